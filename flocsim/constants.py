@@ -1,0 +1,25 @@
+"""Physical constants and numerical tolerances: each with its unit, source and reason."""
+
+VACUUM_PERMITTIVITY = 8.854e-12
+"""ε0 [F/m], rounded as the paper prints it (below eq. 6), so that its numbers come out."""
+
+STANDARD_GRAVITY = 9.81
+"""g [m/s²], the value that MODEL's reference settling speeds were computed with."""
+
+WATER_VISCOSITY = 8.9e-4
+"""γ [Pa s] of water at 25 °C."""
+
+WATER_DENSITY = 997.0
+"""ρ_f [kg/m³] of water at 25 °C."""
+
+WATER_PERMITTIVITY = 78.5
+"""ε_r [-] of water at 25 °C (paper, below eq. 6)."""
+
+MINIMUM_GAP = 1e-9
+"""d_min [m]: the van der Waals law diverges at contact, below this gap it is held constant."""
+
+DEEPEST_OVERLAP = 0.5
+"""Largest overlap, as a share of r_i + r_j: past it the spring law has lost its meaning."""
+
+NEGLIGIBLE_FORCE = 1e-9
+"""A force weaker than this share of its greatest strength is out of reach and left out."""
