@@ -1,0 +1,93 @@
+"""`flocsim init`: write a commented example of a config file."""
+
+import os
+
+from flocsim.errors import UsageError
+
+DEFAULT_FILE = "study.toml"
+
+EXAMPLE = """\
+# A study of binary collisions of settling flocs, for `flocsim ensemble`. docs/config.md has all
+# keys. A quantity is a number in SI units, or a string with a unit such as "16.41 um".
+
+preset = "tang2014"        # the paper's values; or "si": quartz in water, of its real weight
+seed = 1                   # of all random numbers: the same seed, the same results
+replicates = 100           # pairs of orientations per condition
+
+[scene]
+types = ["I", "II", "III"] # the paper's sizes
+# pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
+delta = [0.0, 0.25, 0.5, 0.75, 1.0]   # horizontal displacements, as fractions of delta_max
+# delta_max = "projected"  # a displacement of 1 just grazes; "radius": 1 always misses
+# receiver = "free"        # or "fixed"
+# start_gap = "2 um"       # distance of the outlines at the start
+
+[shapes]
+source = "synthetic"       # flocs that flocsim grows
+# source = "library"       # or flocs fitted to images with `flocsim fit`
+# file = "shapes.h5"
+vertices = [1, 4, 16, 64]  # 1: the sphere of the same area
+radius = "1 um"            # spheroradius
+
+# What follows overrides the preset where it is not commented out.
+
+# [bodies]
+# density = "2650 kg/m^3"  # with depth; or surface_density = "2 kg/m^2"
+# depth = "sphere"         # weighs as much as the solid sphere of the same radius
+
+# [fluid]
+# viscosity = "0.89 mPa s"
+# buoyancy = true          # needs bodies.density
+
+# [forces.van_der_waals]
+# hamaker = "1e-18 J"
+
+# [forces.double_layer]
+# potential = "15 mV"
+# debye_length = "0.98 um"
+
+# [forces.contact]
+# k_n = "20 N/m"
+
+# [forces.mine]            # a force of your own
+# class = "mine:Yukawa"    # the class Yukawa in mine.py beside this file
+
+# [zone]                   # the attraction zone; one of:
+# root = "outer"           # where attraction and repulsion balance; or "inner"
+# distance = "5.9 um"      # the distance between the surfaces of the equivalent spheres
+# centre = "45 um"         # the distance between the centres
+
+[integrator]
+name = "implicit"
+tolerance = "1 nm"         # largest error in position of a step
+# max_steps = 200000       # a replicate that needs more ends undecided
+
+[output]
+file = "results.h5"
+"""
+
+
+def add_parser(subparsers):
+    """Add the subcommand to argparse's ``subparsers``."""
+    parser = subparsers.add_parser(
+        "init",
+        help="write an example config file",
+        description="Write a commented example of a config file, ready to run.",
+    )
+    parser.add_argument(
+        "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite a file that exists")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def run(args):
+    """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
+    from flocsim.io.files import replace_file
+
+    if os.path.lexists(args.file) and not args.force:
+        raise UsageError(f"{args.file} exists already: name another file, or add --force")
+    replace_file(args.file, EXAMPLE.encode())
+    print(f"wrote {args.file}; run it with: flocsim ensemble {args.file}")
+    return 0

@@ -1,0 +1,1 @@
+"""Ensembles of binary collisions: config, scene, sampling, outcomes, statistics, runners."""

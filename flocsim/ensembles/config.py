@@ -1,0 +1,188 @@
+"""The schema of a config file: one attrs class per table, and Config, which holds them all.
+
+An attribute is a key of the table; its metadata say what it takes (flocsim.fields). The loader
+(flocsim.ensembles.loader) makes these objects from TOML; docs/config.md is generated from them.
+"""
+
+from pathlib import Path
+
+import attrs
+
+from flocsim.ensembles.config_fields import (
+    LARGEST_LENGTH,
+    items_reader,
+    optional_quantity,
+    read_by,
+    read_text,
+    whole,
+    whole_reader,
+    word,
+)
+from flocsim.ensembles.config_scene import SceneConfig
+from flocsim.ensembles.presets import PRESETS
+from flocsim.errors import ConfigError
+from flocsim.fields import choice, quantity, word_or_quantity
+from flocsim.state import Fluid
+
+LARGEST_SEED = 2**63 - 1
+MOST_REPLICATES = 10**7
+MOST_STEPS = 10**12
+MOST_VERTICES = 512
+
+
+@attrs.frozen
+class ShapesConfig:
+    """[shapes]: the flocs that collide."""
+
+    source: str = choice(
+        "synthetic", "library", default="synthetic", help="grown by flocsim, or fitted to images"
+    )
+    file: Path | None = attrs.field(
+        default=None,
+        converter=attrs.converters.optional(Path),
+        metadata={
+            "read": read_text,
+            "allowed": "a path, relative to the config file",
+            "shown": "none",
+            "help": 'shape library that `flocsim fit` wrote; with source = "library" only',
+        },
+    )
+    vertices: tuple = read_by(
+        items_reader(whole_reader(1, MOST_VERTICES), "a list of integers such as [1, 4, 16]"),
+        f"a list of distinct integers from 1 to {MOST_VERTICES}",
+        default=(1, 4, 16, 64),
+        help="N, numbers of vertices of the spheropolygons; 1 is the equivalent sphere",
+    )
+    radius: float = quantity(
+        "m", above=0.0, at_most=LARGEST_LENGTH, default=1e-6, help="spheroradius r"
+    )
+    pool: int = whole(
+        1,
+        10**6,
+        default=10,
+        help="number of flocs, nearest in size-to-spheroradius ratio, from which each replicate "
+        "draws its two",
+    )
+    fractal_dimension: float = quantity(
+        "", at_least=1.2, at_most=1.95, default=1.8, help="of the synthetic flocs, in the plane"
+    )
+    primary_particles: int = whole(2, 2000, default=60, help="number in each synthetic floc")
+
+    def __attrs_post_init__(self):
+        if self.source == "library" and self.file is None:
+            raise ConfigError(
+                'source = "library" needs file, the shape library that `flocsim fit` wrote'
+            )
+        if self.source == "synthetic" and self.file is not None:
+            raise ConfigError(
+                'file goes with source = "library", but source is "synthetic": remove file or '
+                "change source"
+            )
+
+
+@attrs.frozen
+class BodiesConfig:
+    """[bodies]: what the flocs weigh; either ``surface_density``, or ``density`` and ``depth``."""
+
+    surface_density: float | None = optional_quantity(
+        "kg/m^2", above=0.0, help="ρ_s: mass m = ρ_s A, A the floc's area"
+    )
+    density: float | None = optional_quantity(
+        "kg/m^3", above=0.0, help="ρ of the solid: ρ_s = ρ · depth"
+    )
+    depth: float | str = word_or_quantity(
+        "sphere",
+        "m",
+        above=0.0,
+        default="sphere",
+        help='thickness of the flocs; "sphere" = 4/3 r_eq, the mass of the equivalent sphere',
+    )
+
+    def __attrs_post_init__(self):
+        if (self.surface_density is None) == (self.density is None):
+            raise ConfigError(
+                "needs either surface_density [kg/m^2], or density [kg/m^3] with depth: add e.g. "
+                "surface_density = 2.0 (the paper's weights), or density = 2650.0"
+            )
+
+
+@attrs.frozen
+class ZoneConfig:
+    """[zone]: the attraction zone d_c < D_0; one of ``root``, ``distance`` and ``centre``."""
+
+    distance: float | None = optional_quantity("m", at_least=0.0, help="d_0: D_0 = r_i + r_j + d_0")
+    centre: float | None = optional_quantity("m", above=0.0, help="D_0 itself")
+    root: str | None = attrs.field(
+        default=attrs.Factory(
+            lambda self: "outer" if self.distance is None and self.centre is None else None,
+            takes_self=True,
+        ),
+        validator=attrs.validators.optional(attrs.validators.in_(("inner", "outer"))),
+        metadata={
+            "choices": ("inner", "outer"),
+            "shown": '"outer"',
+            "help": "d_0 is this root of attraction = repulsion; it must exist",
+        },
+    )
+
+
+@attrs.frozen
+class IntegratorConfig:
+    """[integrator]: how time goes on."""
+
+    name: str = word(default="implicit", help="the method, e.g. implicit or velocity_verlet")
+    tolerance: float = quantity(
+        "m", above=0.0, default=1e-9, help="largest error in position of a step"
+    )
+    max_steps: int = whole(
+        1, MOST_STEPS, default=200_000, help="steps after which a replicate ends undecided"
+    )
+    step: float | None = optional_quantity("s", above=0.0, help="for methods with a fixed step")
+
+
+@attrs.frozen
+class OutputConfig:
+    """[output]: where the results go."""
+
+    file: str = word(default="results.h5", help="results file, relative to the current folder")
+
+
+@attrs.frozen(eq=False)
+class Config:
+    """A whole config file, checked, with the preset's values filled in. SI units.
+
+    ``forces`` (Force objects) and ``force_names`` go in step: gravity, drag, van_der_waals,
+    double_layer, contact, then the user's own as in the file. ``text`` is the file's source and
+    ``folder`` where it lies.
+    """
+
+    preset: str | None = attrs.field(
+        default=None,
+        metadata={
+            "choices": tuple(PRESETS),
+            "shown": "none",
+            "help": "values that lie under the file's own",
+        },
+    )
+    seed: int = whole(0, LARGEST_SEED, default=1, help="of all random numbers")
+    replicates: int = whole(
+        1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
+    )
+    scene: SceneConfig = attrs.Factory(SceneConfig)
+    shapes: ShapesConfig = attrs.Factory(ShapesConfig)
+    bodies: BodiesConfig = attrs.field(kw_only=True)
+    fluid: Fluid = attrs.Factory(Fluid)
+    forces: tuple = attrs.field(kw_only=True)
+    force_names: tuple = attrs.field(kw_only=True)
+    zone: ZoneConfig = attrs.Factory(ZoneConfig)
+    integrator: IntegratorConfig = attrs.Factory(IntegratorConfig)
+    output: OutputConfig = attrs.Factory(OutputConfig)
+    text: str = ""
+    folder: Path = attrs.Factory(Path)
+
+    @property
+    def body_options(self):
+        """The bodies' weight as keyword arguments of flocsim.state.Body."""
+        if self.bodies.density is None:
+            return {"surface_density": self.bodies.surface_density}
+        return {"density": self.bodies.density, "depth": self.bodies.depth}

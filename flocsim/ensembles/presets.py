@@ -1,0 +1,65 @@
+"""Presets: values that lie under the user's config file, each of which the file can override.
+
+- ``tang2014``: the paper's findings come out. Its Table 1, a mass per area of 2.0 kg/m² (the
+  compromise between the masses that Table 1's damping implies), no buoyancy, and a Debye length
+  of 0.98 µm, that of pure water. Attraction and repulsion then balance at 344 nm and 5925 nm; the
+  outer root bounds the zone.
+- ``tang2014-literal``: as printed, with a Debye length of 0.98 nm. Attraction wins at every
+  distance by more than 160 times, so that there is no zone: a run says so and stops. Give
+  ``[zone]`` a distance or a centre to run it all the same.
+- ``si``: solid particles of real weight. Quartz in water with buoyancy, forces between the
+  outlines, a Debye length of 0.98 nm and a Hamaker constant of 4.7e-20 J. Here too there is no
+  root (S = H_A κ/(24π ε0 ε_r φ²) = 4.1, above 4/e² = 0.54, the largest that has one), so the zone
+  is given: d_0 = 10 nm. That is where the attraction H_A r*/(6 d²) of a Type I pair falls to the
+  weight of its falling body (9.5 nm; Type II 6.2 nm, Type III 48 nm), and ten Debye lengths,
+  where the repulsion has long died out.
+"""
+
+TANG2014 = {
+    "bodies": {"surface_density": 2.0},
+    "fluid": {"viscosity": 8.9e-4, "buoyancy": False},
+    "forces": {
+        "gravity": {},
+        "drag": {},
+        "van_der_waals": {"hamaker": 1e-18, "gap": "equivalent_spheres"},
+        "double_layer": {
+            "potential": 15e-3,
+            "debye_length": 0.98e-6,
+            "permittivity": 78.5,
+            "gap": "equivalent_spheres",
+        },
+        "contact": {
+            "k_n": 20.0,
+            "k_t": 2.0,
+            "damping_n": "critical",
+            "damping_t": "proportional",
+        },
+    },
+    "zone": {"root": "outer"},
+}
+
+TANG2014_LITERAL = TANG2014 | {
+    "forces": TANG2014["forces"]
+    | {"double_layer": TANG2014["forces"]["double_layer"] | {"debye_length": 0.98e-9}}
+}
+
+SI = {
+    "bodies": {"density": 2650.0, "depth": "sphere"},
+    "fluid": {"viscosity": 8.9e-4, "density": 997.0, "buoyancy": True},
+    "forces": {
+        "gravity": {},
+        "drag": {},
+        "van_der_waals": {"hamaker": 4.7e-20, "gap": "surface"},
+        "double_layer": {
+            "potential": 15e-3,
+            "debye_length": 0.98e-9,
+            "permittivity": 78.5,
+            "gap": "surface",
+        },
+        "contact": TANG2014["forces"]["contact"],
+    },
+    "zone": {"distance": 1e-8},
+}
+
+PRESETS = {"tang2014": TANG2014, "tang2014-literal": TANG2014_LITERAL, "si": SI}
+"""Name → values, nested like the config file."""

@@ -1,0 +1,108 @@
+"""Numbers with units: "16.41 um" is 16.41e-6 m, converted in decimals, its dimension checked."""
+
+import functools
+import re
+from decimal import Decimal, localcontext
+
+KINDS = {
+    "m": ("a length", "16.41 um"),
+    "s": ("a time", "5 s"),
+    "J": ("an energy", "1e-18 J"),
+    "V": ("an electric potential", "15 mV"),
+    "N/m": ("a stiffness", "20 N/m"),
+    "Pa s": ("a viscosity", "0.89 mPa s"),
+    "kg/m^2": ("a mass per area", "2 kg/m^2"),
+    "kg/m^3": ("a density", "2650 kg/m^3"),
+    "m/s": ("a velocity", "1 mm/s"),
+    "m/s^2": ("an acceleration", "9.81 m/s^2"),
+    "1/s": ("a rate", "1e6 1/s"),
+    "rad": ("an angle", "90 deg"),
+    "rad/s": ("an angular velocity", "1 rad/s"),
+    "N": ("a force", "1 pN"),
+    "N m": ("a torque", "1e-18 N m"),
+    "1/m": ("a reciprocal length", "1.02 1/um"),
+}
+"""What a quantity of a unit is called, and how one is written."""
+
+NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)(.*)", re.DOTALL
+)
+UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)(?:(?:\^|\*\*)?([+-]?[0-9]))?")
+SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
+
+# Far more digits than a float has, so that the only rounding is the last one.
+DIGITS = 60
+
+
+def kind_of(unit):
+    """What a value of the unit is, in words: "an energy such as '1e-18 J'"."""
+    name, example = KINDS.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
+    return f"{name} such as {example!r}"
+
+
+def read_quantity(text, unit):
+    """The value of ``text``, a number and its unit, in ``unit`` as a float.
+
+    The conversion is decimal: ``read_quantity("16.41 um", "m") == 16.41e-6``. Units multiply by a
+    space, "*" or "·", divide by "/", and have whole exponents: "mPa s", "kg/m^3", "kg m-3", "m²".
+    ValueError, with the reason, for text that is no quantity or has another dimension.
+    """
+    number, written = split_quantity(text)
+    with localcontext() as context:
+        context.prec = DIGITS
+        return float(number * factor(written, unit))
+
+
+def split_quantity(text):
+    """The number (Decimal) and the text of the unit behind it."""
+    match = NUMBER.fullmatch(text)
+    if not match:
+        raise ValueError("no number in front")
+    written = match[2].translate(SIGNS).strip()
+    if not written:
+        raise ValueError("a number in quotes needs a unit")
+    return Decimal(match[1]), written
+
+
+@functools.cache
+def registry():
+    """pint's units, in decimals; loaded when the first quantity with a unit is met."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@functools.lru_cache(maxsize=256)
+def factor(written, unit):
+    """How many of ``unit`` one of the ``written`` unit is (Decimal)."""
+    import pint
+
+    one = registry().Quantity(Decimal(1), parse_unit(written))
+    try:
+        return one.to(parse_unit(unit)).magnitude
+    except (pint.PintError, ArithmeticError, TypeError, ValueError) as error:
+        raise ValueError("") from error
+
+
+def parse_unit(text):
+    """A product of powers of units. Read here, since pint would evaluate "9**9**9 m"."""
+    product = registry().Unit("dimensionless")
+    place = 1 if re.match(r"1\s*/", text) else 0
+    while place < len(text):
+        match = UNIT_FACTOR.match(text, place)
+        if not match or not match[2].isidentifier():
+            raise ValueError(f"{text[place:].strip()!r} is no unit")
+        exponent = int(match[3] or 1)
+        product = product * named_unit(match[2]) ** (-exponent if match[1] == "/" else exponent)
+        place = match.end()
+    return product
+
+
+def named_unit(name):
+    """One unit by its name; ValueError if there is none."""
+    import pint
+
+    try:
+        return registry().Unit(name)
+    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"unknown unit {name!r}") from error

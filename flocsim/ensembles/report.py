@@ -1,0 +1,80 @@
+"""The table of a study for the terminal."""
+
+import numpy as np
+
+from flocsim.io.results import CLASSES
+
+HEADER = (
+    ("", "N"),
+    ("", "delta"),
+    ("", "n"),
+    ("col-", "lided"),
+    ("in-", "side"),
+    ("", "Pr[inside] 95 %"),
+    ("", "Pr[A] 95 %"),
+    *(("", name) for name in CLASSES),
+    ("", "missed"),
+    ("un-", "decided"),
+    ("", "failed"),
+)
+
+
+WIDTH = 110
+"""Columns of a wide terminal; the table is set more openly where this leaves room."""
+
+
+def format_table(types, vertices, delta, table):
+    """Counts and probabilities with their intervals, one row per condition, a block per type.
+
+    ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
+    arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
+    "-" where there was no event to estimate a probability from. Returns text without a final line
+    end.
+    """
+    conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
+    rows = [condition_row(vertices, delta, table, place) for place in conditions]
+    upper, lower = zip(*HEADER, strict=True)
+    widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
+    if sum(widths) + 2 * len(widths) <= WIDTH:
+        widths = [width + 1 for width in widths]
+    lines = [align(upper, widths), align(lower, widths)]
+    for place, row in zip(conditions, rows, strict=True):
+        if place[1:] == (0, 0):
+            lines.append(f"type {types[place[0]]}")
+        lines.append(align(row, widths))
+    return "\n".join(lines)
+
+
+def condition_row(vertices, delta, table, place):
+    """The cells of one condition."""
+    _, v, d = place
+    counts = ("n_total", "n_collided", "n_inside")
+    ends = ("n_missed", "n_undecided", "n_failed")
+    return (
+        str(vertices[v]),
+        f"{delta[d]:g}",
+        *(str(table[name][place]) for name in counts),
+        interval(table, "pr_inside", place),
+        interval(table, "pr_a", place),
+        *(str(number) for number in table["n_class"][place]),
+        *(str(table[name][place]) for name in ends),
+    )
+
+
+def interval(table, name, place):
+    """A probability with its interval, e.g. ".600 [.569, .630]"."""
+    value, low, high = (table[name + end][place] for end in ("", "_low", "_high"))
+    if np.isnan(value):
+        return "-"
+    return f"{share(value)} [{share(low)}, {share(high)}]"
+
+
+def share(value):
+    """Three decimals in four characters: ".345", "1.00"."""
+    text = f"{value:.3f}"
+    return text[1:] if text.startswith("0") else text[:4]
+
+
+def align(cells, widths):
+    """Right-aligned cells; nothing trails."""
+    return " ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()

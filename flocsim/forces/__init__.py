@@ -1,0 +1,22 @@
+"""The forces between bodies and fluid; subclass one of the four kinds to add your own."""
+
+from flocsim.forces.base import BodyForce, CentreForce, ContactForce, Force, PairForce, SurfaceForce
+from flocsim.forces.contact import Contact
+from flocsim.forces.double_layer import DoubleLayer
+from flocsim.forces.drag import StokesDrag
+from flocsim.forces.gravity import Gravity
+from flocsim.forces.van_der_waals import VanDerWaals
+
+__all__ = [
+    "BodyForce",
+    "CentreForce",
+    "Contact",
+    "ContactForce",
+    "DoubleLayer",
+    "Force",
+    "Gravity",
+    "PairForce",
+    "StokesDrag",
+    "SurfaceForce",
+    "VanDerWaals",
+]

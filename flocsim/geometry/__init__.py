@@ -1,0 +1,1 @@
+"""Shapes, distances between them, and the contact points of two bodies."""

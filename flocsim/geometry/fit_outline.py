@@ -1,0 +1,155 @@
+"""The outline of a pixel mask, and choices of N points on it that a fit can start from."""
+
+import numpy as np
+
+from flocsim.errors import ShapeError
+
+HEADINGS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+"""Walks along pixel edges as (rows, columns): right, down, left, up, each a right turn on."""
+
+
+def trace_outline(mask):
+    """The outer outline of a mask's first region, (M, 2) as x = column, y = row.
+
+    The points are the middles of the pixel edges between the region and its outside, in order
+    around the region, which is taken 8-connected.  Their polygon is simple.  `mask` has a margin
+    of at least one empty pixel.
+    """
+    start = row, column = tuple(int(place[0]) for place in np.nonzero(mask))
+    inside = mask.tolist()
+    heading, middles = 0, []
+    while True:
+        down, right = HEADINGS[heading]
+        middles.append((column - 0.5 + 0.5 * right, row - 0.5 + 0.5 * down))
+        row, column = row + down, column + right
+        heading = _turn(inside, row, column, heading)
+        if (row, column) == start and heading == 0:
+            return np.array(middles)
+
+
+def _turn(inside, row, column, heading):
+    """The heading after the corner at the upper left of pixel (row, column), region on the right."""
+    down, right = HEADINGS[heading]
+    left_row, left_column = _ahead(row, column, down, right, -1)
+    right_row, right_column = _ahead(row, column, down, right, 1)
+    if inside[left_row][left_column]:
+        return (heading - 1) % 4
+    return heading if inside[right_row][right_column] else (heading + 1) % 4
+
+
+def _ahead(row, column, down, right, hand):
+    """The pixel ahead of a corner, to the left (hand −1) or the right (hand 1) of the heading."""
+    beside_down, beside_right = hand * right, -hand * down
+    return (
+        row + (down + beside_down - 1) // 2,
+        column + (right + beside_right - 1) // 2,
+    )
+
+
+def even_points(outline, count, shift=0.0):
+    """`count` points evenly spaced along the closed outline; `shift` in spacings moves them on."""
+    closed = np.vstack([outline, outline[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    places = (np.arange(count) + shift) / count * along[-1]
+    return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
+
+
+def telling_points(outline, count):
+    """The `count` points that tell most of the outline (Visvalingam and Whyatt 1993).
+
+    The point that spans the smallest triangle with its neighbours is left out, again and again.
+    """
+    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
+    points = points.copy()
+    areas = _triangle_areas(points)
+    while len(points) > count:
+        k = int(np.argmin(areas))
+        points, areas = np.delete(points, k, axis=0), np.delete(areas, k)
+        for near in ((k - 1) % len(points), k % len(points)):
+            areas[near] = _triangle_areas(points[[near - 1, near, (near + 1) % len(points)]])[1]
+    return points
+
+
+def _triangle_areas(points):
+    """Half the spanned parallelogram of every point with its two neighbours, (len(points),)."""
+    before, after = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
+    return 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+
+
+def untangle(vertices):
+    """The vertices in an order in which no edges cross, as far as that is found.
+
+    Of every crossing pair of edges the part between is reversed, which shortens the polygon.
+    """
+    from flocsim.geometry.fit_kernels import segments_cross
+
+    vertices = vertices.copy()
+    # Points on one line can seem to cross for ever, by rounding: the rounds are counted.
+    for _ in range(len(vertices)):
+        crossed = False
+        for first, second in _edge_pairs(len(vertices)):
+            ends = vertices[[first, first + 1, second, (second + 1) % len(vertices)]]
+            if segments_cross(*ends.ravel()):
+                vertices[first + 1 : second + 1] = vertices[first + 1 : second + 1][::-1].copy()
+                crossed = True
+        if not crossed:
+            break
+    return vertices
+
+
+def _edge_pairs(count):
+    """Pairs of edges of a closed polygon that share no vertex."""
+    for first in range(count - 2):
+        for second in range(first + 2, count - (first == 0)):
+            yield first, second
+
+
+def inset(vertices, depth):
+    """The simple polygon with every vertex drawn inwards by `depth`, or less where it must.
+
+    `vertices`: in trace_outline's sense.  A vertex goes along the bisector of its corner by all,
+    half, or none of `depth`, as long as the polygon stays simple.
+    """
+    from flocsim.geometry.fit_kernels import stays_simple
+
+    vertices = vertices.copy()
+    for k, inwards in enumerate(_inward_directions(vertices)):
+        for share in (1.0, 0.5):
+            x, y = vertices[k] + share * depth * inwards
+            if stays_simple(vertices, k, x, y):
+                vertices[k] = x, y
+                break
+    return vertices
+
+
+def _inward_directions(vertices):
+    edges = np.roll(vertices, -1, axis=0) - vertices
+    edges /= np.maximum(np.hypot(*edges.T), 1e-12)[:, None]
+    # Right of the walk, which is the inside; rows count downwards.
+    normals = np.column_stack([-edges[:, 1], edges[:, 0]])
+    sums = normals + np.roll(normals, 1, axis=0)
+    return sums / np.maximum(np.hypot(*sums.T), 1e-12)[:, None]
+
+
+def ring_inside(mask, count):
+    """A regular polygon around the deepest pixel of the mask: a start that is always simple."""
+    from scipy.ndimage import distance_transform_edt
+
+    depth = distance_transform_edt(mask)
+    row, column = np.unravel_index(np.argmax(depth), depth.shape)
+    radius = max(0.5 * depth[row, column], 1.0, 0.01 * count)
+    angles = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([column + radius * np.cos(angles), row + radius * np.sin(angles)])
+
+
+def require_one_region(mask):
+    """The mask as a bool array; ShapeError unless it holds just one 8-connected region."""
+    from scipy.ndimage import label
+
+    mask = np.asarray(mask)
+    if mask.ndim != 2 or not np.isin(mask, (0, 1)).all():
+        raise ShapeError(f"a mask is an (h, w) array of 0 and 1, found shape {mask.shape}")
+    regions = label(mask, structure=np.ones((3, 3)))[1]
+    if regions != 1:
+        raise ShapeError(f"a mask must hold one floc, found {regions} separate regions")
+    return mask.astype(bool)

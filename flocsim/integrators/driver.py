@@ -1,0 +1,220 @@
+"""The one loop around every integrator: lists, error control, events, budgets, recording."""
+
+import math
+
+from flocsim.geometry.candidates import list_candidates, spent
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.handover import hand_over
+from flocsim.layout import (
+    BOUNDING_RADIUS,
+    CANDIDATES,
+    CODE,
+    ERROR,
+    LARGEST_STEP,
+    LOCATED,
+    MAX_STEPS,
+    MOTION_LIMIT,
+    NEW,
+    NOW,
+    PAUSE_AT,
+    RADIUS,
+    RECORDED,
+    REJECTED,
+    STEP,
+    STEPS,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+)
+from flocsim.slots import attempt, event_value, has_contact, next_step, observe, surface_reach
+
+FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
+    1, 10
+)
+"""The values of integrators.status.Status, as plain numbers for the compiled loop."""
+
+SMALLEST_STEP = 1e-14
+"""A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
+
+EVENT_ACCURACY = 1e-3
+"""Events are located to this share of the tolerance …"""
+
+EVENT_FLOOR = 1e-13
+"""… but not finer than this [m]."""
+
+EVENT_TRIALS = 60
+"""Steps tried to locate one event; the bracket is then as narrow as floats allow."""
+
+DEEPEST = 0.5
+"""Largest overlap as a share of r_i + r_j (constants.DEEPEST_OVERLAP)."""
+
+
+def too_deep(scene, work):
+    """Whether any listed pair overlaps past the limit of the contact law."""
+    for row in range(work.tally[CANDIDATES]):
+        a, b = work.candidates[row, 0], work.candidates[row, 2]
+        if -work.geometry[row, 2] > DEEPEST * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]):
+            return True
+    return False
+
+
+def closing_speed(scene, work, a, b):
+    """Upper bound of the speed at which two outlines move against each other [m/s]."""
+    v = work.motion
+    turning = abs(v[NOW, a, 5]) * scene.bodies[a, BOUNDING_RADIUS]
+    turning += abs(v[NOW, b, 5]) * scene.bodies[b, BOUNDING_RADIUS]
+    return math.hypot(v[NOW, a, 3] - v[NOW, b, 3], v[NOW, a, 4] - v[NOW, b, 4]) + turning
+
+
+def least_listed_gap(work):
+    """The smallest gap among the listed pairs (inf where none is listed)."""
+    least = math.inf
+    for row in range(work.tally[CANDIDATES]):
+        least = min(least, work.geometry[row, 2])
+    return least
+
+
+def motion_step(scene, work, clock):
+    """The longest step whose motion keeps the list valid and skips no awaited event."""
+    longest = math.inf
+    least_gap = least_listed_gap(work)
+    pair = 0
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            room = 0.5 * work.budget[pair]
+            if clock[MOTION_LIMIT] < math.inf:
+                grain = clock[MOTION_LIMIT] * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS])
+                room = min(room, max(0.9 * least_gap, grain))
+            speed = closing_speed(scene, work, a, b)
+            if speed * longest > room:
+                longest = room / speed
+            pair += 1
+    return longest
+
+
+def choose_step(scene, work, clock, lists):
+    """The size of the next step [s]."""
+    step = min(clock[STEP], clock[LARGEST_STEP])
+    if lists:
+        step = min(step, motion_step(scene, work, clock))
+    left = clock[UNTIL] - clock[TIME]
+    # Two even steps at the end instead of a long one and a sliver.
+    if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
+        return 0.5 * left
+    return min(step, left)
+
+
+def between(low, high, at_low, at_high):
+    """Where a straight line through two values crosses zero; the middle where it does not."""
+    trial = (low * at_high - high * at_low) / (at_high - at_low)
+    if low < trial < high:
+        return trial
+    return 0.5 * (low + high)
+
+
+def accept(scene, work, clock, counts, step, ratio, lists):
+    """Make the new state the current one."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(6):
+            work.motion[NOW, body, axis] = work.motion[NEW, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        work.slip[NOW, row] = work.slip[NEW, row]
+    clock[TIME] += step
+    counts[STEPS] += 1
+    if clock[TOLERANCE] < math.inf:
+        clock[ERROR] += ratio * clock[TOLERANCE]
+    if lists:
+        locate_contacts(scene, work, NOW)
+        hand_over(work)
+
+
+def reject(clock, counts, step, ratio, too_far):
+    """Choose a smaller step; STALLED where there is none."""
+    counts[REJECTED] += 1
+    clock[STEP] = 0.25 * step if ratio < 0.0 or too_far else next_step(clock, step, ratio)
+    if step < SMALLEST_STEP * max(clock[TIME], 1e-3):
+        return STALLED
+    return 0
+
+
+def record_row(work, clock, counts, record):
+    """Write the current state to the record (rows of time, then six numbers for each body)."""
+    row = counts[RECORDED]
+    record[row, 0] = clock[TIME]
+    for body in range(work.motion.shape[1]):
+        for axis in range(6):
+            record[row, 1 + 6 * body + axis] = work.motion[NOW, body, axis]
+    counts[RECORDED] = row + 1
+
+
+def event_accuracy(clock):
+    """How near to an event's zero a located step must end [m]."""
+    if clock[TOLERANCE] == math.inf:
+        return EVENT_FLOOR
+    return max(EVENT_ACCURACY * clock[TOLERANCE], EVENT_FLOOR)
+
+
+def advance(scene, work, memo, clock, counts, record):
+    """Run until a Status; call again to go on after PAUSED, RECORD_FULL or NO_ROOM.
+
+    ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
+    """
+    lists = has_contact() or surface_reach(scene.parameters) > 0.0
+    low, high, at_low, at_high, side, trials = 0.0, 0.0, 0.0, 0.0, 0, 0
+    while clock[TIME] < clock[UNTIL]:
+        if counts[STEPS] + counts[REJECTED] >= counts[MAX_STEPS]:
+            return STEP_BUDGET
+        if counts[STEPS] >= counts[PAUSE_AT]:
+            return PAUSED
+        if record.shape[0] > 0 and counts[RECORDED] == record.shape[0]:
+            return RECORD_FULL
+        if lists and spent(scene, work, NOW) > 0.5:
+            if not list_candidates(scene, work):
+                return NO_ROOM
+            locate_contacts(scene, work, NOW)
+        if trials == 0:
+            at_low = event_value(scene, work, memo, NOW)
+            step = choose_step(scene, work, clock, lists)
+        else:
+            step = between(low, high, at_low, at_high)
+        ratio = attempt(scene, work, clock, step)
+        if ratio < 0.0 and clock[TOLERANCE] == math.inf:
+            return NOT_FINITE
+        too_far = lists and ratio >= 0.0 and spent(scene, work, NEW) > 1.0
+        if ratio < 0.0 or ratio > 1.0 or too_far:
+            trials = 0
+            status = reject(clock, counts, step, ratio, too_far)
+            if status != 0:
+                return status
+            continue
+        value = event_value(scene, work, memo, NEW) if at_low > 0.0 else 1.0
+        at_event = at_low > 0.0 and value <= 0.0
+        close = abs(value) <= event_accuracy(clock) or high - low <= 1e-15 * high
+        if (at_event or trials > 0) and not close and trials < EVENT_TRIALS:
+            # Illinois: halve the value of the end that stays, so that both ends close in.
+            if trials == 0:
+                low, high, at_high, side = 0.0, step, value, 0
+            elif value > 0.0:
+                low, at_low = step, value
+                at_high *= 0.5 if side == 1 else 1.0
+                side = 1
+            else:
+                high, at_high = step, value
+                at_low *= 0.5 if side == -1 else 1.0
+                side = -1
+            trials += 1
+            continue
+        at_event = at_event or trials > 0
+        if not at_event:
+            clock[STEP] = next_step(clock, step, ratio)
+        counts[LOCATED] += 1 if at_event else 0
+        trials = 0
+        accept(scene, work, clock, counts, step, ratio, lists)
+        if record.shape[0] > 0:
+            record_row(work, clock, counts, record)
+        if lists and too_deep(scene, work):
+            return TOO_DEEP
+        counts[CODE] = observe(scene, work, memo, clock[TIME], at_event)
+        if counts[CODE] != 0:
+            return STOPPED
+    return FINISHED

@@ -1,0 +1,109 @@
+"""Files written whole or not at all, and sealed so that damage is found before HDF5 parses them.
+
+The seal is a checksum appended behind the end of the HDF5 data, where every HDF5 library ignores
+it: a damaged HDF5 file can crash its reader or keep it busy for ever, a wrong checksum cannot.
+"""
+
+import contextlib
+import hashlib
+import os
+import secrets
+from pathlib import Path
+
+from flocsim.errors import FileError
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+SEAL_MARK = b"\nflocsim blake2b-256 "
+SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
+
+
+def replace_file(path, data):
+    """Put ``data`` (bytes) at ``path``: a reader meets the old file or the new one, never a part.
+
+    Written to a temporary file in the same folder, synced, renamed, and the folder synced.
+    Raises FileError if the folder is missing or unwritable, the disk is full, or the path names
+    something that is not an ordinary file.
+    """
+    target = ordinary_target(path)
+    temporary = target.with_name(f".flocsim-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    try:
+        write_synced(temporary, data)
+        os.replace(temporary, target)
+        sync_folder(target.parent)
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error) from error
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            temporary.unlink()
+
+
+def ordinary_target(path):
+    """The file behind ``path``, links followed; renaming over a device or a folder is refused."""
+    try:
+        target = Path(os.path.realpath(path))
+        refused = target.exists() and not target.is_file()
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error) from error
+    if refused:
+        raise FileError(f"{path} is not an ordinary file: name another place to write to")
+    return target
+
+
+def unwritable(path, error):
+    """The FileError that says why ``path`` could not be written."""
+    reason = getattr(error, "strerror", None) or error
+    return FileError(
+        f"{path} could not be written: {reason}; check the folder, its permissions and free space"
+    )
+
+
+def write_synced(path, data):
+    """Write a new file and wait until the disk has it."""
+    with open(path, "xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_folder(folder):
+    """Make a rename last through a power cut; Windows cannot and need not open a folder."""
+    if os.name != "nt":
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def seal(data):
+    """The bytes of an HDF5 file with their checksum appended."""
+    return data + SEAL_MARK + hashlib.blake2b(data, digest_size=32).hexdigest().encode() + b"\n"
+
+
+def read_sealed(path):
+    """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
+    try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise FileError(f"{path} is not an ordinary file: name a results file")
+        data = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path} could not be read: {reason}; check the name") from error
+    return unseal(path, data)
+
+
+def unseal(path, data):
+    """``data`` without its seal, once the checksum has been found right."""
+    if not data.startswith(HDF5_SIGNATURE):
+        raise FileError(f"{path} is not an HDF5 file: name a file that flocsim wrote")
+    content, tail = data[:-SEAL_LENGTH], data[-SEAL_LENGTH:]
+    if not tail.startswith(SEAL_MARK):
+        raise FileError(
+            f"{path} does not end in flocsim's checksum: it is of another kind, was cut short or "
+            "was changed by another program; use the original file"
+        )
+    if seal(content) != data:
+        raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
+    return content

@@ -1,0 +1,71 @@
+"""Noise and uneven light: what is taken out of a picture before its flocs are looked for."""
+
+import numpy as np
+
+SURFACE_ROUNDS = 15
+"""Rounds of reweighting; the surface moves by less than a grey level after about ten."""
+
+SURFACE_SAMPLES = 120
+"""Points along the longer side that the surface is fitted to: plenty for a degree of 6."""
+
+DARKEST = 0.01
+"""Added before taking logarithms: about the black level of 8-bit cameras."""
+
+
+def low_pass(grey, scale):
+    """`grey` with detail finer than `scale` [px] removed: exp(−½ (k·scale)²) in Fourier space.
+
+    The cosine transform is the Fourier transform of the picture mirrored at its edges, so that
+    opposite edges do not bleed into each other.
+    """
+    from scipy import fft
+
+    spectrum = fft.dctn(grey, norm="ortho")
+    for axis, size in enumerate(grey.shape):
+        wavenumber = np.pi * np.arange(size) / size
+        gain = np.exp(-0.5 * (wavenumber * scale) ** 2)
+        spectrum *= np.expand_dims(gain, 1 - axis)
+    return fft.idctn(spectrum, norm="ortho")
+
+
+def robust_deviation(values):
+    """The standard deviation of a normal bulk, blind to outliers: 1.4826 × median |v − median|."""
+    return 1.4826 * np.median(np.abs(values - np.median(values)))
+
+
+def smooth_surface(grey, degree):
+    """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`.
+
+    Least squares over products of Legendre polynomials of total degree ≤ `degree`, reweighted
+    w = 1/(1 + (residual/1.5σ)²)² so that pixels of flocs lose their say; σ is the robust deviation.
+    """
+    rows, columns = (_legendre(size, degree) for size in grey.shape)
+    step = max(1, -(-max(grey.shape) // SURFACE_SAMPLES))
+    sample = grey[::step, ::step]
+    basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
+    terms = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
+    coefficients = np.zeros(terms.shape)
+    coefficients[terms] = _reweighted_fit(
+        basis[..., terms].reshape(sample.size, -1), sample.ravel()
+    )
+    return rows @ coefficients @ columns.T
+
+
+def light_surface(grey, degree):
+    """As smooth_surface, for light that falls off by a factor: fitted to the logarithm of grey."""
+    return np.exp(smooth_surface(np.log(np.maximum(grey, 0.0) + DARKEST), degree)) - DARKEST
+
+
+def _legendre(size, degree):
+    places = np.linspace(-1.0, 1.0, size) if size > 1 else np.zeros(1)
+    return np.polynomial.legendre.legvander(places, degree)
+
+
+def _reweighted_fit(basis, values):
+    weights = np.ones_like(values)
+    for _ in range(SURFACE_ROUNDS):
+        solution = np.linalg.lstsq(basis * weights[:, None], values * weights, rcond=None)[0]
+        residual = values - basis @ solution
+        deviation = robust_deviation(residual) + 1e-3
+        weights = 1.0 / (1.0 + ((residual - np.median(residual)) / (1.5 * deviation)) ** 2) ** 2
+    return solution

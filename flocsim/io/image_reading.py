@@ -1,0 +1,111 @@
+"""Picture files → grey arrays.  Pillow opens nearly all; tifffile what Pillow cannot in TIFF."""
+
+from pathlib import Path
+
+import numpy as np
+
+from flocsim.errors import ImageError
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+"""Endings that are taken for pictures when a folder is given."""
+
+LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
+"""Weights of red, green and blue in the luminance (ITU-R BT.709)."""
+
+
+def read_grey(path):
+    """The luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float64 in [0, 1].
+
+    The full range of the file's number type maps to [0, 1]; floating-point files must already lie
+    there or are divided by their maximum.  Transparent pixels take the median grey of the opaque
+    ones, so that they count as background.  Raises ImageError, naming the file, when it is
+    missing, damaged, no picture, or a stack of several.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ImageError(f"{path}: no such picture file; check the path")
+    pixels = _decode(path)
+    if pixels.size == 0 or not np.all(np.isfinite(pixels)):
+        raise ImageError(f"{path}: the picture is empty or holds values that are not numbers")
+    return _luminance(_to_unit_range(pixels, path), path)
+
+
+def _decode(path):
+    try:
+        return _decode_with_pillow(path)
+    except ImageError:
+        raise
+    except Exception as problem:
+        # Decoders raise nearly anything on damaged files; all of it means one thing to the user.
+        if path.suffix.lower() in (".tif", ".tiff"):
+            return _decode_with_tifffile(path)
+        raise ImageError(
+            f"{path}: cannot be read as a picture ({_one_line(problem)}); "
+            "give an undamaged PNG, JPEG, TIFF or BMP"
+        ) from problem
+
+
+def _decode_with_pillow(path):
+    from PIL import Image, ImageOps
+
+    with Image.open(path) as image:
+        if getattr(image, "n_frames", 1) > 1:
+            raise ImageError(
+                f"{path}: holds {image.n_frames} pictures; save the wanted one to its own file"
+            )
+        image.load()
+        image = ImageOps.exif_transpose(image)
+        if image.mode in ("P", "PA"):
+            image = image.convert("RGBA")
+        elif image.mode in ("CMYK", "YCbCr", "LAB", "HSV", "RGBX"):
+            image = image.convert("RGB")
+        return np.asarray(image)
+
+
+def _decode_with_tifffile(path):
+    import tifffile
+
+    try:
+        return np.asarray(tifffile.imread(path))
+    except Exception as problem:
+        raise ImageError(
+            f"{path}: cannot be read as a TIFF ({_one_line(problem)}); "
+            "save it uncompressed, or as PNG"
+        ) from problem
+
+
+def _one_line(problem):
+    return " ".join(str(problem).split())[:120] or type(problem).__name__
+
+
+def _to_unit_range(pixels, path):
+    if pixels.dtype == bool:
+        return pixels.astype(float)
+    low, high = float(pixels.min()), float(pixels.max())
+    if low < 0:
+        raise ImageError(f"{path}: holds negative values (least {low:g}); grey starts at 0")
+    if np.issubdtype(pixels.dtype, np.floating):
+        return pixels.astype(float) / max(high, 1.0)
+    # 16-bit files may arrive in a 32-bit array: the smallest usual range that holds them counts.
+    full = 255.0 if pixels.dtype.itemsize == 1 else 65535.0
+    return pixels.astype(float) / max(full, high)
+
+
+def _luminance(pixels, path):
+    if pixels.ndim == 2:
+        return pixels
+    if pixels.ndim != 3 or pixels.shape[2] > 4:
+        raise ImageError(
+            f"{path}: an array of shape {pixels.shape} is not one grey or colour picture; "
+            "save the wanted picture to its own file"
+        )
+    has_alpha = pixels.shape[2] in (2, 4)
+    colours = pixels[..., :-1] if has_alpha else pixels
+    grey = colours[..., 0] if colours.shape[2] == 1 else colours @ LUMINANCE
+    return _fill_transparent(grey, pixels[..., -1]) if has_alpha else grey
+
+
+def _fill_transparent(grey, alpha):
+    opaque = grey[alpha > 0.5]
+    backdrop = np.median(opaque) if opaque.size else 0.0
+    return alpha * grey + (1.0 - alpha) * backdrop

@@ -1,0 +1,60 @@
+"""Confidence intervals of a probability estimated from counts.
+
+They live in this room because the figures need them for pooled counts and may not look up to
+`flocsim.ensembles`, whose `statistics` module offers them to users.
+"""
+
+from statistics import NormalDist
+
+import numpy as np
+
+from flocsim.errors import UsageError
+
+
+def wilson(successes, trials, confidence=0.95):
+    """Wilson's score interval (low, high) of a probability, from whole-number counts.
+
+    With p = successes/trials and z the normal quantile at (1 + confidence)/2:
+    (p + z²/2n ± z √(p(1 − p)/n + z²/4n²)) / (1 + z²/n).
+
+    ``successes`` and ``trials`` broadcast against each other; both results have their shape and
+    are NaN where trials = 0.  Raises UsageError unless 0 ≤ successes ≤ trials, both whole, and
+    0 < confidence < 1.  Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212.
+    """
+    successes, trials = checked_counts(successes, trials)
+    if not 0.0 < confidence < 1.0:
+        raise UsageError(f"confidence must lie between 0 and 1, found {confidence!r}")
+    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = successes / trials
+        spread = z * np.sqrt(share * (1.0 - share) / trials + (z / (2.0 * trials)) ** 2)
+        scale = 1.0 + z * z / trials
+        centre = share + z * z / (2.0 * trials)
+        low, high = (centre - spread) / scale, (centre + spread) / scale
+    # At the ends the formula gives 0 and 1, but only up to rounding.
+    low = np.where((successes == 0) & (trials > 0), 0.0, low)
+    high = np.where((successes == trials) & (trials > 0), 1.0, high)
+    return low, high
+
+
+def proportion(successes, trials, confidence=0.95):
+    """(successes/trials, low, high) with Wilson's interval; all NaN where trials = 0."""
+    low, high = wilson(successes, trials, confidence)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.true_divide(successes, trials)
+    return share, low, high
+
+
+def checked_counts(successes, trials):
+    """Both counts as float arrays, after a check that they can be counts."""
+    try:
+        successes, trials = np.broadcast_arrays(
+            np.asarray(successes, dtype=float), np.asarray(trials, dtype=float)
+        )
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"successes and trials must be matching counts: {error}") from error
+    possible = (successes >= 0) & (successes <= trials) & np.isfinite(trials)
+    whole = (successes == np.floor(successes)) & (trials == np.floor(trials))
+    if not np.all(possible & whole):
+        raise UsageError("successes and trials must be whole with 0 <= successes <= trials")
+    return successes, trials

@@ -1,0 +1,114 @@
+"""The look that all figures share: type sizes, colours, and the axis of vertex counts."""
+
+import contextlib
+import re
+
+import numpy as np
+
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": "0.35",
+    "axes.axisbelow": True,
+    "xtick.color": "0.25",
+    "ytick.color": "0.25",
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    "figure.dpi": 100.0,
+    "savefig.dpi": 200.0,
+    "pdf.fonttype": 42,
+    # Without a fixed salt every SVG gets random names inside.
+    "svg.hashsalt": "flocsim",
+}
+
+CLASS_COLOURS = {"A": "#0072B2", "B": "#56B4E9", "C": "#D55E00", "D": "#E69F00"}
+"""Okabe and Ito's palette, told apart by the colour-blind: blues inside the zone, warm outside."""
+BODY_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
+CONTACT_COLOUR = "#D7191C"
+MARKERS = "osD^vPX*"
+MOST_LABELS = 8
+"""More labels of vertex counts than this would run into each other."""
+CROWDED = 50
+"""Points in a panel from which on markers and lines are drawn finer."""
+
+
+@contextlib.contextmanager
+def house_style():
+    """Draw or save with the same settings whatever the user's matplotlibrc says."""
+    import matplotlib.style
+
+    with matplotlib.style.context(["default", STYLE]):
+        yield
+
+
+def new_figure(width, height):
+    """An empty figure [inches] on its own canvas: no window, no global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def graded_colours(count):
+    """``count`` colours from dark to light for an ordered quantity (viridis without its yellow)."""
+    import matplotlib
+
+    return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
+
+
+def plain(text):
+    """Text in which a dollar sign does not start mathematics."""
+    return str(text).replace("$", r"\$")
+
+
+def type_title(number, name):
+    """A panel's title, e.g. "(a) Type II"; a pair of radii needs no "Type"."""
+    kind = "Type " if re.fullmatch("[IVX]+", name) else ""
+    letter = chr(ord("a") + number) if number < 26 else str(number + 1)
+    return f"({letter}) {kind}{plain(name)}"
+
+
+def vertex_positions(vertices):
+    """Evenly spaced places 0, 1, … in the order of the counts: the sphere has no place to scale."""
+    return np.searchsorted(np.unique(vertices), vertices).astype(float)
+
+
+def set_vertex_axis(axes, vertices):
+    """Ticks at the vertex counts, N = 1 called "sphere", labels thinned until they fit."""
+    counts = np.unique(vertices)
+    axes.set_xlim(-0.5, len(counts) - 0.5)
+    axes.set_xticks(np.arange(len(counts)), labels=thinned_labels(counts))
+    axes.tick_params(axis="x", length=2.5)
+
+
+def thinned_labels(counts):
+    """Labels of the ticks, some left empty so that none touch; the first and last always show."""
+    words = ["sphere" if count == 1 else str(count) for count in counts]
+    every = -(-len(words) // MOST_LABELS)
+    for index in range(1, len(words)):
+        if (len(words) - 1 - index) % every or index < every:
+            words[index] = ""
+    return words
+
+
+def set_probability_axis(axes):
+    """From 0 to 1 with quiet lines at the quarters."""
+    axes.set_ylim(-0.03, 1.03)
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", ".25", ".5", ".75", "1"])
+    axes.grid(axis="y", color="0.9", linewidth=0.6)
+
+
+def dodge(number, count):
+    """Sideways shift, as a share of a slot, that keeps the bars of ``count`` lines apart."""
+    step = min(0.1, 0.6 / max(count - 1, 1))
+    return (number - 0.5 * (count - 1)) * step

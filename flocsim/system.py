@@ -1,0 +1,215 @@
+"""System: bodies, forces, an integrator and a fluid → Trajectory."""
+
+import time
+from itertools import combinations
+
+import attrs
+import numpy as np
+
+from flocsim.composer import compose
+from flocsim.errors import UsageError
+from flocsim.forces.base import Force
+from flocsim.forces.source import scene_functions
+from flocsim.geometry import spheres_only
+from flocsim.geometry.overlap import overlap_fault
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.driver import advance
+from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.status import Status
+from flocsim.layout import (
+    ERROR,
+    EVALUATIONS,
+    NOW,
+    PAUSE_AT,
+    RECORDED,
+    REJECTED,
+    STEPS,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+)
+from flocsim.state import Body, Fluid, scene_of, with_capacity, work_of
+
+RECORD_ROWS = 4096
+"""Rows of the record between two copies; also the steps between two looks at Ctrl-C."""
+
+
+@attrs.frozen(eq=False)
+class Trajectory:
+    """What happened in a run of n bodies.
+
+    ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
+    at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
+    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], the
+    sum of the local errors of the steps (nan where the method estimates none); ``wall_time`` [s].
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    status: Status
+    steps: int
+    rejected: int
+    evaluations: int
+    error: float
+    wall_time: float
+
+
+def check_bodies(bodies):
+    """The bodies as a tuple; UsageError for none, or for what is no Body."""
+    bodies = tuple(bodies)
+    if not bodies:
+        raise UsageError("a System needs at least one Body")
+    for body in bodies:
+        if not isinstance(body, Body):
+            raise UsageError(f"bodies must be flocsim Body objects, found {body!r}")
+    return bodies
+
+
+def check_forces(forces):
+    """The forces as a tuple; UsageError for what is no Force object."""
+    forces = tuple(forces)
+    for force in forces:
+        if isinstance(force, type) and issubclass(force, Force):
+            raise UsageError(
+                f"forces must be objects, found the class {force.__name__}: write "
+                f"{force.__name__}(…) with its parameters"
+            )
+    return forces
+
+
+def check_integrator(instance, attribute, value):
+    """attrs validator: an Integrator object."""
+    if not isinstance(value, Integrator):
+        raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
+
+
+@attrs.frozen(eq=False)
+class System:
+    """Bodies in a fluid, the forces on them, and the method that moves them.
+
+    Parameters: ``bodies``, Body objects; ``forces``, Force objects; ``integrator``; ``fluid``.
+
+    >>> from flocsim.forces import Gravity, StokesDrag
+    >>> body = Body(Sphere(5e-6), density=2650.0)
+    >>> System([body], [Gravity(), StokesDrag()]).run(until=1e-3).status.name
+    'FINISHED'
+    """
+
+    bodies: tuple = attrs.field(converter=check_bodies)
+    forces: tuple = attrs.field(default=(), converter=check_forces)
+    integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
+    fluid: Fluid = attrs.field(factory=Fluid, validator=attrs.validators.instance_of(Fluid))
+    pieces: object = attrs.field(init=False, repr=False)
+
+    def __attrs_post_init__(self):
+        object.__setattr__(self, "pieces", scene_functions(self.forces, self.fluid))
+
+    @property
+    def spheres_only(self):
+        """Whether no body has an edge."""
+        return all(len(body.shape.vertices) == 1 for body in self.bodies)
+
+    def scene(self):
+        """The bodies as arrays for the drivers."""
+        return scene_of(self.bodies, self.fluid, self.pieces.parameters)
+
+    def motion(self):
+        """Position and velocity (n, 3) at the start."""
+        position = [(*body.position, body.angle) for body in self.bodies]
+        velocity = [(*body.velocity, body.spin) for body in self.bodies]
+        return np.array(position, dtype=float), np.array(velocity, dtype=float)
+
+    def fillings(self, observer=None):
+        """{slot: function} of forces, integrator, shapes and an observer."""
+        shapes = spheres_only.FILLINGS if self.spheres_only else {}
+        return {**self.pieces.fillings, **self.integrator.fillings, **shapes, **(observer or {})}
+
+    def compose(self, entry=advance, observer=None, *, jit=True):
+        """The driver of this scene as one function, compiled unless ``jit=False``."""
+        return compose(entry, self.fillings(observer), jit=jit)
+
+    def check_overlaps(self):
+        """UsageError where two bodies start with crossing cores or too deep an overlap."""
+        for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
+            fault = overlap_fault(
+                a.shape.placed_vertices(*a.position, a.angle), a.shape.radius,
+                b.shape.placed_vertices(*b.position, b.angle), b.shape.radius,
+            )  # fmt: skip
+            if fault:
+                raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
+
+    def run(self, until, *, max_steps=1_000_000, record=True, jit=True):
+        """Move the bodies until a time [s] and return the Trajectory.
+
+        A run that ends early says why in ``Trajectory.status``; it raises no exception.
+        """
+        if not until > 0.0:
+            raise UsageError(f"until must be a time above 0 s, found {until!r}")
+        self.check_overlaps()
+        began = time.perf_counter()
+        run = Run(self, until, max_steps, record, jit)
+        status = run.to_end()
+        return run.trajectory(status, time.perf_counter() - began)
+
+    def explain(self):
+        """What is compiled into this scene and what is left out, each with its reason."""
+        lines = [f"{len(self.bodies)} bodies, {'spheres only' if self.spheres_only else 'polygons'}"]
+        lines += [f"in:  {name}: {force}" for name, force in self.pieces.used.items()]
+        lines += [f"out: {name}: {reason}" for name, reason in self.pieces.left_out.items()]
+        if self.spheres_only:
+            lines.append("out: vertex–edge pairs, rotation of vertices: no body has an edge")
+        return "\n".join(lines)
+
+
+class Run:
+    """One run in progress: the arrays, and what was recorded so far."""
+
+    def __init__(self, system, until, max_steps, record, jit):
+        """Arrays for a run of the system from its start."""
+        self.driver = system.compose(jit=jit)
+        self.scene = system.scene()
+        self.work = work_of(self.scene, *system.motion())
+        self.clock = system.integrator.fresh_clock()
+        self.clock[UNTIL] = until
+        self.counts = system.integrator.fresh_counts(max_steps)
+        self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * len(system.bodies)))
+        self.saved = [self.current_row()]
+
+    def current_row(self):
+        """Time and state now, as one row of a record."""
+        return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
+
+    def to_end(self):
+        """Advance until the run has ended for good."""
+        memo = np.zeros(1)
+        while True:
+            self.counts[PAUSE_AT] = self.counts[STEPS] + RECORD_ROWS
+            code = self.driver(self.scene, self.work, memo, self.clock, self.counts, self.record)
+            self.save()
+            if code == Status.NO_ROOM:
+                self.work = with_capacity(self.work, 2 * len(self.work.candidates))
+            elif code not in (Status.RECORD_FULL, Status.PAUSED):
+                return Status(code)
+
+    def save(self):
+        """Copy the record and start it anew."""
+        self.saved.append(self.record[: self.counts[RECORDED]].copy())
+        self.counts[RECORDED] = 0
+
+    def trajectory(self, status, wall_time):
+        """The Trajectory of what was recorded; start and end alone where nothing was."""
+        rows = np.concatenate([*self.saved, *([] if len(self.record) else [self.current_row()])])
+        motion = rows[:, 1:].reshape(len(rows), -1, 6)
+        adaptive = np.isfinite(self.clock[TOLERANCE])
+        return Trajectory(
+            t=rows[:, 0],
+            position=motion[:, :, :3],
+            velocity=motion[:, :, 3:],
+            status=status,
+            steps=int(self.counts[STEPS]),
+            rejected=int(self.counts[REJECTED]),
+            evaluations=int(self.work.tally[EVALUATIONS]),
+            error=float(self.clock[ERROR]) if adaptive else float("nan"),
+            wall_time=wall_time,
+        )

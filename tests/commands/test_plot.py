@@ -1,0 +1,136 @@
+"""`flocsim plot` and `flocsim info`, called as the command line calls them."""
+
+import argparse
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from synthetic_results import make_results
+
+from flocsim.commands import info, plot
+from flocsim.ensembles.report import format_table
+from flocsim.errors import FileError, UsageError
+from flocsim.io.plots import FIGURES
+from flocsim.io.provenance import provenance
+from flocsim.io.results import write_results
+
+CONFIG = 'preset = "si"\nseed = 3\n'
+
+
+def call(command, *words):
+    """Parse the words as the `flocsim` command does, and run."""
+    parser = argparse.ArgumentParser(prog="flocsim")
+    command.add_parser(parser.add_subparsers())
+    args = parser.parse_args([command.__name__.split(".")[-1], *map(str, words)])
+    return args.run(args)
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A results file as an ensemble would leave it."""
+    run = provenance(CONFIG, 3) | {"wall_time": 12.345678, "ranks": 2}
+    write_results(tmp_path / "study.h5", make_results(count=8, run=run))
+    return tmp_path / "study.h5"
+
+
+def test_all_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):
+    assert call(plot, study, "--output-dir", tmp_path / "a" / "b", "--format", "pdf") == 0
+    printed = capsys.readouterr().out.split("\n")[:-1]
+    names = [f"study-{label}.pdf" for label in
+             ("figure-4", "figure-5", "figure-6", "figure-8", "overview")]  # fmt: skip
+    assert printed == [str(tmp_path / "a" / "b" / name) for name in names]
+    assert sorted(os.listdir(tmp_path / "a" / "b")) == names
+
+
+def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert call(plot, "study.h5", "--figures", "overview, 8,8") == 0
+    assert capsys.readouterr().out == "study-overview.png\nstudy-figure-8.png\n"
+    assert (tmp_path / "study-overview.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("figures", ["7", "4,figure", "", ","])
+def test_unknown_figures_are_refused_before_anything_is_read(figures):
+    with pytest.raises(UsageError, match="choose from 4, 5, 6, 8, overview"):
+        call(plot, "absent.h5", "--figures", figures)
+
+
+def test_the_command_knows_the_figures_that_exist():
+    assert tuple(FIGURES) == plot.FIGURE_NAMES
+
+
+@pytest.mark.parametrize("command", [plot, info])
+def test_an_absent_file_is_told(command, tmp_path):
+    with pytest.raises(FileError, match="absent"):
+        call(command, tmp_path / "absent.h5")
+
+
+def test_an_impossible_folder_is_told(study):
+    with pytest.raises(FileError, match="--output-dir"):
+        call(plot, study, "--output-dir", study)
+
+
+def facts_printed(text):
+    """The lines of `flocsim info` as a dict of name and value."""
+    pairs = (line.split("  ", 1) for line in text.splitlines() if "  " in line)
+    return {name: value.strip() for name, value in pairs if name}
+
+
+def test_info_tells_conditions_and_origin(study, capsys):
+    assert call(info, study) == 0
+    text = capsys.readouterr().out
+    facts = facts_printed(text)
+    assert facts["preset"] == "si"
+    assert facts["vertices"] == "1 (sphere), 4, 16, 64"
+    assert facts["delta / delta_max"] == "0, 0.25, 0.5, 0.75, 1"
+    assert facts["replicates"] == "8 in each of 60 conditions"
+    assert facts["numpy version"] == np.__version__
+    assert facts["wall time"] == "12.3457 s"
+    assert facts["seed"] == "3"
+    assert CONFIG not in text
+
+
+def test_info_counts_outcomes_reasons_and_steps(study, capsys):
+    replicates = make_results(count=8).replicates
+    outcome, steps = replicates["outcome"], replicates["steps"]
+    call(info, study)
+    facts = facts_printed(capsys.readouterr().out)
+    assert facts["outcomes"].startswith(f"{np.sum(outcome == 0)} A, {np.sum(outcome == 1)} B, ")
+    failed, undecided = np.sum(outcome == 6), np.sum(outcome == 5)
+    assert facts["reasons"] == f"{failed} overlap_too_deep, {undecided} step_budget"
+    assert f"{np.median(steps):g} in the median" in facts["steps"]
+    assert f"{steps.max()} at most" in facts["steps"]
+
+
+def test_info_ends_with_the_table_of_probabilities(study, capsys):
+    results = make_results(count=8)
+    call(info, study)
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
+
+
+def test_info_gives_the_config_back_exactly(study, capsys):
+    assert call(info, study, "--config") == 0
+    assert capsys.readouterr().out == CONFIG
+
+
+def test_info_without_config_text(tmp_path, capsys):
+    write_results(tmp_path / "bare.h5", make_results(count=2, run={}))
+    assert call(info, tmp_path / "bare.h5") == 0
+    assert "none named" in capsys.readouterr().out
+    with pytest.raises(FileError, match="no config"):
+        call(info, tmp_path / "bare.h5", "--config")
+
+
+def test_the_parsers_load_nothing_heavy():
+    code = (
+        "import argparse, sys\n"
+        "from flocsim.commands import info, plot\n"
+        "s = argparse.ArgumentParser().add_subparsers()\n"
+        "info.add_parser(s), plot.add_parser(s)\n"
+        "print([m for m in ('h5py', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

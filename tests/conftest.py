@@ -1,0 +1,14 @@
+"""What every test run shares: one thread per process, no display, repeatable random examples."""
+
+import os
+
+from hypothesis import settings
+
+# Before numpy or numba is imported: they read these once.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+# A first call may compile a kernel, so a deadline per example would fail on speed alone.
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")

@@ -1,0 +1,202 @@
+"""The laws of MODEL section 2, one small class each, and their sum on all bodies."""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from reference.contacts import closest, contacts
+
+VACUUM_PERMITTIVITY = 8.854e-12
+
+
+def loads(scene, laws, displacement=None):
+    """Force and torque (n, 3) [N, N, N m] on every body: the sum over the laws.
+
+    `displacement`: tangential displacement ξ [m] by pair (vertex's body, vertex, edge's body,
+    edge); a touching pair that is not named has ξ = 0.
+    """
+    total = np.zeros((len(scene.bodies), 3))
+    for law in laws:
+        history = [displacement or {}] if isinstance(law, Contact) else []
+        total += law.loads(scene, *history)
+    return total
+
+
+def add_force(total, scene, body, force, point):
+    """Add a force (2,) that acts on a body at a point: torque = (point − centre) × force."""
+    arm = point - scene.positions[body, :2]
+    total[body] += [force[0], force[1], arm[0] * force[1] - arm[1] * force[0]]
+
+
+def refuse_strangers(displacement, touching):
+    """ValueError if a tangential displacement is given for a pair that does not touch."""
+    strangers = set(displacement) - set(touching)
+    if strangers:
+        raise ValueError(f"displacement given for pairs that do not touch: {strangers}")
+
+
+def reduced(a, b):
+    """1/(1/a + 1/b): r* of two radii (5), M of two masses (8)."""
+    return 1 / (1 / a + 1 / b)
+
+
+@dataclass(frozen=True)
+class Gravity:
+    """m g (1 − ρ_f/ρ) to −y (3); no buoyancy without a fluid density."""
+
+    g: float = 9.81
+    fluid_density: float = 0.0
+
+    def loads(self, scene):
+        total = np.zeros((len(scene.bodies), 3))
+        for k, body in enumerate(scene.bodies):
+            lift = self.fluid_density / body.density if self.fluid_density else 0.0
+            total[k, 1] = -body.mass * self.g * (1.0 - lift)
+        return total
+
+
+@dataclass(frozen=True)
+class Drag:
+    """−6πγ r_eq (v − u(x)) (4), torque −8πγ r_eq³ (ω − Ω), in the flow u(x) = U + G x.
+
+    Ω = ½(G_yx − G_xy), with `gradient[a, b]` = ∂u_a/∂x_b [1/s].
+    """
+
+    viscosity: float
+    rotational: bool = True
+    flow: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    gradient: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+
+    def loads(self, scene):
+        total = np.zeros((len(scene.bodies), 3))
+        turning = (self.gradient[1, 0] - self.gradient[0, 1]) / 2
+        for k, body in enumerate(scene.bodies):
+            position, velocity, r = scene.positions[k], scene.velocities[k], body.equivalent_radius
+            fluid = self.flow + self.gradient @ position[:2]
+            total[k, :2] = -6 * np.pi * self.viscosity * r * (velocity[:2] - fluid)
+            if self.rotational:
+                total[k, 2] = -8 * np.pi * self.viscosity * r**3 * (velocity[2] - turning)
+        return total
+
+
+class PairLaw:
+    """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d."""
+
+    def loads(self, scene):
+        total = np.zeros((len(scene.bodies), 3))
+        apply = {"equivalent_spheres": self.along_centres, "surface": self.at_surfaces}[self.gap]
+        for i, j in combinations(range(len(scene.bodies)), 2):
+            radii = scene.bodies[i].equivalent_radius, scene.bodies[j].equivalent_radius
+            apply(total, scene, i, j, radii)
+        return total
+
+    def along_centres(self, total, scene, i, j, radii):
+        """d = d_c − r_i − r_j with equivalent radii; along the line of centres, no torque."""
+        between = scene.positions[i, :2] - scene.positions[j, :2]
+        centre_distance = np.hypot(*between)
+        force = self.repulsion(centre_distance - sum(radii), reduced(*radii))
+        total[i, :2] += force * between / centre_distance
+        total[j, :2] -= force * between / centre_distance
+
+    def at_surfaces(self, total, scene, i, j, radii):
+        """d = least distance of the outlines; at the closest points, so with torque."""
+        pair = closest(scene, i, j)
+        force = self.repulsion(-pair.overlap[0], reduced(*radii)) * pair.normal[0]
+        vertex_body, _, edge_body, _ = pair.pair[0]
+        add_force(total, scene, vertex_body, force, pair.point[0])
+        add_force(total, scene, edge_body, -force, pair.point[0])
+
+
+@dataclass(frozen=True)
+class VanDerWaals(PairLaw):
+    """Attraction H_A r*/(6 d²) (5), flat below the cut-off `d_min`."""
+
+    hamaker: float
+    d_min: float = 1e-9
+    gap: str = "equivalent_spheres"
+
+    def repulsion(self, d, reduced_radius):
+        return -self.hamaker * reduced_radius / (6 * max(d, self.d_min) ** 2)
+
+
+@dataclass(frozen=True)
+class DoubleLayer(PairLaw):
+    """Repulsion 4π ε0 ε_r κ φ² r* exp(−κ d) (6); flat below `least_gap` (−∞: the bare law)."""
+
+    potential: float
+    debye_length: float
+    permittivity: float = 78.5
+    gap: str = "equivalent_spheres"
+    least_gap: float = -np.inf
+
+    def repulsion(self, d, reduced_radius):
+        permittivity = VACUUM_PERMITTIVITY * self.permittivity
+        contact_value = 4 * np.pi * permittivity * self.potential**2 / self.debye_length
+        decay = np.exp(-max(d, self.least_gap) / self.debye_length)
+        return contact_value * reduced_radius * decay
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Normal k_n Δ − M λ_n v_n, tangential −k_t ξ − M λ_t v_t, at every touching pair (7)(8).
+
+    `damping_n` [1/s] or "critical" = 2√(k_n/M); `damping_t` [1/s], by default λ_n k_t/k_n.
+    `tension=False` clips the normal force at 0; `friction` µ limits the tangential force to
+    ±µ max(normal, 0).
+    """
+
+    k_n: float
+    k_t: float
+    damping_n: float | str = "critical"
+    damping_t: float | None = None
+    friction: float | None = None
+    tension: bool = True
+
+    def damping(self, mass):
+        """λ_n, λ_t [1/s] for a pair of effective mass M [kg]."""
+        critical = self.damping_n == "critical"
+        normal = 2 * np.sqrt(self.k_n / mass) if critical else self.damping_n
+        return normal, normal * self.k_t / self.k_n if self.damping_t is None else self.damping_t
+
+    def components(self, mass, overlap, displacement, normal_velocity, tangential_velocity):
+        """Normal (repulsive positive) and tangential force [N] on the vertex's body."""
+        damping_n, damping_t = self.damping(mass)
+        normal = self.k_n * overlap - mass * damping_n * normal_velocity
+        tangential = -self.k_t * displacement - mass * damping_t * tangential_velocity
+        if not self.tension:
+            normal = max(normal, 0.0)
+        if self.friction is not None:
+            limit = self.friction * max(normal, 0.0)
+            tangential = min(max(tangential, -limit), limit)
+        return normal, tangential
+
+    def loads(self, scene, displacement):
+        """Forces and torques (n, 3) of all touching pairs; ValueError for a ξ of another pair."""
+        touching = contacts(scene)
+        keys = touching.pair_keys()
+        refuse_strangers(displacement, keys)
+        return self.loads_at(scene, touching, [displacement.get(key, 0.0) for key in keys])
+
+    def loads_at(self, scene, pairs, displacements):
+        """Forces and torques (n, 3) of the given Contacts with their ξ (m,) [m]."""
+        total = np.zeros((len(scene.bodies), 3))
+        for row, displacement in enumerate(displacements):
+            vertex_body, _, edge_body, _ = pairs.pair[row]
+            mass = reduced(scene.bodies[vertex_body].mass, scene.bodies[edge_body].mass)
+            normal, tangential = self.components(
+                mass,
+                pairs.overlap[row],
+                displacement,
+                pairs.normal_velocity[row],
+                pairs.tangential_velocity[row],
+            )
+            force = normal * pairs.normal[row] + tangential * pairs.tangent[row]
+            add_force(total, scene, vertex_body, force, pairs.point[row])
+            add_force(total, scene, edge_body, -force, pairs.point[row])
+        return total
+
+    def energy(self, scene, displacement=None):
+        """Elastic energy Σ ½ k_n Δ² + ½ k_t ξ² [J] of the touching pairs."""
+        normal = 0.5 * self.k_n * np.sum(contacts(scene).overlap ** 2)
+        return normal + 0.5 * self.k_t * sum(xi**2 for xi in (displacement or {}).values())

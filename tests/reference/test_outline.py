@@ -1,0 +1,88 @@
+"""Shape integrals held against closed forms and against a drawn union of pieces."""
+
+import numpy as np
+import pytest
+import shapely
+
+from reference.outline import area_centroid_inertia, core_geometry
+from reference.samples import random_core
+from reference.scenes import c_shape, convex, segment, spiral, star
+from reference.shapes import make_body, rotation
+
+
+def test_disk_and_capsule():
+    area, centroid, inertia = area_centroid_inertia([[1.0, 2.0]], 3.0)
+    assert [area, inertia] == pytest.approx([9 * np.pi, 81 * np.pi / 2], rel=1e-13)
+    assert centroid == pytest.approx([1.0, 2.0], rel=1e-13)
+    length, r = 5.0, 0.7
+    half_disk = np.pi * r**4 / 2 + np.pi * r**2 * length**2 / 4 + 4 / 3 * r**3 * length
+    bar = length * 2 * r * (length**2 + 4 * r**2) / 12
+    area, centroid, inertia = area_centroid_inertia([[1.0, 0.0], [1.0, length]], r)
+    assert [area, inertia] == pytest.approx([2 * r * length + np.pi * r**2, bar + half_disk])
+    assert centroid == pytest.approx([1.0, length / 2])
+
+
+@pytest.mark.parametrize("make_core", [segment, convex, star, c_shape, spiral])
+@pytest.mark.parametrize("seed", range(4))
+def test_integrals_agree_with_a_union_of_many_sided_pieces(make_core, seed):
+    rng = np.random.default_rng(seed)
+    core, radius = random_core(make_core, rng), rng.uniform(0.03, 0.5)
+    area, centroid, inertia = area_centroid_inertia(core, radius)
+    drawn = swept_by_union(core, radius)
+    assert area == pytest.approx(drawn.area, rel=1e-10)
+    assert centroid == pytest.approx(drawn.centroid.coords[0], abs=1e-10)
+    assert inertia == pytest.approx(polar_moment(drawn, centroid), rel=1e-9)
+    if make_core in (segment, convex):
+        perimeter = core_geometry(core).length * (2 if len(core) == 2 else 1)
+        expected = core_geometry(core).area + perimeter * radius + np.pi * radius**2
+        assert area == pytest.approx(expected, rel=1e-13)
+
+
+def swept_by_union(core, radius, sides=4000):
+    """Core, a rectangle along each edge, a disk at each vertex (a polygon of the disk's area)."""
+    angles = np.arange(sides) * 2 * np.pi / sides
+    equal_area = radius * np.sqrt(2 * np.pi / sides / np.sin(2 * np.pi / sides))
+    disk = equal_area * np.array([np.cos(angles), np.sin(angles)]).T
+    edges = zip(core, np.roll(core, -1, axis=0), strict=True)
+    bars = [shapely.LineString(edge).buffer(radius, cap_style="flat") for edge in edges]
+    return shapely.union_all(
+        [core_geometry(core), *bars, *(shapely.Polygon(v + disk) for v in core)]
+    )
+
+
+def polar_moment(polygon, centroid):
+    """Σ cross (a·a + a·b + b·b)/12 over the edges a → b of all rings: exact for a polygon."""
+    ordered = shapely.orient_polygons(polygon)
+    total = 0.0
+    for ring in [ordered.exterior, *ordered.interiors]:
+        points = np.array(ring.coords) - centroid
+        a, b = points[:-1], points[1:]
+        cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        total += np.sum(cross * np.sum(a * a + a * b + b * b, axis=1)) / 12
+    return total
+
+
+def test_mouth_that_the_sweep_closes_leaves_a_hole():
+    ring = [[0, 0], [10, 0], [10, 4.5], [8, 4.5], [8, 2], [2, 2], [2, 8], [8, 8], [8, 5.5]]
+    core = np.array([*ring, [10, 5.5], [10, 10], [0, 10]], dtype=float)
+    # Both the outline and the hole dip into the mouth, between the arcs about its corners.
+    dip = 1 - (0.5 * np.sqrt(0.75) + np.arcsin(0.5))
+    area, _, _ = area_centroid_inertia(core, 1.0)
+    assert area == pytest.approx(100 + 40 + np.pi - 16 - 2 * dip, rel=1e-13)
+
+
+def test_shape_integrals_ignore_numbering_sense_and_placing():
+    core = random_core(spiral, np.random.default_rng(3))
+    area, centroid, inertia = area_centroid_inertia(core, 0.2)
+    moved = np.roll(core, 5, axis=0)[::-1] @ rotation(0.7).T + [3.0, -2.0]
+    other = area_centroid_inertia(moved, 0.2)
+    assert [other[0], other[2]] == pytest.approx([area, inertia], rel=1e-12)
+    assert other[1] == pytest.approx(rotation(0.7) @ centroid + [3.0, -2.0], rel=1e-12)
+
+
+def test_mass_conventions():
+    sheet = make_body(convex(np.random.default_rng(0)), 0.1, surface_density=2.0)
+    solid = make_body(convex(np.random.default_rng(0)), 0.1, density=2650.0)
+    assert sheet.mass == pytest.approx(2.0 * np.pi * sheet.equivalent_radius**2)
+    assert solid.mass == pytest.approx(2650.0 * 4 / 3 * np.pi * solid.equivalent_radius**3)
+    assert solid.inertia / solid.mass == pytest.approx(sheet.inertia / sheet.mass)

@@ -1,0 +1,235 @@
+"""run.py without installing anything: its usage, its decisions and its messages.
+
+`call` and `usable` are replaced by doubles that note the commands and say what a real run says.
+"""
+
+import ast
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+posix = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python is a shell script")
+RUN_PY = Path(__file__).resolve().parents[1] / "run.py"
+
+
+class Stage:
+    """A folder with a run.py in it whose commands are noted, not run."""
+
+    def __init__(self, folder, monkeypatch):
+        spec = importlib.util.spec_from_file_location("run_py", RUN_PY)
+        self.run_py = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(self.run_py)
+        self.commands, self.exit_codes = [], {}
+        self.folder, self.stamp = folder, folder / ".venv" / "installed-by-run.txt"
+        (folder / "pyproject.toml").write_text("[project]")
+        doubles = {"call": self.call, "usable": self.usable, "HERE": folder, "WINDOWS": False}
+        for name, double in doubles.items():
+            monkeypatch.setattr(self.run_py, name, double)
+        monkeypatch.chdir(folder)
+
+    def call(self, *command):
+        """The double of run.py's call."""
+        line = " ".join(command)
+        self.commands.append(line)
+        if "-m venv" in line:
+            self.add(".venv/bin/python")
+        return next((code for part, code in self.exit_codes.items() if part in line), 0)
+
+    def usable(self):
+        """The double of run.py's usable."""
+        return (self.folder / ".venv/bin/python").exists()
+
+    def add(self, path):
+        """An empty file in the folder."""
+        (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (self.folder / path).write_text("")
+
+    def run(self, *arguments):
+        """The commands that run.py gives for these arguments, and its exit code."""
+        self.commands.clear()
+        code = self.run_py.main(list(arguments))
+        return list(self.commands), code
+
+
+@pytest.fixture
+def stage(tmp_path, monkeypatch):
+    folder = tmp_path / "a folder"
+    folder.mkdir()
+    return Stage(folder.resolve(), monkeypatch)
+
+
+def real(*arguments, cwd=None):
+    """The real run.py as a process of its own."""
+    command = [sys.executable, str(RUN_PY), *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("arguments", [[], ["dmeo"], ["demo", "-x"], ["setup", "all"], [""]])
+def test_wrong_usage_exits_2_with_the_usage(arguments, tmp_path):
+    done = real(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("usage: python3 run.py demo")
+
+
+def test_old_python_is_told_so_in_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "version_info", (3, 10, 4, "final", 0))
+    with pytest.raises(SystemExit) as stopped:
+        exec(compile(RUN_PY.read_text(), "run.py", "exec"), {"__name__": "__main__"})
+    message = capsys.readouterr().err
+    assert stopped.value.code == 2 and message.count("\n") == 1
+    assert "needs Python 3.11 or newer, found 3.10;" in message
+
+
+def test_old_python_can_read_the_file():
+    tree = ast.parse(RUN_PY.read_text(), feature_version=(3, 0))
+    newer = (ast.JoinedStr, ast.Starred, ast.AnnAssign, ast.NamedExpr, ast.Match)
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    unpacked = [argument for call in calls for argument in call.args[-1:]]
+    found = [node for node in ast.walk(tree) if isinstance(node, newer) and node not in unpacked]
+    assert not found, [f"line {node.lineno}: {ast.unparse(node)}" for node in found]
+
+
+def test_only_the_standard_library_is_imported():
+    nodes = ast.walk(ast.parse(RUN_PY.read_text()))
+    imports = [node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    names = {alias.name.split(".")[0] for node in imports for alias in node.names}
+    assert names <= sys.stdlib_module_names
+
+
+def test_demo_installs_once_then_runs_and_draws(stage, capsys):
+    first, code = stage.run("demo")
+    assert code == 0 and len(first) == 4
+    assert first[0].endswith("-m venv --clear .venv")
+    assert first[1] == ".venv/bin/python -m pip install -e .[mpi]"
+    assert first[2:] == stage.run("demo")[0]
+    assert "There is no mpirun in .venv" in capsys.readouterr().out
+    stage.add(".venv/bin/mpirun")
+    stage.add("quickstart_overview.png")
+    study, plot = stage.run("demo")[0]
+    python = ".venv/bin/python -m flocsim.ensemble examples/quickstart.toml"
+    assert study == ".venv/bin/mpirun -n 2 " + python
+    assert plot == ".venv/bin/flocsim plot quickstart.h5 --figures overview"
+    told = capsys.readouterr().out
+    assert str(stage.folder / "quickstart.h5") in told and "quickstart_overview.png" in told
+
+
+def test_failed_study_is_not_drawn_and_keeps_its_exit_code(stage, capsys):
+    stage.exit_codes["flocsim.ensemble"] = 75
+    commands, code = stage.run("demo")
+    assert code == 75 and "flocsim.ensemble" in commands[-1]
+    assert "results" not in capsys.readouterr().out
+
+
+def test_pytest_gets_its_arguments_and_gives_the_exit_code(stage):
+    stage.exit_codes["-m pytest"] = 5
+    commands, code = stage.run("test", "-k", "wall", "-x")
+    assert code == 5 and commands[-1] == ".venv/bin/python -m pytest -k wall -x"
+
+
+def test_install_is_repeated_only_when_something_new_is_needed(stage):
+    def installs(command):
+        return [line for line in stage.run(command)[0] if "pip install" in line]
+
+    assert installs("demo") and not installs("demo")
+    assert installs("setup") == [".venv/bin/python -m pip install -e .[mpi,test,dev]"]
+    assert not installs("setup") and not installs("test") and not installs("demo")
+    (stage.folder / "pyproject.toml").write_text("[project]\nname = 'flocsim'")
+    assert installs("demo") and installs("setup")
+
+
+def test_half_made_venv_is_made_anew(stage):
+    (stage.folder / ".venv").mkdir()  # interrupted before it had a Python
+    assert "--clear" in stage.run("setup")[0][0]
+    stage.stamp.write_text(stage.run_py.UNFINISHED)  # killed while pip was at work
+    assert "--clear" in stage.run("setup")[0][0]
+    stage.stamp.unlink()  # made by hand, complete
+    assert "pip install" in stage.run("setup")[0][0]
+
+
+def test_failing_pip_is_one_line_and_keeps_what_was_there(stage, capsys):
+    stage.run("demo")
+    before = stage.stamp.read_text()
+    stage.exit_codes["pip install"] = 1
+    with pytest.raises(SystemExit) as stopped:
+        stage.run("setup")
+    message = capsys.readouterr().err
+    assert stopped.value.code == 70 and message.count("\n") == 1 and "internet" in message
+    assert stage.stamp.read_text() == before
+
+
+@pytest.mark.parametrize("missing", ["venv", "ensurepip"])
+def test_python_without_venv_names_the_package_to_install(stage, monkeypatch, capsys, missing):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name != missing)
+    with pytest.raises(SystemExit) as stopped:
+        stage.run("demo")
+    assert stopped.value.code == 70 and not stage.commands
+    assert "apt install python3-venv" in capsys.readouterr().err
+
+
+def test_works_from_another_folder(stage, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    stage.run("setup")
+    assert Path.cwd() == stage.folder
+    assert capsys.readouterr().out.startswith(f"$ cd '{stage.folder}'\n")
+
+
+def test_windows_paths(stage, monkeypatch):
+    monkeypatch.setattr(stage.run_py, "WINDOWS", True)
+    assert stage.run_py.tool("python") == os.path.join(".venv", "Scripts", "python.exe")
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """Gives a maker of folders with the real run.py and a stand-in for .venv's Python."""
+
+    def make(script):
+        python = tmp_path / ".venv/bin/python"
+        python.parent.mkdir(parents=True)
+        python.write_text(f'#!/bin/sh\ncase "$*" in -c*|*pip*) exit 0;; esac\n{script}\n')
+        python.chmod(0o755)
+        (tmp_path / "run.py").write_text(RUN_PY.read_text())
+        (tmp_path / "pyproject.toml").write_text("[project]")
+        return [sys.executable, str(tmp_path / "run.py")]
+
+    return make
+
+
+@posix
+def test_commands_are_shown_as_typed_and_their_exit_codes_returned(installed, tmp_path):
+    command = [*installed("echo got $*; exit 7"), "test", "-k", "a b"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    shown = ["$ .venv/bin/python -m pytest -k 'a b'", "got -m pytest -k a b"]
+    assert (done.returncode, done.stdout.splitlines()[-2:], done.stderr) == (7, shown, "")
+
+
+@posix
+def test_missing_program_is_one_line(installed, tmp_path):
+    done = subprocess.run([*installed("exit 0"), "demo"], capture_output=True, text=True)
+    assert done.returncode == 70
+    assert done.stderr.count("\n") == 1 and ".venv/bin/flocsim" in done.stderr
+
+
+@posix
+def test_killed_command_gives_the_exit_code_of_a_shell(installed, tmp_path):
+    done = subprocess.run([*installed("kill -9 $$"), "test"], capture_output=True, text=True)
+    assert done.returncode == 128 + signal.SIGKILL
+
+
+@posix
+def test_interrupt_waits_for_the_command_to_save_its_work(installed, tmp_path):
+    save = "trap 'sleep 0.5; echo saved > work; exit 0' INT; echo ready; sleep 20"
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen([*installed(save), "test"], start_new_session=True, **pipes)
+    while process.stdout.readline().strip() != "ready":
+        assert process.poll() is None
+    time.sleep(0.1)  # run.py itself has to be waiting by now
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=10)[1] == "run.py: interrupted\n"
+    assert process.returncode == 130
+    assert (tmp_path / "work").read_text() == "saved\n"
