@@ -19,10 +19,9 @@ BASE, NEWTON = range(2)
 CANDIDATES, EVALUATIONS, REBUILDS, SOLVES = range(4)
 """Places in ``Work.tally``: pairs listed; forces evaluated, lists made, systems solved so far."""
 
-TIME, UNTIL, STEP, TOLERANCE, ERROR, LARGEST_STEP, MOTION_LIMIT, CLOCK_SIZE = range(8)
+TIME, UNTIL, STEP, TOLERANCE, ERROR, LARGEST_STEP, CLOCK_SIZE = range(7)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), summed
-local error [m], largest step [s], largest motion of a step while an event is awaited, as a share
-of r_i + r_j (inf: no limit)."""
+local error [m], largest step [s]."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, COUNTS_SIZE = range(8)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after

@@ -98,9 +98,9 @@ def next_step(clock, step, ratio):
     return step
 
 
-def event_value(scene, work, memo, position):
-    """Changes sign from + to − at the event to be located; 1 where there is none."""
-    return 1.0
+def event_value(scene, work, memo, state):
+    """Changes sign from + to − at the event to be located; inf where none is awaited."""
+    return math.inf
 
 
 def observe(scene, work, memo, time, at_event):

@@ -20,6 +20,10 @@ class Force:
         """The law itself; each kind says what it returns."""
         raise NotImplementedError("a force needs a static method `kernel`")
 
+    def kernel_in(self, fluid):
+        """The kernel to use in this fluid; a subclass may have a cheaper one for some fluids."""
+        return self.kernel
+
     @property
     def absent(self):
         """Why a scene can leave this force out ("" where it cannot), e.g. a zero strength."""

@@ -119,8 +119,9 @@ def body_text(pieces, namespace, forces, fluid):
     """Source of the body forces and of the parts that the implicit integrators differentiate."""
     terms = {"body_force": [], "velocity_force": [], "position_force": []}
     for force in forces:
-        _, call = call_text(pieces, namespace, force, fluid, force.kernel, "body")
-        reads = attributes_read(force.kernel)
+        kernel = force.kernel_in(fluid)
+        _, call = call_text(pieces, namespace, force, fluid, kernel, "body")
+        reads = attributes_read(kernel)
         terms["body_force"].append(("", call))
         if reads & VELOCITIES:
             terms["velocity_force"].append(("", call))

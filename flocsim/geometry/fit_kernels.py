@@ -5,9 +5,7 @@ Imported only when a fit is made, since it loads numba.  Pixel coordinates, x = 
 right) or within the spheroradius of an edge.  Both counts are kept per pixel, so that a moved
 vertex needs only its two edges recounted.
 
-Only functions called from Python are cached on disk, and all work on scalars: numba gives the
-array expressions of separately cached functions the same inner names, and one then runs in the
-place of the other.
+Only functions called from Python are cached on disk; they carry the others with them.
 """
 
 import numpy as np
@@ -104,7 +102,7 @@ def count_errors(mask, vertices, radius):
 
 @njit
 def row_reach(ax, ay, bx, by, row, radius):
-    """The (first, last) x that the edge a–b swept by the radius can have in a row, or (inf, −inf)."""
+    """First and last x that the edge a–b swept by the radius can have in a row, or inf, −inf."""
     low, high = min(ay, by), max(ay, by)
     if row < low - radius or row > high + radius:
         return np.inf, -np.inf
@@ -210,12 +208,12 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
         return False
     for k in range(count):
         cx, cy = vertices[k]
-        if k == start or k == stop:
+        if k in (start, stop):
             continue
         if squared_distance(cx, cy, ax, ay, bx, by) < limit:
             return False
         following = (k + 1) % count
-        if following == start or following == stop:
+        if following in (start, stop):
             continue
         dx, dy = vertices[following]
         if squared_distance(x, y, cx, cy, dx, dy) < limit:

@@ -28,7 +28,7 @@ def trace_outline(mask):
 
 
 def _turn(inside, row, column, heading):
-    """The heading after the corner at the upper left of pixel (row, column), region on the right."""
+    """The heading after the upper left corner of pixel (row, column), the region on the right."""
     down, right = HEADINGS[heading]
     left_row, left_column = _ahead(row, column, down, right, -1)
     right_row, right_column = _ahead(row, column, down, right, 1)

@@ -12,7 +12,6 @@ from flocsim.layout import (
     COUNTS_SIZE,
     LARGEST_STEP,
     MAX_STEPS,
-    MOTION_LIMIT,
     PAUSE_AT,
     STEP,
     TOLERANCE,
@@ -48,14 +47,13 @@ class Integrator(ABC):
     def fillings(self):
         """{slot: function} of this integrator."""
 
-    def fresh_clock(self, motion_limit=math.inf):
+    def fresh_clock(self):
         """The float state of a run that starts at time zero."""
         clock = np.zeros(CLOCK_SIZE)
         clock[UNTIL] = math.inf
         clock[STEP] = self.first_step
         clock[TOLERANCE] = self.tolerance
         clock[LARGEST_STEP] = self.largest_step
-        clock[MOTION_LIMIT] = motion_limit
         return clock
 
     def fresh_counts(self, max_steps):

@@ -13,7 +13,6 @@ from flocsim.layout import (
     LARGEST_STEP,
     LOCATED,
     MAX_STEPS,
-    MOTION_LIMIT,
     NEW,
     NOW,
     PAUSE_AT,
@@ -41,6 +40,10 @@ EVENT_ACCURACY = 1e-3
 
 EVENT_FLOOR = 1e-13
 """… but not finer than this [m]."""
+
+EVENT_GRAIN = 0.02
+"""While an event is awaited, a step moves the bodies by no more than 0.9 of the gap, or this share
+of r_i + r_j: what a straight step can then cut off a corner is below 1e-4 of r_i + r_j."""
 
 EVENT_TRIALS = 60
 """Steps tried to locate one event; the bracket is then as narrow as floats allow."""
@@ -74,7 +77,7 @@ def least_listed_gap(work):
     return least
 
 
-def motion_step(scene, work, clock):
+def motion_step(scene, work, awaiting):
     """The longest step whose motion keeps the list valid and skips no awaited event."""
     longest = math.inf
     least_gap = least_listed_gap(work)
@@ -82,8 +85,8 @@ def motion_step(scene, work, clock):
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             room = 0.5 * work.budget[pair]
-            if clock[MOTION_LIMIT] < math.inf:
-                grain = clock[MOTION_LIMIT] * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS])
+            if awaiting:
+                grain = EVENT_GRAIN * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS])
                 room = min(room, max(0.9 * least_gap, grain))
             speed = closing_speed(scene, work, a, b)
             if speed * longest > room:
@@ -92,11 +95,11 @@ def motion_step(scene, work, clock):
     return longest
 
 
-def choose_step(scene, work, clock, lists):
+def choose_step(scene, work, clock, lists, awaiting):
     """The size of the next step [s]."""
     step = min(clock[STEP], clock[LARGEST_STEP])
     if lists:
-        step = min(step, motion_step(scene, work, clock))
+        step = min(step, motion_step(scene, work, awaiting))
     left = clock[UNTIL] - clock[TIME]
     # Two even steps at the end instead of a long one and a sliver.
     if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
@@ -174,7 +177,7 @@ def advance(scene, work, memo, clock, counts, record):
             locate_contacts(scene, work, NOW)
         if trials == 0:
             at_low = event_value(scene, work, memo, NOW)
-            step = choose_step(scene, work, clock, lists)
+            step = choose_step(scene, work, clock, lists, at_low < math.inf)
         else:
             step = between(low, high, at_low, at_high)
         ratio = attempt(scene, work, clock, step)
@@ -187,7 +190,7 @@ def advance(scene, work, memo, clock, counts, record):
             if status != 0:
                 return status
             continue
-        value = event_value(scene, work, memo, NEW) if at_low > 0.0 else 1.0
+        value = event_value(scene, work, memo, NEW) if at_low > 0.0 else math.inf
         at_event = at_low > 0.0 and value <= 0.0
         close = abs(value) <= event_accuracy(clock) or high - low <= 1e-15 * high
         if (at_event or trials > 0) and not close and trials < EVENT_TRIALS:

@@ -75,6 +75,8 @@ def _decode_with_tifffile(path):
 
 
 def _one_line(problem):
+    if type(problem).__name__ == "UnidentifiedImageError":
+        return "its content is of no known picture format"
     return " ".join(str(problem).split())[:120] or type(problem).__name__
 
 

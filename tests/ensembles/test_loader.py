@@ -58,11 +58,11 @@ def test_keys_that_exclude_each_other_replace_the_presets(tmp_path, over, bodies
 
 
 def test_a_preset_keeps_what_the_file_leaves_alone(tmp_path):
-    config = load_text(
-        tmp_path, 'preset = "si"\n[bodies]\ndepth = "5 um"\n[forces.contact]\nk_t = 1.0\n'
-    )
+    text = 'preset = "si"\n[bodies]\ndepth = "5 um"\n[forces.van_der_waals]\nd_min = "2 nm"\n'
+    config = load_text(tmp_path, text)
     assert config.body_options == {"density": 2650.0, "depth": 5e-6}
-    assert (config.forces[-1].k_n, config.forces[-1].k_t) == (20.0, 1.0)
+    attraction = config.forces[2]
+    assert (attraction.d_min, attraction.hamaker, attraction.gap) == (2e-9, 4.7e-20, "surface")
 
 
 def test_false_leaves_out_a_presets_force(tmp_path):

@@ -1,0 +1,224 @@
+"""What becomes of two bodies: missed, or a collision that ends bound or departed.
+
+``observe`` looks at the pair after every accepted step. Bound needs one of two proofs.
+
+Certificate: the bodies touch, do not move against each other, and the attraction outweighs the
+largest load that settling can put on the bond, in any orientation, by a safety factor: in pulling
+straight, and in prying the doublet open about each of the two outermost contact points, which lie
+on either side of the line of centres. Two spheres, and a surface force, which follows the contact,
+need the straight pull only.
+
+Rest: the bodies touch and have rested as one rigid doublet for a stated time, with the load at
+its worst: the faster settling one straight below (a fixed receiver cannot turn, so it need not).
+
+Departed is a pair that touched, whose outlines are further apart than the escape gap, and which is
+parting now and would part at the steady drift that weight and centre forces give it there.
+"""
+
+import math
+
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.kernels import edge_count, edge_end, segment_distance2
+from flocsim.integrators.views import centre_line, centre_view, surface_view
+from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, FREE, NOW, RADIUS
+from flocsim.slots import centre_force, has_centre_force, surface_force, surface_reach
+
+(
+    ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J,
+    COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION, REST_SINCE, MEMO_SIZE,
+) = range(16)  # fmt: skip
+"""The observer's memo. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
+relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m], times [s]."""
+
+BOUND, DEPARTED, MISSED = 1, 2, 3
+"""Codes of the observer."""
+
+SAFETY = 3.0
+"""Factor by which attraction must outweigh the load in a certificate."""
+
+CALM = 0.02
+"""A pair whose parts move at less than this share of the relative drift is calm enough for a
+certificate …"""
+
+REST = 1e-3
+"""… and rests below this share."""
+
+HANGING = 0.99
+"""Cosine between line of centres and drift above which the load is at its worst."""
+
+
+def event_of_touch(scene, work, memo, state):
+    """Smallest gap of the outlines until they have touched, then inf."""
+    if memo[COLLIDED] == 1.0:
+        return math.inf
+    return locate_contacts(scene, work, state)
+
+
+def one_way_distance2(scene, work, a, b):
+    """Smallest squared distance from a's core points to b's edges, both at the current place."""
+    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
+    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    ca, sa = math.cos(work.motion[NOW, a, 2]), math.sin(work.motion[NOW, a, 2])
+    cb, sb = math.cos(work.motion[NOW, b, 2]), math.sin(work.motion[NOW, b, 2])
+    # The points of a in the frame of b: only they have to be turned.
+    c, s = ca * cb + sa * sb, sa * cb - ca * sb
+    tx, ty = cb * ox + sb * oy, cb * oy - sb * ox
+    v = scene.vertices
+    first = scene.first[b]
+    points = scene.first[b + 1] - first
+    least = math.inf
+    for point in range(scene.first[a], scene.first[a + 1]):
+        px = c * v[point, 0] - s * v[point, 1] + tx
+        py = s * v[point, 0] + c * v[point, 1] + ty
+        for edge in range(max(edge_count(points), 1)):
+            start, end = first + edge, edge_end(scene, b, edge)
+            distance2 = segment_distance2(px, py, v[start, 0], v[start, 1], v[end, 0], v[end, 1])
+            least = min(least, distance2)
+    return least
+
+
+def outline_gap(scene, work):
+    """Distance between the two outlines at the current place [m], by all pairs."""
+    least = min(one_way_distance2(scene, work, 0, 1), one_way_distance2(scene, work, 1, 0))
+    return math.sqrt(least) - scene.bodies[0, RADIUS] - scene.bodies[1, RADIUS]
+
+
+def least_gap(work):
+    """Smallest gap among the listed pairs (inf where none is listed)."""
+    least = math.inf
+    for row in range(work.tally[CANDIDATES]):
+        least = min(least, work.geometry[row, 2])
+    return least
+
+
+def note_collision(work, memo, time, distance):
+    """Write down the instant of the first touch."""
+    memo[COLLIDED] = 1.0
+    memo[INSIDE] = 1.0 if distance < memo[ZONE] else 0.0
+    memo[D_COLLISION] = distance
+    memo[D_MAX] = distance
+    memo[T_COLLISION] = time
+
+
+def is_parting(scene, work, memo, time, nx, ny):
+    """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
+    motion = work.motion
+    rate = nx * (motion[NOW, 1, 3] - motion[NOW, 0, 3])
+    rate += ny * (motion[NOW, 1, 4] - motion[NOW, 0, 4])
+    drift = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y]
+    if has_centre_force():
+        repulsion = centre_force(centre_view(scene, work, time, NOW, NOW, 1, 0), scene.parameters)
+        drift += repulsion * (memo[MOBILITY_I] + memo[MOBILITY_J])
+    return rate > 0.0 and drift > 0.0
+
+
+def is_away(scene, work, memo, distance, gap):
+    """Whether the outlines are further apart than the escape gap."""
+    far = distance - scene.bodies[0, BOUNDING_RADIUS] - scene.bodies[1, BOUNDING_RADIUS]
+    if far > memo[ESCAPE]:
+        return True
+    return gap > 0.0 and gap > memo[ESCAPE] * 0.25 and outline_gap(scene, work) > memo[ESCAPE]
+
+
+def relative_speeds(scene, work, nx, ny):
+    """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
+    v = work.motion
+    ux, uy = v[NOW, 1, 3] - v[NOW, 0, 3], v[NOW, 1, 4] - v[NOW, 0, 4]
+    rx, ry = v[NOW, 1, 0] - v[NOW, 0, 0], v[NOW, 1, 1] - v[NOW, 0, 1]
+    spin = v[NOW, 0, 5]
+    shear = math.hypot(ux + spin * ry, uy - spin * rx)
+    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
+    return abs(ux * nx + uy * ny), shear + abs(v[NOW, 1, 5] - spin) * size
+
+
+def largest_load(memo):
+    """The pull on the bond of a settling doublet in its worst orientation [N]."""
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    return drift / (memo[MOBILITY_I] + memo[MOBILITY_J])
+
+
+def surface_attraction(scene, work, time):
+    """Attraction at the closest points [N], 0 without surface forces."""
+    if surface_reach(scene.parameters) <= 0.0 or work.tally[CANDIDATES] == 0:
+        return 0.0
+    closest = 0
+    for row in range(work.tally[CANDIDATES]):
+        if work.geometry[row, 2] < work.geometry[closest, 2]:
+            closest = row
+    return -surface_force(surface_view(scene, work, time, NOW, NOW, closest), scene.parameters)
+
+
+def arms_hold(work, attraction, load, nx, ny, distance):
+    """Whether the attraction along the centres holds against prying about both outer contacts."""
+    left_holds, right_holds = False, False
+    for row in range(work.tally[CANDIDATES]):
+        if work.geometry[row, 2] >= 0.0:
+            continue
+        # The contact point relative to body 0, from its components along n and t of the pair.
+        g = work.geometry
+        shift = 3 if work.candidates[row, 0] == 0 else 5
+        x = g[row, shift + 1] * g[row, 0] + g[row, shift] * g[row, 1]
+        y = g[row, shift + 1] * g[row, 1] - g[row, shift] * g[row, 0]
+        side = nx * y - ny * x
+        lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny))
+        holds = attraction * abs(side) > load * lever
+        left_holds = left_holds or (holds and side > 0.0)
+        right_holds = right_holds or (holds and side < 0.0)
+    return left_holds and right_holds
+
+
+def is_certain(scene, work, memo, time, nx, ny, distance):
+    """Whether no later load can open the bond."""
+    along, shear = relative_speeds(scene, work, nx, ny)
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    load = SAFETY * largest_load(memo)
+    centres = 0.0
+    if has_centre_force():
+        view = centre_view(scene, work, time, NOW, NOW, 1, 0)
+        centres = -centre_force(view, scene.parameters)
+    surfaces = surface_attraction(scene, work, time)
+    points = scene.first[2]
+    if points == 2 or surfaces > load - min(centres, 0.0):
+        return along < CALM * drift and centres + surfaces > load
+    if shear > CALM * drift or centres <= load:
+        return False
+    return arms_hold(work, centres, load, nx, ny, distance)
+
+
+def has_rested(scene, work, memo, time, nx, ny):
+    """Whether the doublet has rested long enough, its load at the worst."""
+    _, shear = relative_speeds(scene, work, nx, ny)
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    if shear > REST * drift:
+        memo[REST_SINCE] = time
+        return False
+    hanging = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y] >= HANGING * drift
+    hanging = hanging or scene.bodies[0, FREE] == 0.0
+    return hanging and time - memo[REST_SINCE] >= memo[REST_TIME]
+
+
+def follow(scene, work, memo, distance):
+    """Keep the largest and last centre distance, and whether it crossed D_0."""
+    memo[D_LAST] = distance
+    if memo[COLLIDED] == 1.0:
+        memo[D_MAX] = max(memo[D_MAX], distance)
+        inside = 1.0 if distance < memo[ZONE] else 0.0
+        if inside != memo[INSIDE]:
+            memo[CROSSED] = 1.0
+
+
+def watch_pair(scene, work, memo, time, at_event):
+    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
+    nx, ny, distance = centre_line(work, NOW, 1, 0)
+    gap = least_gap(work)
+    if memo[COLLIDED] == 0.0 and (at_event or gap < 0.0):
+        note_collision(work, memo, time, distance)
+    follow(scene, work, memo, distance)
+    if is_parting(scene, work, memo, time, nx, ny) and is_away(scene, work, memo, distance, gap):
+        return MISSED if memo[COLLIDED] == 0.0 else DEPARTED
+    if memo[COLLIDED] == 0.0 or gap >= 0.0:
+        memo[REST_SINCE] = time
+        return 0
+    if is_certain(scene, work, memo, time, nx, ny, distance):
+        return BOUND
+    return BOUND if has_rested(scene, work, memo, time, nx, ny) else 0

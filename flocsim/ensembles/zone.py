@@ -1,0 +1,70 @@
+"""The attraction zone d_c < D_0: where van der Waals attraction and double-layer repulsion balance.
+
+With x = κ d, F_A = F_R reads x² exp(−x) = S, S = H_A κ/(24π ε0 ε_r φ²): sizes cancel. It has two
+roots where S ≤ 4/e², x = −2 W₀(−√S/2) (inner) and −2 W₋₁(−√S/2) (outer), and none above.
+"""
+
+import math
+
+from flocsim.errors import ZoneError
+from flocsim.forces import DoubleLayer, VanDerWaals
+
+LARGEST_RATIO = 4.0 / math.e**2
+"""S above which attraction wins at every distance."""
+
+BRANCHES = {"inner": 0, "outer": -1}
+"""Branch of the Lambert function that gives each root."""
+
+
+def attraction_ratio(hamaker, potential, debye_length, permittivity):
+    """S = H_A κ/(24π ε0 ε_r φ²) [-]; inf without a potential."""
+    layer = DoubleLayer(
+        potential=potential, debye_length=debye_length, permittivity=permittivity
+    )
+    if layer.strength == 0.0:
+        return math.inf
+    return hamaker / (6.0 * layer.strength * debye_length**2)
+
+
+def neutral_distance(hamaker, potential, debye_length, permittivity, root):
+    """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
+    from scipy.special import lambertw
+
+    ratio = attraction_ratio(hamaker, potential, debye_length, permittivity)
+    if ratio > LARGEST_RATIO:
+        raise ZoneError(
+            f"no attraction zone: van der Waals attraction exceeds double-layer repulsion at every "
+            f"distance, S = {ratio:.4g} > 4/e² = {LARGEST_RATIO:.4f}, so that F_A = F_R has no "
+            f"root; raise forces.double_layer.potential or debye_length, lower "
+            f"forces.van_der_waals.hamaker, or give zone.distance or zone.centre"
+        )
+    if ratio <= 0.0:
+        raise ZoneError(
+            "no attraction zone: without attraction F_A = F_R has no root; raise "
+            "forces.van_der_waals.hamaker, or give zone.distance or zone.centre"
+        )
+    x = -2.0 * lambertw(-0.5 * math.sqrt(ratio), BRANCHES[root]).real
+    return float(x * debye_length)
+
+
+def only_one(forces, kind):
+    """The one force of a class; ZoneError unless there is just one."""
+    found = [force for force in forces if isinstance(force, kind)]
+    if len(found) != 1:
+        raise ZoneError(
+            f"zone.root needs just one {kind.__name__} force to balance, found {len(found)}; give "
+            "zone.distance or zone.centre instead"
+        )
+    return found[0]
+
+
+def zone_distance(zone, forces, radius_i, radius_j):
+    """D_0 [m], the centre distance within which a pair counts as inside the zone."""
+    if zone.centre is not None:
+        return zone.centre
+    if zone.distance is not None:
+        return radius_i + radius_j + zone.distance
+    attraction, layer = only_one(forces, VanDerWaals), only_one(forces, DoubleLayer)
+    return radius_i + radius_j + neutral_distance(
+        attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity, zone.root
+    )

@@ -1,0 +1,45 @@
+"""The picture of a fit: outlines of the shapes over the grey picture they were made from."""
+
+import numpy as np
+
+from flocsim.geometry.outline import swept_rings
+
+OUTLINE_COLOUR = "#d55e00"
+LONGEST_SIDE = 12.0
+"""Longer side of the drawing [inch]."""
+
+
+def picture_rings(region, fit):
+    """Closed rings [(k, 2), …] of a region's Fit, in picture pixels, x right and y down."""
+    top, left = region.bbox[:2]
+    # The mask has a margin of one pixel, and the fit's y counts upwards.
+    rings = swept_rings(fit.vertices, fit.radius)
+    return [ring * (1.0, -1.0) + (left - 1, top - 1) for ring in rings]
+
+
+def draw_overlay(grey, flocs, title):
+    """A figure of the picture with the outline of every floc.
+
+    grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line.  Returns the figure,
+    for flocsim.io.plots.save.
+    """
+    from matplotlib.figure import Figure
+
+    height, width = grey.shape
+    scale = LONGEST_SIDE / max(height, width)
+    figure = Figure(figsize=(max(width * scale, 4.0), max(height * scale, 2.0) + 0.4), dpi=150)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 0.4 / figure.get_figheight()))
+    axes.imshow(grey, cmap="gray", interpolation="nearest")
+    axes.set_axis_off()
+    axes.set_title(title, loc="left", fontsize=10)
+    for region, fit in flocs:
+        _draw_floc(axes, region, fit)
+    return figure
+
+
+def _draw_floc(axes, region, fit):
+    rings = picture_rings(region, fit)
+    for ring in rings:
+        axes.plot(*ring.T, color=OUTLINE_COLOUR, linewidth=0.8)
+    right, top = np.max(rings[0][:, 0]), np.min(rings[0][:, 1])
+    axes.annotate(str(region.label), (right, top), color=OUTLINE_COLOUR, fontsize=7)
