@@ -74,7 +74,7 @@ def code_digest(code):
 
 
 def describe(name, value):
-    """One line about a global that is no function, for the hash; KernelError for what may change."""
+    """One line about a global that is no function, for the hash; None for what may change."""
     if isinstance(value, types.ModuleType):
         return f"{name}=module {value.__name__}"
     if isinstance(value, type):
@@ -205,9 +205,7 @@ def compiled(entry, fillings, name):
     sys.modules[name] = module
     module.driver = Linker(fillings, transform).link(entry)
     exec(compile(text, str(path), "exec"), module.__dict__)
-    return numba.njit(
-        module.run, nogil=True, cache=folder is not None, error_model="numpy"
-    )
+    return numba.njit(module.run, nogil=True, cache=folder is not None, error_model="numpy")
 
 
 def compose(entry, fillings, *, jit=True):

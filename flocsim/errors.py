@@ -17,7 +17,7 @@ class UsageError(FlocsimError):
 
 
 class ConfigError(UsageError):
-    """One or more wrong entries of a config file; each line names the key, the finding, the remedy."""
+    """Wrong entries of a config file; each line names the key, the finding, the remedy."""
 
 
 class ShapeError(UsageError, ValueError):

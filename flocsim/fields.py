@@ -63,7 +63,7 @@ def choice(*options, default=attrs.NOTHING, help=""):
 
 
 def word_or_quantity(word, unit, *, above=None, at_least=None, default=attrs.NOTHING, help=""):
-    """A field that takes one special word or a quantity, e.g. damping ``"critical"`` or a number."""
+    """A field that takes one special word or a quantity, e.g. ``"critical"`` or a number."""
     number = range_validator(above=above, at_least=at_least)
 
     def check(instance, attribute, value):

@@ -76,7 +76,6 @@ class Scene(NamedTuple):
     parameters: np.ndarray
 
 
-
 def read_vector(name, length, unit):
     """An attrs converter: ``length`` finite numbers as a tuple of floats."""
 
@@ -241,7 +240,6 @@ class Work(NamedTuple):
     budget: np.ndarray
     placed: np.ndarray
     tally: np.ndarray
-
 
 
 def work_of(scene, position, velocity, capacity=256):

@@ -154,7 +154,9 @@ class System:
 
     def explain(self):
         """What is compiled into this scene and what is left out, each with its reason."""
-        lines = [f"{len(self.bodies)} bodies, {'spheres only' if self.spheres_only else 'polygons'}"]
+        lines = [
+            f"{len(self.bodies)} bodies, {'spheres only' if self.spheres_only else 'polygons'}"
+        ]
         lines += [f"in:  {name}: {force}" for name, force in self.pieces.used.items()]
         lines += [f"out: {name}: {reason}" for name, reason in self.pieces.left_out.items()]
         if self.spheres_only:

@@ -11,9 +11,6 @@ write them to a shape library.  The circle of equal area (N = 1) is always store
 
   flocsim fit frames/ --pixel-size 0.95e-6 --vertices 4,8,16,64 --radius 1 -o shapes.h5"""
 
-CLASS_LIMIT = 5.0
-"""r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
-
 
 def add_parser(subparsers):
     """Add the subcommand to argparse's ``subparsers``."""
@@ -27,21 +24,46 @@ def add_parser(subparsers):
     )
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
-    add("--pixel-size", required=True, metavar="METRES",
-        help="length of a pixel's side in metres, e.g. 0.95e-6")
-    add("--vertices", default="4,8,16,64", metavar="LIST",
-        help="numbers of vertices with commas between them (default: %(default)s)")
+    add(
+        "--pixel-size",
+        required=True,
+        metavar="METRES",
+        help="length of a pixel's side in metres, e.g. 0.95e-6",
+    )
+    add(
+        "--vertices",
+        default="4,8,16,64",
+        metavar="LIST",
+        help="numbers of vertices with commas between them (default: %(default)s)",
+    )
     add("--radius", default="1", metavar="PX", help="spheroradius in pixels (default: %(default)s)")
-    add("-o", "--output", default="shapes.h5", metavar="FILE",
-        help="shape library to write (default: %(default)s)")
-    add("--flocs", default="auto", choices=("auto", "bright", "dark"),
-        help="how flocs stand out from the background (default: %(default)s)")
-    add("--min-radius", default="4", metavar="PX",
-        help="equivalent radius below which a region is no floc (default: %(default)s)")
+    add(
+        "-o",
+        "--output",
+        default="shapes.h5",
+        metavar="FILE",
+        help="shape library to write (default: %(default)s)",
+    )
+    add(
+        "--flocs",
+        default="auto",
+        choices=("auto", "bright", "dark"),
+        help="how flocs stand out from the background (default: %(default)s)",
+    )
+    add(
+        "--min-radius",
+        default="4",
+        metavar="PX",
+        help="equivalent radius below which a region is no floc (default: %(default)s)",
+    )
     add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
-    add("--method", default="pattern", choices=("pattern", "even"),
+    add(
+        "--method",
+        default="pattern",
+        choices=("pattern", "even"),
         help="pattern: search for the least error; even: points evenly on the outline, the plain "
-        "baseline (default: %(default)s)")
+        "baseline (default: %(default)s)",
+    )
     add("--overlay", metavar="FILE",
         help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
         "pictures, one file each: FILE-picture.png")  # fmt: skip
@@ -62,6 +84,7 @@ def run(args):
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return 2
 
+    from flocsim.io.fit_report import format_errors
     from flocsim.io.shape_library import write_library
 
     write_library(args.output, entries)
@@ -159,13 +182,17 @@ def overlay_path(overlay, picture, several):
 
 def fit_picture(path, name, overlay, args, options):
     """ShapeEntries of one picture, its line printed, its overlay drawn."""
+    from flocsim.io.fit_report import describe, warn_of_coarse
     from flocsim.io.images import read_grey, segment
     from flocsim.io.shape_library import make_entry
 
     grey = read_grey(path)
     found = segment(grey, flocs=args.flocs, min_radius=options["min_radius"])
     regions = largest(found.regions, options["max_flocs"])
-    fits = [fit_region(region, args.method, options) for region in regions]
+    fits = []
+    for region in regions:
+        show_progress(name, len(fits), len(regions))
+        fits.append(fit_region(region, args.method, options))
     print(describe(name, found, len(regions)), flush=True)
     warn_of_coarse(name, regions, options["radius"])
     if overlay is not None:
@@ -175,6 +202,13 @@ def fit_picture(path, name, overlay, args, options):
         make_entry(name, region, fit, pixel_size, radius)
         for region, fit in zip(regions, fits, strict=True)
     ]
+
+
+def show_progress(name, done, total):
+    """How far a picture is, on a line of its own that the next one replaces; only on a terminal."""
+    if sys.stderr.isatty():
+        end = "\r\x1b[K" if done + 1 == total else ""
+        print(f"\r{name}: floc {done + 1} of {total}{end}", end="", file=sys.stderr, flush=True)
 
 
 def largest(regions, count):
@@ -198,17 +232,6 @@ def fit_region(region, method, options):
         }
 
 
-def warn_of_coarse(name, regions, radius):
-    """A line on stderr if the spheroradius is not below r_eq of some flocs (paper, section 3.2)."""
-    coarse = sum(region.equivalent_radius <= radius for region in regions)
-    if coarse:
-        print(
-            f"flocsim: {name}: the spheroradius of {radius:g} px is not below r_eq of {coarse} "
-            "flocs, which it cannot follow; use a smaller --radius",
-            file=sys.stderr,
-        )
-
-
 def draw(overlay, grey, name, regions, fits, options):
     """Write the picture with the outlines at the largest N."""
     from flocsim.io.plot_fit import draw_overlay
@@ -218,37 +241,3 @@ def draw(overlay, grey, name, regions, fits, options):
     flocs = [(region, fit[most]) for region, fit in zip(regions, fits, strict=True)]
     title = f"{name}: {len(flocs)} flocs, N = {most}, r = {options['radius']:g} px"
     save(draw_overlay(grey, flocs, title), overlay)
-
-
-def describe(name, found, fitted):
-    """One line on a picture: flocs, rejected regions by reason, foreground."""
-    parts = [f"{len(found.regions)} {found.flocs} flocs"]
-    if fitted < len(found.regions):
-        parts.append(f"the {fitted} largest fitted")
-    parts += [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
-    return f"{name}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
-
-
-def format_errors(entries):
-    """A table of the mean relative error [%] by N and size class."""
-    classes = {
-        f"r_eq <= {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius <= CLASS_LIMIT],
-        f"r_eq > {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius > CLASS_LIMIT],
-        "all": entries,
-    }
-    heads = [f"{name} ({len(members)})" for name, members in classes.items()]
-    lines = ["mean relative error [%] by vertices and size class (number of flocs)"]
-    lines.append("  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]))
-    for count in entries[0].fits:
-        means = [mean_error(members, count) for members in classes.values()]
-        label = "1 (circle)" if count == 1 else str(count)
-        lines.append("  ".join([f"{label:>10}", *(f"{mean:>18}" for mean in means)]))
-    return "\n".join(lines)
-
-
-def mean_error(entries, count):
-    """The mean relative error at N = `count`, "-" without flocs."""
-    errors = [entry.fits[count].relative_error for entry in entries]
-    return f"{sum(errors) / len(errors):.2f}" if errors else "-"
-
-

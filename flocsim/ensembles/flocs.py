@@ -12,7 +12,7 @@ from flocsim.geometry.sphere import Sphere
 from flocsim.geometry.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 
 SYNTHETIC_RATIO = 16.0
-"""r_eq/r at which synthetic flocs are fitted: between the small and the large flocs of the paper."""
+"""r_eq/r at which synthetic flocs are fitted: between the paper's small and large flocs."""
 
 
 @attrs.frozen(eq=False)

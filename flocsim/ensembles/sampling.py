@@ -16,5 +16,3 @@ def draws(seed, replicate):
 def orientations(numbers):
     """Angles θ = 2πn [rad] of bodies i and j."""
     return 2.0 * np.pi * numbers[0], 2.0 * np.pi * numbers[1]
-
-

@@ -17,7 +17,6 @@ from flocsim.io.results_schema import NOT_APPLICABLE
 from flocsim.layout import (
     CODE,
     ERROR,
-    NOW,
     RECORDED,
     REJECTED,
     STEPS,

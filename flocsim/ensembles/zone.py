@@ -18,9 +18,7 @@ BRANCHES = {"inner": 0, "outer": -1}
 
 def attraction_ratio(hamaker, potential, debye_length, permittivity):
     """S = H_A κ/(24π ε0 ε_r φ²) [-]; inf without a potential."""
-    layer = DoubleLayer(
-        potential=potential, debye_length=debye_length, permittivity=permittivity
-    )
+    layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
     if layer.strength == 0.0:
         return math.inf
     return hamaker / (6.0 * layer.strength * debye_length**2)
@@ -65,6 +63,10 @@ def zone_distance(zone, forces, radius_i, radius_j):
     if zone.distance is not None:
         return radius_i + radius_j + zone.distance
     attraction, layer = only_one(forces, VanDerWaals), only_one(forces, DoubleLayer)
-    return radius_i + radius_j + neutral_distance(
-        attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity, zone.root
+    return (
+        radius_i
+        + radius_j
+        + neutral_distance(
+            attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity, zone.root
+        )
     )

@@ -66,7 +66,9 @@ class Contact(ContactForce):
         if tension == 0.0:
             normal = max(normal, 0.0)
         shear_damping = lambda_t + proportional * damping
-        tangential = -k_t * contact.slip - contact.effective_mass * shear_damping * contact.slip_rate
+        tangential = (
+            -k_t * contact.slip - contact.effective_mass * shear_damping * contact.slip_rate
+        )
         if friction_limit < math.inf:
             hold = friction_limit * max(normal, 0.0)
             tangential = min(max(tangential, -hold), hold)

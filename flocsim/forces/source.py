@@ -207,7 +207,7 @@ def sort_forces(pieces, forces):
 
 
 def scene_functions(forces, fluid):
-    """Pieces of the scene with these forces in this fluid: fillings, parameters, what is left out."""
+    """Pieces of the scene with these forces in this fluid."""
     pieces = Pieces()
     kinds = sort_forces(pieces, forces)
     namespace = {"PairView": PairView, "max": max, "min": min, "abs": abs, "math": math}

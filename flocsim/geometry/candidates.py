@@ -54,7 +54,7 @@ def add_pair(scene, work, a, point, b, start, end, ox, oy, cutoff):
 
 
 def list_one_way(scene, work, a, b, cutoff):
-    """List pairs of a's vertices and b's edges; the smallest gap met, −inf where the list is full."""
+    """List pairs of a's vertices and b's edges; the smallest gap met, −inf for a full list."""
     ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
     oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
     contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
@@ -131,7 +131,11 @@ def list_pair(scene, work, a, b):
     oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
     reach = surface_reach(scene.parameters)
     skin = skin_of(scene, a, b)
-    apart = math.sqrt(ox * ox + oy * oy) - scene.bodies[a, BOUNDING_RADIUS] - scene.bodies[b, BOUNDING_RADIUS]
+    apart = (
+        math.sqrt(ox * ox + oy * oy)
+        - scene.bodies[a, BOUNDING_RADIUS]
+        - scene.bodies[b, BOUNDING_RADIUS]
+    )
     if apart > max(skin, reach):
         return apart - max(0.0, reach)
     if reach > 0.0:

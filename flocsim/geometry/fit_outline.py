@@ -76,53 +76,8 @@ def _triangle_areas(points):
     return 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
 
 
-def untangle(vertices):
-    """The vertices in an order in which no edges cross, as far as that is found.
-
-    Of every crossing pair of edges the part between is reversed, which shortens the polygon.
-    """
-    from flocsim.geometry.fit_kernels import segments_cross
-
-    vertices = vertices.copy()
-    # Points on one line can seem to cross for ever, by rounding: the rounds are counted.
-    for _ in range(len(vertices)):
-        crossed = False
-        for first, second in _edge_pairs(len(vertices)):
-            ends = vertices[[first, first + 1, second, (second + 1) % len(vertices)]]
-            if segments_cross(*ends.ravel()):
-                vertices[first + 1 : second + 1] = vertices[first + 1 : second + 1][::-1].copy()
-                crossed = True
-        if not crossed:
-            break
-    return vertices
-
-
-def _edge_pairs(count):
-    """Pairs of edges of a closed polygon that share no vertex."""
-    for first in range(count - 2):
-        for second in range(first + 2, count - (first == 0)):
-            yield first, second
-
-
-def inset(vertices, depth):
-    """The simple polygon with every vertex drawn inwards by `depth`, or less where it must.
-
-    `vertices`: in trace_outline's sense.  A vertex goes along the bisector of its corner by all,
-    half, or none of `depth`, as long as the polygon stays simple.
-    """
-    from flocsim.geometry.fit_kernels import stays_simple
-
-    vertices = vertices.copy()
-    for k, inwards in enumerate(_inward_directions(vertices)):
-        for share in (1.0, 0.5):
-            x, y = vertices[k] + share * depth * inwards
-            if stays_simple(vertices, k, x, y):
-                vertices[k] = x, y
-                break
-    return vertices
-
-
-def _inward_directions(vertices):
+def inward_directions(vertices):
+    """Unit bisectors (N, 2) of the corners, inwards for trace_outline's sense."""
     edges = np.roll(vertices, -1, axis=0) - vertices
     edges /= np.maximum(np.hypot(*edges.T), 1e-12)[:, None]
     # Right of the walk, which is the inside; rows count downwards.

@@ -1,19 +1,24 @@
 """From a mask to N vertices: starts, pattern search, and moving vertices to where they are needed.
 
-Imported only when a polygon is fitted, since the kernels load numba.
+The kernels are composed (flocsim.composer): compiled on first use and kept on disk.
 """
+
+from functools import cache
 
 import numpy as np
 
-from flocsim.geometry.fit_kernels import count_errors, is_simple, pattern_search
+from flocsim.composer import compose
+from flocsim.geometry import fit_cover, fit_pattern, fit_simple
 from flocsim.geometry.fit_outline import (
     even_points,
-    inset,
+    inward_directions,
     ring_inside,
     telling_points,
     trace_outline,
-    untangle,
 )
+
+ANGLES = np.pi / 4.0 * np.arange(8)
+DIRECTIONS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 
 STEPS = np.array([8.0, 4.0, 2.0, 1.0, 0.5, 0.25])
 """Steps of the pattern search [px]: from past the usual detail of a floc to below a pixel."""
@@ -26,6 +31,22 @@ FEWEST = 8
 
 CANDIDATES = 3
 """So many of the vertices that count least are tried elsewhere; more gains nearly nothing."""
+
+
+@cache
+def compiled(kernel):
+    """The kernel of fit_cover, fit_simple or fit_pattern, compiled."""
+    return compose(kernel, {})
+
+
+def count_errors(mask, vertices, radius):
+    """V of the swept polygon against the mask."""
+    return int(compiled(fit_cover.count_errors)(mask, np.ascontiguousarray(vertices), radius))
+
+
+def is_simple(vertices):
+    """Whether no edges cross or nearly touch."""
+    return bool(compiled(fit_simple.is_simple)(np.ascontiguousarray(vertices)))
 
 
 def even_fit(mask, count, radius):
@@ -83,14 +104,23 @@ def _simple(points, mask):
     """The points as a simple polygon: as they are, reordered, or a ring in their place."""
     if is_simple(points):
         return points
-    reordered = untangle(points)
+    reordered = np.array(points)
+    compiled(fit_simple.untangle)(reordered)
     return reordered if is_simple(reordered) else ring_inside(mask, len(points))
 
 
+def inset(vertices, depth):
+    """The simple polygon with every vertex drawn inwards by `depth` [px], or less where it must."""
+    drawn = np.array(vertices)
+    compiled(fit_simple.draw_in)(drawn, inward_directions(drawn), float(depth))
+    return drawn
+
+
 def _searched(mask, start, radius, steps, active=None):
-    vertices = np.ascontiguousarray(start)
+    vertices = np.array(start)
     active = np.ones(len(vertices), bool) if active is None else active
-    return vertices, pattern_search(mask, vertices, radius, steps, active)
+    search = compiled(fit_pattern.pattern_search)
+    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active))
 
 
 def _relocated(mask, vertices, wrong, radius):

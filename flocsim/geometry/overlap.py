@@ -40,3 +40,30 @@ def overlap_fault(a, radius_a, b, radius_b):
     if overlap > DEEPEST_OVERLAP * (radius_a + radius_b):
         return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
     return None
+
+
+def nearest_on_edges(points, starts, ends):
+    """Nearest points (k, edges, 2) on each edge to each of the points (k, 2)."""
+    along = ends - starts
+    share = np.einsum("kej,ej->ke", points[:, None] - starts[None], along)
+    share = np.clip(share / np.einsum("ej,ej->e", along, along), 0.0, 1.0)
+    return starts[None] + share[..., None] * along[None]
+
+
+def touching_points(a, radius_a, b, radius_b):
+    """Middles (c, 2) [m] of the overlaps of two placed cores (N, 2) with their radii."""
+    found = []
+    for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):
+        starts, ends = edges_of(core)
+        if len(starts) == 0:
+            starts = ends = core
+        if len(core) == 1:
+            feet = np.broadcast_to(core, (len(points), 1, 2))
+        else:
+            feet = nearest_on_edges(points, starts, ends)
+        away = points[:, None] - feet
+        distance = np.hypot(away[..., 0], away[..., 1])
+        normal = away / np.maximum(distance, 1e-300)[..., None]
+        middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
+        found.append(middle[distance < radius + other])
+    return np.concatenate(found)

@@ -1,4 +1,4 @@
-"""What replaces the polygon code in a scene of spheres: nothing to turn, one pair per two bodies."""
+"""What replaces the polygon code in a scene of spheres: one pair per two bodies."""
 
 from flocsim.geometry import candidates, contacts
 

@@ -88,7 +88,12 @@ def chord_crossings(origin, direction, length, vertices, radius):
     starts, units, lengths = unit_edges(vertices)
     slope = cross(direction[None], units)
     oblique = np.abs(slope) > 1e-12
-    starts, units, lengths, slope = starts[oblique], units[oblique], lengths[oblique], slope[oblique]
+    starts, units, lengths, slope = (
+        starts[oblique],
+        units[oblique],
+        lengths[oblique],
+        slope[oblique],
+    )
     offset = cross(starts - origin, units)
     for side in (-radius, radius):
         cut = (offset + side) / slope
@@ -130,7 +135,7 @@ def pieces_between(cuts, first, last):
 
 
 def chord_nodes(start, end, vertices, radius):
-    """Points, tangents and weights of the exposed part of one offset edge (right of start → end)."""
+    """Points, tangents and weights of the exposed part of an edge's offset to its right."""
     along = end - start
     length = np.hypot(*along)
     direction = along / length
@@ -171,7 +176,7 @@ def outline_nodes(vertices, radius):
 def swept_moments(vertices, radius):
     """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴].
 
-    ``vertices`` (N, 2) is a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
+    ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
     """
     if len(vertices) == 1:
         return np.pi * radius**2, vertices[0].copy(), 0.5 * np.pi * radius**4

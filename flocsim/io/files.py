@@ -107,3 +107,16 @@ def unseal(path, data):
     if seal(content) != data:
         raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
     return content
+
+
+def check_writable(path):
+    """FileError now, rather than after hours, if ``path`` could not be written later."""
+    target = ordinary_target(path)
+    probe = target.with_name(f".flocsim-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    try:
+        write_synced(probe, b"")
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error) from error
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            probe.unlink()

@@ -1,5 +1,6 @@
 """Picture files → grey arrays.  Pillow opens nearly all; tifffile what Pillow cannot in TIFF."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,10 @@ def read_grey(path):
 
 def _decode(path):
     try:
-        return _decode_with_pillow(path)
+        with warnings.catch_warnings():
+            # What a decoder only warns of, odd metadata, does not touch the pixels.
+            warnings.simplefilter("ignore")
+            return _decode_with_pillow(path)
     except ImageError:
         raise
     except Exception as problem:

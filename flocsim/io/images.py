@@ -184,7 +184,7 @@ def _reason_to_reject(found, shape, min_radius):
     if _size(found)[1] < min_radius:
         return "too small"
     if top == 0 or left == 0 or bottom == shape[0] or right == shape[1]:
-        return "touches the border"
+        return "at the border"
     return None
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from flocsim.geometry.outline import swept_rings
+from flocsim.io.plot_style import house_style
 
 OUTLINE_COLOUR = "#d55e00"
 LONGEST_SIDE = 12.0
@@ -23,18 +24,24 @@ def draw_overlay(grey, flocs, title):
     grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line.  Returns the figure,
     for flocsim.io.plots.save.
     """
+    with house_style():
+        axes = _picture_axes(grey.shape)
+        axes.imshow(grey, cmap="gray", interpolation="nearest")
+        axes.set_axis_off()
+        axes.set_title(title)
+        for region, fit in flocs:
+            _draw_floc(axes, region, fit)
+    return axes.figure
+
+
+def _picture_axes(shape):
+    """Axes that a picture of this shape fills, with a strip for the title."""
     from matplotlib.figure import Figure
 
-    height, width = grey.shape
-    scale = LONGEST_SIDE / max(height, width)
-    figure = Figure(figsize=(max(width * scale, 4.0), max(height * scale, 2.0) + 0.4), dpi=150)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - 0.4 / figure.get_figheight()))
-    axes.imshow(grey, cmap="gray", interpolation="nearest")
-    axes.set_axis_off()
-    axes.set_title(title, loc="left", fontsize=10)
-    for region, fit in flocs:
-        _draw_floc(axes, region, fit)
-    return figure
+    height, width = (size * LONGEST_SIDE / max(shape) for size in shape)
+    strip = 0.3
+    figure = Figure(figsize=(max(width, 4.0), max(height, 2.0) + strip))
+    return figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
 
 
 def _draw_floc(axes, region, fit):

@@ -216,6 +216,4 @@ def _stored(columns, row, count):
     vertices = columns["vertices"][row]
     if vertices.shape != (count, 2) or not np.isfinite(vertices).all():
         raise ValueError(f"vertices of floc {row} at N = {count} have shape {vertices.shape}")
-    return StoredFit(
-        vertices, float(columns["radius"][row]), float(columns["relative_error"][row])
-    )
+    return StoredFit(vertices, float(columns["radius"][row]), float(columns["relative_error"][row]))

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from real_images import silhouettes
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.geometry.fit import fit_mask
@@ -60,7 +61,8 @@ def test_relative_error_is_that_of_the_definition(method, vertices, radius):
 def test_the_search_beats_even_spacing_and_the_circle(vertices):
     for seed in range(4):
         found = fit_mask(blob(seed), vertices=vertices).relative_error
-        assert found < fit_mask(blob(seed), vertices=vertices, method="even").relative_error
+        even = fit_mask(blob(seed), vertices=vertices, method="even").relative_error
+        assert found < even or found == 0
         assert found < fit_mask(blob(seed), vertices=1).relative_error
 
 
@@ -184,9 +186,9 @@ def test_wrong_options_are_named(options, named):
         fit_mask(blob(0), **options)
 
 
-def test_real_flocs_reach_the_published_accuracy(silhouettes):
+def test_real_flocs_reach_the_published_accuracy():
     """Paper, section 3.2: spheres RE ≥ 32 % as a class mean, best fits below 1 %."""
-    flocs = [mask for mask, radius in silhouettes if 14 <= radius <= 26][::4]
+    flocs = [mask for mask, radius in silhouettes() if 14 <= radius <= 26][::4]
     means = {
         n: np.mean([fit_mask(mask, vertices=n).relative_error for mask in flocs])
         for n in (1, 4, 8, 16, 28, 64)

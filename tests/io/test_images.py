@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from PIL import Image
+from real_images import real_image
 
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images import read_grey, segment
@@ -27,10 +28,8 @@ def synthetic(flocs="dark", vignette=0.8, noise=0.02, shape=(300, 400), seed=1):
     cover = np.sum(covers, axis=0)
     y, x = np.mgrid[-1 : 1 : shape[0] * 1j, -1 : 1 : shape[1] * 1j]
     light = 1 - 0.5 * vignette * (x**2 + y**2)
-    if flocs == "dark":
-        grey = 0.8 * light * (1 - 0.85 * cover)
-    else:
-        grey = 0.1 * light + 0.7 * cover
+    lost, scattered = 0.8 * light * (1 - 0.85 * cover), 0.1 * light + 0.7 * cover
+    grey = lost if flocs == "dark" else scattered
     return grey + noise * np.random.default_rng(seed).standard_normal(shape), np.array(radii)
 
 
@@ -91,7 +90,7 @@ def disks(*places, shape=(120, 120)):
 def test_border_and_small_regions_are_rejected_with_the_reason():
     found = segment(disks((60, 60, 15), (0, 30, 10), (100, 100, 2.5)))
     assert len(found.regions) == 1
-    assert found.rejected_by_reason() == {"too small": 1, "touches the border": 1}
+    assert found.rejected_by_reason() == {"too small": 1, "at the border": 1}
     assert len(segment(disks((60, 60, 15), (100, 100, 2.5)), min_radius=1).regions) == 2
 
 
@@ -197,8 +196,8 @@ def test_a_stack_of_pictures_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("frame", ["023", "024", "025"])
-def test_camera_frames_with_a_strong_vignette(real_images, frame):
-    found = segment(read_grey(real_images / f"flocpy/{frame}.png"))
+def test_camera_frames_with_a_strong_vignette(frame):
+    found = segment(read_grey(real_image(f"flocpy/{frame}.png")))
     assert found.flocs == "dark"
     assert 0.026 <= found.foreground_share <= 0.050
     assert 15 <= len(found.regions) <= 26
@@ -217,8 +216,8 @@ def test_camera_frames_with_a_strong_vignette(real_images, frame):
         ("soot_tem/201805A_A6_004_half.png", "dark", 5, 45),
     ],
 )
-def test_every_real_picture_gives_flocs(real_images, name, flocs, least, most):
-    found = segment(read_grey(real_images / name))
+def test_every_real_picture_gives_flocs(name, flocs, least, most):
+    found = segment(read_grey(real_image(name)))
     assert found.flocs == flocs
     assert least <= len(found.regions) <= most
     assert found.foreground_share < 0.2

@@ -1,27 +1,15 @@
-"""Compiled inner loops of the fit: pixel cover of a swept polygon and the pattern search on it.
+"""Which pixels a swept polygon covers, and how that changes when one vertex moves.
 
-Imported only when a fit is made, since it loads numba.  Pixel coordinates, x = column, y = row
-(downwards).  A polygon covers a pixel whose centre is inside its core (odd number of edges to the
-right) or within the spheroradius of an edge.  Both counts are kept per pixel, so that a moved
-vertex needs only its two edges recounted.
+Pixel coordinates, x = column, y = row (downwards).  A polygon covers a pixel whose centre is
+inside its core (odd number of edges to the right) or within the spheroradius of an edge.  Both
+counts are kept per pixel, so that a moved vertex needs only its two edges recounted.
 
-Only functions called from Python are cached on disk; they carry the others with them.
+Plain Python on scalars and arrays; flocsim.geometry.fit_search compiles it.
 """
 
 import numpy as np
-from numba import njit
-
-CLEARANCE = 0.01
-"""Least distance [px] between a vertex and an edge not its own: simple polygons stay simple."""
-
-DIRECTIONS = np.array(
-    [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -1.0),
-     (1.0, -1.0)]
-)  # fmt: skip
-DIRECTIONS /= np.hypot(DIRECTIONS[:, :1], DIRECTIONS[:, 1:])
 
 
-@njit
 def squared_distance(x, y, ax, ay, bx, by):
     """Squared distance of the point (x, y) from the segment a–b."""
     ux, uy = bx - ax, by - ay
@@ -33,7 +21,6 @@ def squared_distance(x, y, ax, ay, bx, by):
     return dx * dx + dy * dy
 
 
-@njit
 def crossing(ax, ay, bx, by, y):
     """x where the edge a–b crosses the row at height y, −inf if it does not."""
     if (ay > y) == (by > y):
@@ -44,14 +31,12 @@ def crossing(ax, ay, bx, by, y):
     return ax + (y - ay) / (by - ay) * (bx - ax)
 
 
-@njit
 def first_pixel(least, size):
     """The first pixel of an axis of `size` pixels at or after the coordinate `least`."""
     # Held to the axis before the conversion: infinity has no integer.
     return int(np.ceil(min(max(least, 0.0), float(size))))
 
 
-@njit
 def cover(vertices, radius, shape):
     """Counts per pixel: (edges crossed to the right are odd, edges within the radius)."""
     odd = np.zeros(shape, np.bool_)
@@ -67,7 +52,6 @@ def cover(vertices, radius, shape):
     return odd, near
 
 
-@njit
 def add_edge(near, ax, ay, bx, by, radius):
     """Count the edge a–b at every pixel within the radius of it."""
     rows, columns = near.shape
@@ -82,7 +66,6 @@ def add_edge(near, ax, ay, bx, by, radius):
                 near[row, column] += 1
 
 
-@njit
 def count_wrong(mask, odd, near):
     """V: the number of pixels where cover and mask differ (paper, section 2.3)."""
     wrong = 0
@@ -93,14 +76,12 @@ def count_wrong(mask, odd, near):
     return wrong
 
 
-@njit(cache=True)
 def count_errors(mask, vertices, radius):
     """V of the polygon `vertices` (N, 2) swept by `radius` [px], against a (h, w) bool mask."""
     odd, near = cover(vertices, radius, mask.shape)
     return count_wrong(mask, odd, near)
 
 
-@njit
 def row_reach(ax, ay, bx, by, row, radius):
     """First and last x that the edge a–b swept by the radius can have in a row, or inf, −inf."""
     low, high = min(ay, by), max(ay, by)
@@ -114,7 +95,6 @@ def row_reach(ax, ay, bx, by, row, radius):
     return min(first, last) - radius, max(first, last) + radius
 
 
-@njit
 def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
     """Change of V when a vertex goes from `old` to `new`; the counts follow if `keep`.
 
@@ -145,7 +125,6 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
     return change
 
 
-@njit
 def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
     """move_vertex's share of the pixels of a row with first ≤ x ≤ last."""
     before, old, after, new = ends
@@ -177,137 +156,4 @@ def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
         if keep:
             odd[row, column] = was_odd != flip
             near[row, column] = was_near + extra
-    return change
-
-
-@njit
-def side(ax, ay, bx, by, x, y):
-    """Twice the signed area of the triangle a, b, (x, y)."""
-    return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-
-
-@njit(cache=True)
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-    """Whether the segments a–b and c–d cross at an inner point of both."""
-    return (side(ax, ay, bx, by, cx, cy) > 0.0) != (side(ax, ay, bx, by, dx, dy) > 0.0) and (
-        side(cx, cy, dx, dy, ax, ay) > 0.0
-    ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
-
-
-@njit
-def edge_is_clear(vertices, start, stop, moved, x, y):
-    """Whether the edge between the neighbours `start` and `stop` keeps clear of all others.
-
-    The vertex `moved`, one of the two, counts as being at (x, y).
-    """
-    limit = CLEARANCE * CLEARANCE
-    count = len(vertices)
-    ax, ay = (x, y) if start == moved else (vertices[start, 0], vertices[start, 1])
-    bx, by = (x, y) if stop == moved else (vertices[stop, 0], vertices[stop, 1])
-    if (bx - ax) ** 2 + (by - ay) ** 2 < limit:
-        return False
-    for k in range(count):
-        cx, cy = vertices[k]
-        if k in (start, stop):
-            continue
-        if squared_distance(cx, cy, ax, ay, bx, by) < limit:
-            return False
-        following = (k + 1) % count
-        if following in (start, stop):
-            continue
-        dx, dy = vertices[following]
-        if squared_distance(x, y, cx, cy, dx, dy) < limit:
-            return False
-        if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-            return False
-    return True
-
-
-@njit(cache=True)
-def stays_simple(vertices, k, x, y):
-    """Whether a simple polygon stays simple when its vertex k goes to (x, y)."""
-    count = len(vertices)
-    before, after = (k - 1) % count, (k + 1) % count
-    return edge_is_clear(vertices, before, k, k, x, y) and edge_is_clear(
-        vertices, k, after, k, x, y
-    )
-
-
-@njit(cache=True)
-def is_simple(vertices):
-    """Whether no edges cross and every vertex is clear of the edges that are not its own."""
-    for k in range(len(vertices)):
-        if not stays_simple(vertices, k, vertices[k, 0], vertices[k, 1]):
-            return False
-    return True
-
-
-@njit
-def stepped(vertices, k, direction, step):
-    """Where vertex k comes to by a step in a direction."""
-    return (
-        vertices[k, 0] + step * DIRECTIONS[direction, 0],
-        vertices[k, 1] + step * DIRECTIONS[direction, 1],
-    )
-
-
-@njit
-def best_step(mask, odd, near, vertices, k, radius, step):
-    """The direction in which a step of vertex k lowers V the most: (direction or −1, change)."""
-    count = len(vertices)
-    before, after = vertices[(k - 1) % count], vertices[(k + 1) % count]
-    margin = radius + 1.0
-    best, least = -1, 0
-    for direction in range(len(DIRECTIONS)):
-        new = stepped(vertices, k, direction, step)
-        # Pixels off the array are not counted: the swept outline has to stay on it.
-        if min(new[0], new[1]) < margin or (
-            new[0] > mask.shape[1] - 1 - margin or new[1] > mask.shape[0] - 1 - margin
-        ):
-            continue
-        change = move_vertex(mask, odd, near, before, vertices[k], after, new, radius, False)
-        if change < least and stays_simple(vertices, k, new[0], new[1]):
-            best, least = direction, change
-    return best, least
-
-
-@njit(cache=True)
-def pattern_search(mask, vertices, radius, steps, active):
-    """Move vertices in eight directions by shrinking `steps` [px] while V falls.
-
-    mask: (h, w) bool; vertices: (N, 2), simple; changed in place; active: (N,) bool, the vertices
-    to begin with.  A vertex whose steps all failed rests until one nearby moves.  Returns V.
-    """
-    odd, near = cover(vertices, radius, mask.shape)
-    wrong = count_wrong(mask, odd, near)
-    count = len(vertices)
-    waiting = np.empty(count, np.bool_)
-    for step in steps:
-        for k in range(count):
-            waiting[k] = active[k]
-        k, rested = 0, 0
-        while rested < count:
-            change = 0
-            if waiting[k]:
-                change = step_vertex(mask, odd, near, vertices, k, radius, step)
-                waiting[k] = False
-            if change < 0:
-                wrong += change
-                for near_by in range(k - 2, k + 3):
-                    waiting[near_by % count] = active[near_by % count] = True
-            rested = 0 if change < 0 else rested + 1
-            k = (k + 1) % count
-    return wrong
-
-
-@njit
-def step_vertex(mask, odd, near, vertices, k, radius, step):
-    """Take the best step of vertex k, if any lowers V, and give the change of V."""
-    direction, change = best_step(mask, odd, near, vertices, k, radius, step)
-    if direction >= 0:
-        count = len(vertices)
-        new = stepped(vertices, k, direction, step)
-        before, after = vertices[(k - 1) % count], vertices[(k + 1) % count]
-        move_vertex(mask, odd, near, before, vertices[k], after, new, radius, True)
-        vertices[k, 0], vertices[k, 1] = new
     return change

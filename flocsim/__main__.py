@@ -1,0 +1,51 @@
+"""The command `flocsim`, also `python -m flocsim`: one subcommand for each thing to do."""
+
+import argparse
+import os
+import sys
+
+from flocsim.commands import ensemble, fit, info, init, plot, trajectory
+from flocsim.errors import FlocsimError
+
+COMMANDS = (init, fit, ensemble, trajectory, plot, info)
+
+
+def make_parser():
+    """The parser of the command and of all its subcommands."""
+    parser = argparse.ArgumentParser(
+        prog="flocsim",
+        description="When two flocs of real shape meet in water: do they collide, do they stick?",
+    )
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for command in COMMANDS:
+        command.add_parser(subparsers)
+    return parser
+
+
+def tolerant_streams():
+    """Print on any terminal: a letter that it does not know must not end a command."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def main(argv=None):
+    """Run a subcommand; the exit code. Errors are one line on stderr."""
+    tolerant_streams()
+    arguments = make_parser().parse_args(argv)
+    try:
+        return arguments.run(arguments)
+    except FlocsimError as error:
+        print(f"flocsim: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("flocsim: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone (`| head`): not an error, but nothing more to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,123 @@
+"""`flocsim trajectory cfg.toml --replicate 17`: one collision as a strip of frames (Fig. 7)."""
+
+from pathlib import Path
+
+from flocsim.errors import UsageError
+
+
+def add_parser(subparsers):
+    """Add the subcommand to argparse's ``subparsers``."""
+    parser = subparsers.add_parser(
+        "trajectory", help="run one replicate of a config and draw it as a strip of frames"
+    )
+    parser.add_argument("config", help="config file (TOML)")
+    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
+    parser.add_argument(
+        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
+    )
+    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
+    parser.add_argument("--seed", type=int, help="seed, instead of the config's")
+    parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="strip of frames: .png, .pdf or .svg"
+    )
+    parser.add_argument(
+        "--distance", metavar="FILE", help="also draw the centre distance against time"
+    )
+    parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def chosen(value, known, option, default):
+    """The place of an option's value among the config's; UsageError where it is not there."""
+    known = list(known)
+    if value is None:
+        value = known[default]
+    if value not in known:
+        raise UsageError(f"{option} must be one of {', '.join(map(str, known))}, found {value}")
+    return known.index(value)
+
+
+def select(config, args):
+    """(place of the condition, N, share of δ_max) that the arguments choose."""
+    if not args.replicate >= 0:
+        raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
+    if not 2 <= args.frames <= 50:
+        raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
+    names = [name for name, _, _ in config.scene.conditions]
+    condition = chosen(args.type, names, "--type", 0)
+    vertices = config.shapes.vertices
+    vertex_count = vertices[chosen(args.vertices, vertices, "--vertices", -1)]
+    delta = config.scene.delta
+    return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
+
+
+def describe(config, place, replicate, row):
+    """One line on what happened."""
+    from flocsim.ensembles.failures import FAILURES
+    from flocsim.io.results_schema import OUTCOMES
+
+    condition, vertices, share = place
+    outcome = OUTCOMES[row["outcome"]]
+    reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
+    name = config.scene.conditions[condition][0]
+    touch = ""
+    if row["inside"] <= 1:
+        touch = f"collision at {1e3 * row['t_collision']:.4g} ms, "
+        touch += f"d_c = {1e6 * row['d_c_collision']:.4g} um; "
+    return (
+        f"type {name}, N = {vertices}, delta = {share:g}, replicate {replicate}: "
+        f"{outcome}{reason}; {touch}end at {1e3 * row['t_end']:.4g} ms, {row['steps']} steps"
+    )
+
+
+def draw(args, frames, motion, row, zone, title):
+    """Draw and save what was asked for; the paths written."""
+    from flocsim.io.plots import draw_distance, draw_strip, save
+
+    output = Path(args.output or f"trajectory-{args.replicate}.png")
+    strip = draw_strip(
+        frames.outlines, frames.times, frames.paths, title,
+        centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
+    )  # fmt: skip
+    save(strip, output)
+    written = [output]
+    if args.distance:
+        times, distance = motion
+        save(draw_distance(times, distance, zone, title), Path(args.distance))
+        written.append(Path(args.distance))
+    return written
+
+
+def run(args):
+    """Run the replicate, draw it, print what happened; the exit code."""
+    import numpy as np
+
+    from flocsim.ensembles.frames import frames_of
+    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.sampling import draws
+    from flocsim.ensembles.scene import Record
+    from flocsim.ensembles.study import Study
+    from flocsim.io.trajectory import write_trajectory
+
+    config = load_config(args.config, {} if args.seed is None else {"seed": args.seed})
+    place = select(config, args)
+    study = Study(config)
+    record = Record()
+    row = study.run(*place, args.replicate, record)
+    encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))
+    times, position, velocity = record.arrays()
+    frames = frames_of(encounter.shapes, times, position, row["t_collision"], args.frames)
+    distance = np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+    title = describe(config, place, args.replicate, row)
+    print(title)
+    zone = encounter.zone_distance
+    for path in draw(args, frames, (times, distance), row, zone, title.split(";")[0]):
+        print(path)
+    if args.save:
+        facts = {"config": config.text, "replicate": args.replicate, "zone_distance": zone}
+        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts)
+        print(args.save)
+    return 0

@@ -1,0 +1,57 @@
+"""How far a study has come, as whole lines or as one line that renews itself on a terminal."""
+
+import sys
+import time
+
+LINE_SECONDS = 5.0
+"""Seconds between two lines where the output is no terminal."""
+
+BAR_SECONDS = 0.2
+"""Seconds between two renewals on a terminal."""
+
+
+def duration(seconds):
+    """Seconds in words: 42 s, 3 min 10 s, 2 h 05 min."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    if seconds < 6000:
+        return f"{int(seconds) // 60} min {int(seconds) % 60:02d} s"
+    return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
+
+
+class Progress:
+    """Reports on rank 0; its own share of the work stands for everybody's."""
+
+    def __init__(self, total, quiet, stream=None):
+        """``total`` replicates in all; nothing is printed where ``quiet``."""
+        self.total = total
+        self.quiet = quiet
+        self.stream = stream or sys.stdout
+        self.tty = self.stream.isatty()
+        self.began = time.monotonic()
+        self.printed = self.began
+
+    def say(self, text):
+        """Print a line, unless quiet."""
+        if not self.quiet:
+            print(text, file=self.stream, flush=True)
+
+    def report(self, share):
+        """Report that a share of the work is done, if it is time to."""
+        now = time.monotonic()
+        if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
+            return
+        self.printed = now
+        left = (now - self.began) * (1.0 - share) / share if share > 0.0 else 0.0
+        text = f"{share:4.0%}  {int(share * self.total)} of {self.total} replicates, "
+        text += f"{duration(left)} left"
+        if self.tty:
+            print(f"\r{text:<70}", end="", file=self.stream, flush=True)
+        else:
+            print(text, file=self.stream, flush=True)
+
+    def finish(self):
+        """End the line that renews itself; the seconds since the start."""
+        if self.tty and not self.quiet:
+            print("\r" + " " * 70 + "\r", end="", file=self.stream, flush=True)
+        return time.monotonic() - self.began

@@ -1,0 +1,58 @@
+"""What `flocsim fit` tells a person: a line on every picture, a table of the errors."""
+
+import sys
+
+CLASS_LIMIT = 5.0
+"""r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
+
+
+def plural(count, noun):
+    """ "1 floc", "2 flocs"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def describe(name, found, fitted):
+    """One line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
+    parts = [plural(len(found.regions), f"{found.flocs} floc")]
+    if fitted < len(found.regions):
+        parts.append(f"the {fitted} largest fitted")
+    reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
+    if reasons:
+        parts.append(f"rejected {' and '.join(reasons)}")
+    return f"{name}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
+
+
+def warn_of_coarse(name, regions, radius):
+    """A line on stderr if the spheroradius is not below r_eq of some flocs (paper, section 3.2)."""
+    coarse = sum(region.equivalent_radius <= radius for region in regions)
+    if coarse:
+        print(
+            f"flocsim: {name}: the spheroradius of {radius:g} px is not below r_eq of "
+            f"{plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
+            file=sys.stderr,
+        )
+
+
+def format_errors(entries):
+    """A table of the mean relative error [%] of ShapeEntries by N and size class."""
+    classes = {
+        f"r_eq <= {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius <= CLASS_LIMIT],
+        f"r_eq > {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius > CLASS_LIMIT],
+        "all": entries,
+    }
+    heads = [f"{name} ({len(members)})" for name, members in classes.items()]
+    lines = [
+        "mean relative error [%] by vertices and size class (number of flocs)",
+        "  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]),
+    ]
+    for count in entries[0].fits:
+        means = [mean_error(members, count) for members in classes.values()]
+        label = "1 (circle)" if count == 1 else str(count)
+        lines.append("  ".join([f"{label:>10}", *(f"{mean:>18}" for mean in means)]))
+    return "\n".join(lines)
+
+
+def mean_error(entries, count):
+    """The mean relative error at N = `count`, "-" without flocs."""
+    errors = [entry.fits[count].relative_error for entry in entries]
+    return f"{sum(errors) / len(errors):.2f}" if errors else "-"

@@ -1,0 +1,47 @@
+"""Trajectory files: one replicate's motion in HDF5."""
+
+import io
+
+import numpy as np
+
+from flocsim.io.files import replace_file, seal
+
+SCHEMA_VERSION = 1
+
+DATASETS = {
+    "time": ("s", "time since the start"),
+    "position": ("m, m, rad", "x, y and angle of each body (time, body, 3)"),
+    "velocity": ("m/s, m/s, rad/s", "velocity and spin of each body (time, body, 3)"),
+    "centre_distance": ("m", "distance of the two centroids"),
+}
+"""Units and meaning of the arrays of a trajectory file."""
+
+
+def write_trajectory(path, times, position, velocity, shapes, facts):
+    """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
+
+    Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],
+    their spheroradii in the attribute ``radius``. Raises FileError if it cannot be written.
+    """
+    import h5py
+
+    arrays = {
+        "time": times,
+        "position": position,
+        "velocity": velocity,
+        "centre_distance": np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T),
+    }
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        file.attrs["kind"] = "flocsim trajectory"
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        for name, value in facts.items():
+            file.attrs[name] = value
+        for name, array in arrays.items():
+            dataset = file.create_dataset(name, data=array)
+            dataset.attrs["units"], dataset.attrs["long_name"] = DATASETS[name]
+        for body, shape in enumerate(shapes):
+            dataset = file.create_dataset(f"vertices_{body}", data=np.array(shape.vertices))
+            dataset.attrs["units"] = "m"
+            dataset.attrs["radius"] = shape.radius
+    replace_file(path, seal(buffer.getvalue()))
