@@ -193,7 +193,10 @@ def compiled(entry, fillings, name):
 
     def transform(clone):
         clone.__module__ = name
-        return numba.njit(clone, nogil=True, no_cpython_wrapper=True, error_model="numpy")
+        # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
+        return numba.njit(
+            clone, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy"
+        )
 
     folder = cache_folder()
     text = entry_source(entry)

@@ -12,6 +12,7 @@ from flocsim.forces.base import Force
 from flocsim.forces.source import scene_functions
 from flocsim.geometry import spheres_only
 from flocsim.geometry.overlap import overlap_fault
+from flocsim.integrators.absent import replacements
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.driver import advance
 from flocsim.integrators.implicit import Implicit
@@ -122,8 +123,10 @@ class System:
 
     def fillings(self, observer=None):
         """{slot: function} of forces, integrator, shapes and an observer."""
+        physics = self.pieces.fillings
         shapes = spheres_only.FILLINGS if self.spheres_only else {}
-        return {**self.pieces.fillings, **self.integrator.fillings, **shapes, **(observer or {})}
+        known = {**physics, **self.integrator.fillings, **shapes, **(observer or {})}
+        return {**replacements(physics), **known}
 
     def compose(self, entry=advance, observer=None, *, jit=True):
         """The driver of this scene as one function, compiled unless ``jit=False``."""

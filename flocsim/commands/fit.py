@@ -75,6 +75,7 @@ def run(args):
     """Fit, print what was found and write the library; returns the exit code."""
     options = read_options(args)
     check_output(args.output)
+    check_overlay(args.overlay)
     try:
         entries = fit_pictures(list_pictures(args.images), args, options)
     except KeyboardInterrupt:
@@ -84,12 +85,13 @@ def run(args):
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return 2
 
-    from flocsim.io.fit_report import format_errors
+    from flocsim.io.fit_report import format_errors, plural
     from flocsim.io.shape_library import write_library
 
     write_library(args.output, entries)
     print(format_errors(entries))
-    print(f"{args.output}: {len(entries)} flocs at N = {', '.join(map(str, options['vertices']))}")
+    counts = ", ".join(map(str, options["vertices"]))
+    print(f"{args.output}: {plural(len(entries), 'floc')} at N = {counts}")
     return 0
 
 
@@ -138,6 +140,14 @@ def check_output(path):
         raise FileError(f"{path} cannot be written: {folder} is no folder that can be written to")
 
 
+def check_overlay(path):
+    """Raise UsageError before the long work if the overlay's name has no known ending."""
+    from flocsim.io.plots import FORMATS
+
+    if path is not None and Path(path).suffix.lower().removeprefix(".") not in FORMATS:
+        raise UsageError(f"--overlay {path} must end in .{', .'.join(FORMATS)}")
+
+
 def list_pictures(names):
     """The pictures' paths, folders replaced by the pictures in them; each path once."""
     from flocsim.io.image_reading import SUFFIXES
@@ -182,7 +192,7 @@ def overlay_path(overlay, picture, several):
 
 def fit_picture(path, name, overlay, args, options):
     """ShapeEntries of one picture, its line printed, its overlay drawn."""
-    from flocsim.io.fit_report import describe, warn_of_coarse
+    from flocsim.io.fit_report import describe, show_progress, warn_of_coarse
     from flocsim.io.images import read_grey, segment
     from flocsim.io.shape_library import make_entry
 
@@ -202,13 +212,6 @@ def fit_picture(path, name, overlay, args, options):
         make_entry(name, region, fit, pixel_size, radius)
         for region, fit in zip(regions, fits, strict=True)
     ]
-
-
-def show_progress(name, done, total):
-    """How far a picture is, on a line of its own that the next one replaces; only on a terminal."""
-    if sys.stderr.isatty():
-        end = "\r\x1b[K" if done + 1 == total else ""
-        print(f"\r{name}: floc {done + 1} of {total}{end}", end="", file=sys.stderr, flush=True)
 
 
 def largest(regions, count):

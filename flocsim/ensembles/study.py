@@ -85,9 +85,13 @@ class Study:
         row = self.run(condition, vertices, self.config.scene.delta[d], int(replicate))
         return (place, *(row[name] for name in REPLICATES))
 
-    def compile(self):
-        """Compile what the study needs, by running one replicate of spheres and one of polygons."""
+    @property
+    def kinds(self):
+        """Numbers of vertices that stand for the kinds of compiled code that the study needs."""
         vertices = self.config.shapes.vertices
-        for kind in {n > 1 for n in vertices}:
-            chosen = next(n for n in vertices if (n > 1) == kind)
-            self.run(0, chosen, self.config.scene.delta[0], 0)
+        return sorted({n > 1: n for n in vertices}.values())
+
+    def compile(self, kinds):
+        """Compile, or load from the disk, what these numbers of vertices need, by running it."""
+        for vertices in kinds:
+            self.run(0, vertices, self.config.scene.delta[0], 0)

@@ -4,6 +4,7 @@ The kernels are composed (flocsim.composer): compiled on first use and kept on d
 """
 
 from functools import cache
+from itertools import islice
 
 import numpy as np
 
@@ -31,6 +32,9 @@ FEWEST = 8
 
 CANDIDATES = 3
 """So many of the vertices that count least are tried elsewhere; more gains nearly nothing."""
+
+EDGES = 100
+"""Of more edges than this only the longest are given a vertex: the short ones need none."""
 
 
 @cache
@@ -126,7 +130,7 @@ def _searched(mask, start, radius, steps, active=None):
 def _relocated(mask, vertices, wrong, radius):
     """Take vertices out where they count least and put them in anew, as long as V falls."""
     lowered = len(vertices) > 2
-    while lowered:
+    while lowered and wrong > 0:
         lowered = False
         for trial in _relocations(mask, vertices, radius):
             if trial[1] < wrong:
@@ -140,7 +144,7 @@ def _relocations(mask, vertices, radius):
     """Every search after moving one of the least useful vertices to the middle of another edge."""
     for removed in _least_useful(mask, vertices, radius):
         rest = np.delete(vertices, removed, axis=0)
-        for edge in range(len(rest)):
+        for edge in _longest_edges(rest):
             middle = 0.5 * (rest[edge] + rest[(edge + 1) % len(rest)])
             start = np.insert(rest, edge + 1, middle, axis=0)
             if is_simple(start):
@@ -149,11 +153,16 @@ def _relocations(mask, vertices, radius):
 
 
 def _least_useful(mask, vertices, radius):
-    """Indices of the vertices without which V grows the least."""
+    """Indices of the few vertices without which V grows the least and the polygon stays simple."""
     without = [np.delete(vertices, k, axis=0) for k in range(len(vertices))]
-    costs = [count_errors(mask, rest, radius) if is_simple(rest) else np.inf for rest in without]
-    order = np.argsort(costs, kind="stable")[:CANDIDATES]
-    return [int(k) for k in order if np.isfinite(costs[k])]
+    order = np.argsort([count_errors(mask, rest, radius) for rest in without], kind="stable")
+    return list(islice((int(k) for k in order if is_simple(without[k])), CANDIDATES))
+
+
+def _longest_edges(vertices):
+    """Indices, rising, of the edges where a vertex is tried: all, or the longest of very many."""
+    lengths = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
+    return sorted(np.argsort(-lengths, kind="stable")[:EDGES].tolist())
 
 
 def _around(count, *places):

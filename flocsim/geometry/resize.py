@@ -16,27 +16,26 @@ def area_of_scaled(vertices, factor, radius):
 
 
 def core_factor(vertices, radius, area):
-    """The factor by which the core must be scaled for the swept outline to have an area."""
+    """The factor by which the core must be scaled for the swept outline to have an area.
+
+    While the outline keeps its form, the area is π r² + b·factor + c·factor²: each trial fits b
+    and c to the two latest areas, which settles it in three or four.
+    """
     disc = np.pi * radius**2
-    low, high = 0.0, np.sqrt(area / area_of_scaled(vertices, 1.0, radius))
-    while area_of_scaled(vertices, high, radius) < area:
-        high *= 2.0
-    at_low, at_high = disc - area, area_of_scaled(vertices, high, radius) - area
-    side = 0
-    for _ in range(100):
-        trial = (low * at_high - high * at_low) / (at_high - at_low)
-        miss = area_of_scaled(vertices, trial, radius) - area
-        if abs(miss) <= ACCURACY * area:
-            break
-        if miss < 0.0:
-            low, at_low = trial, miss
-            at_high *= 0.5 if side == -1 else 1.0
-            side = -1
-        else:
-            high, at_high = trial, miss
-            at_low *= 0.5 if side == 1 else 1.0
-            side = 1
-    return trial
+    guess = np.sqrt(area / area_of_scaled(vertices, 1.0, radius))
+    trials = [(1e-3 * guess, None), (guess, area_of_scaled(vertices, guess, radius))]
+    trials[0] = (1e-3 * guess, area_of_scaled(vertices, 1e-3 * guess, radius))
+    for _ in range(60):
+        (f, at_f), (g, at_g) = trials[-2:]
+        if abs(at_g - area) <= ACCURACY * area:
+            return g
+        (b, c) = np.linalg.solve([[f, f * f], [g, g * g]], [at_f - disc, at_g - disc])
+        root = b * b + 4.0 * c * (area - disc)
+        step = 2.0 * (area - disc) / (b + np.sqrt(root)) if root > 0.0 else 0.0
+        # Far from the model's reach the area still goes roughly with the square.
+        trial = step if 0.2 * g < step < 5.0 * g else g * np.sqrt(area / at_g)
+        trials.append((trial, area_of_scaled(vertices, trial, radius)))
+    return trials[-1][0]
 
 
 def resized(shape, equivalent_radius, radius):

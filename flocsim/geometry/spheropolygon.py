@@ -50,6 +50,13 @@ def counter_clockwise(vertices):
     return vertices
 
 
+def positive_factor(factor):
+    """``factor`` as a float; ShapeError unless it is a finite number above 0."""
+    if not np.isfinite(factor) or factor <= 0.0:
+        raise ShapeError(f"a shape can be scaled by a finite factor above 0, found {factor!r}")
+    return float(factor)
+
+
 @attrs.frozen(eq=False)
 class SpheroPolygon(Shape):
     """Minkowski sum of a simple polygon, convex or not, and a disk.
@@ -87,4 +94,17 @@ class SpheroPolygon(Shape):
 
     def scaled(self, factor):
         """The same outline, ``factor`` times as large: vertices and spheroradius."""
-        return SpheroPolygon(self.vertices * factor, self.radius * factor)
+        factor = positive_factor(factor)
+        copy = object.__new__(SpheroPolygon)
+        vertices = self.vertices * factor
+        vertices.flags.writeable = False
+        # Nothing has to be computed again: areas go with factor², second moments with factor⁴.
+        for name, value in (
+            ("vertices", vertices),
+            ("radius", self.radius * factor),
+            ("centroid", self.centroid * factor),
+            ("area", self.area * factor**2),
+            ("second_moment", self.second_moment * factor**4),
+        ):
+            object.__setattr__(copy, name, value)
+        return copy

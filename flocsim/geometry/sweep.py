@@ -30,11 +30,9 @@ def unit_edges(vertices):
     return starts, (ends - starts) / lengths[:, None], lengths
 
 
-def beside(points, starts, units, lengths):
-    """Which points (k, 2) project onto the edge of the same row, with a rounding's margin."""
-    along = np.einsum("ij,ij->i", points - starts, units)
-    margin = 1e-9 * lengths
-    return (along > -margin) & (along < lengths + margin)
+def beside(along, lengths):
+    """Which distances along an edge lie on the edge, with a rounding's margin."""
+    return (along > -1e-9 * lengths) & (along < lengths * (1.0 + 1e-9))
 
 
 def cross(a, b):
@@ -78,99 +76,127 @@ def exposed(points, vertices, radius):
     return seen
 
 
-def chord_crossings(origin, direction, length, vertices, radius):
-    """Where the line origin + s·direction, 0 < s < length, meets circles and offset edges."""
-    to_centre = vertices - origin
-    along = to_centre @ direction
-    half = radius**2 - (np.einsum("ij,ij->i", to_centre, to_centre) - along**2)
-    root = np.sqrt(half[half > 0.0])
-    cuts = [along[half > 0.0] - root, along[half > 0.0] + root]
+def circle_cuts(origins, directions, vertices, radius):
+    """Where lines (rows) cross the circles around the vertices: row numbers and places."""
+    to_centre = vertices[None] - origins[:, None]
+    along = np.einsum("pkj,pj->pk", to_centre, directions)
+    half = radius**2 - (np.einsum("pkj,pkj->pk", to_centre, to_centre) - along**2)
+    rows, columns = np.nonzero(half > 0.0)
+    root = np.sqrt(half[rows, columns])
+    middle = along[rows, columns]
+    return np.tile(rows, 2), np.concatenate([middle - root, middle + root])
+
+
+def offset_cuts(origins, directions, vertices, radius):
+    """Where lines (rows) cross the offsets of the edges, on both sides: row numbers and places."""
     starts, units, lengths = unit_edges(vertices)
-    slope = cross(direction[None], units)
-    oblique = np.abs(slope) > 1e-12
-    starts, units, lengths, slope = (
-        starts[oblique],
-        units[oblique],
-        lengths[oblique],
-        slope[oblique],
-    )
-    offset = cross(starts - origin, units)
+    slope = cross(directions[:, None], units[None])
+    rows, edges = np.nonzero(np.abs(slope) > 1e-12)
+    offset = cross(starts[edges] - origins[rows], units[edges])
+    found = []
     for side in (-radius, radius):
-        cut = (offset + side) / slope
-        met = origin + cut[:, None] * direction
-        cuts.append(cut[beside(met, starts, units, lengths)])
-    cuts = np.concatenate(cuts)
-    return cuts[(cuts > 0.0) & (cuts < length)]
+        place = (offset + side) / slope[rows, edges]
+        met = origins[rows] + place[:, None] * directions[rows] - starts[edges]
+        on_edge = beside(np.einsum("ij,ij->i", met, units[edges]), lengths[edges])
+        found.append((rows[on_edge], place[on_edge]))
+    return joined(*found)
 
 
-def circle_crossings(centre, vertices, radius):
-    """Angles at which the circle around centre meets the other circles and the offset edges."""
-    to_centre = vertices - centre
-    distance = np.hypot(to_centre[:, 0], to_centre[:, 1])
-    meets = (distance > 0.0) & (distance < 2.0 * radius)
-    bearing = np.arctan2(to_centre[meets, 1], to_centre[meets, 0])
-    half = np.arccos(distance[meets] / (2.0 * radius))
-    angles = [bearing - half, bearing + half]
+def arc_circle_cuts(vertices, radius):
+    """Where the circles around vertices (rows) cross each other: row numbers and angles."""
+    to_centre = vertices[None] - vertices[:, None]
+    distance = np.hypot(to_centre[..., 0], to_centre[..., 1])
+    rows, columns = np.nonzero((distance > 0.0) & (distance < 2.0 * radius))
+    across = to_centre[rows, columns]
+    bearing = np.arctan2(across[:, 1], across[:, 0])
+    half = np.arccos(distance[rows, columns] / (2.0 * radius))
+    return np.tile(rows, 2), np.concatenate([bearing - half, bearing + half])
+
+
+def arc_offset_cuts(vertices, radius):
+    """Where the circles around vertices (rows) cross the offsets of edges: rows and angles."""
     starts, units, lengths = unit_edges(vertices)
     normals = np.column_stack([units[:, 1], -units[:, 0]])
     facing = np.arctan2(normals[:, 1], normals[:, 0])
-    level = np.einsum("ij,ij->i", starts - centre, normals)
+    level = np.einsum("pej,ej->pe", starts[None] - vertices[:, None], normals)
     # Where the arc meets its own edges tangentially, the normals themselves are the cuts.
-    own = np.abs(level) < 1e-9 * radius
-    angles += [facing[own], facing[own] + np.pi]
+    own, edges = np.nonzero(np.abs(level) < 1e-9 * radius)
+    found = [(own, facing[edges]), (own, facing[edges] + np.pi)]
     for side in (-radius, radius):
         cosine = (level + side) / radius
-        crosses = np.abs(cosine) < 1.0
-        opening = np.arccos(cosine[crosses])
-        for angle in (facing[crosses] - opening, facing[crosses] + opening):
-            met = centre + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-            angles.append(angle[beside(met, starts[crosses], units[crosses], lengths[crosses])])
-    return np.mod(np.concatenate(angles), 2.0 * np.pi)
+        rows, edges = np.nonzero(np.abs(cosine) < 1.0)
+        opening = np.arccos(cosine[rows, edges])
+        for angle in (facing[edges] - opening, facing[edges] + opening):
+            met = vertices[rows] - starts[edges]
+            met = met + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+            on_edge = beside(np.einsum("ij,ij->i", met, units[edges]), lengths[edges])
+            found.append((rows[on_edge], angle[on_edge]))
+    return joined(*found)
 
 
-def pieces_between(cuts, first, last):
-    """Neighbouring cuts as (start, end) intervals that cover [first, last]."""
-    stops = np.unique(np.concatenate([[first], cuts, [last]]))
-    return stops[:-1], stops[1:]
+def joined(*parts):
+    """Tuples of arrays, put together part by part."""
+    return tuple(np.concatenate(same) for same in zip(*parts, strict=True))
 
 
-def chord_nodes(start, end, vertices, radius):
-    """Points, tangents and weights of the exposed part of an edge's offset to its right."""
-    along = end - start
-    length = np.hypot(*along)
-    direction = along / length
-    origin = start + radius * np.array([direction[1], -direction[0]])
-    low, high = pieces_between(
-        chord_crossings(origin, direction, length, vertices, radius), 0.0, length
-    )
-    middles = origin + (0.5 * (low + high))[:, None] * direction
-    seen = exposed(middles, vertices, radius)
-    centre, half = 0.5 * (low + high)[seen], 0.5 * (high - low)[seen]
-    position = (centre[:, None] + half[:, None] * QUADRATURE_NODES).ravel()
-    weights = (half[:, None] * QUADRATURE_WEIGHTS).ravel()
-    return origin + position[:, None] * direction, np.tile(direction, (len(position), 1)), weights
+def pieces(rows, cuts, lasts):
+    """Intervals that cover [0, last] of every row, cut at the given places.
+
+    Returns row numbers, starts and ends, in order.
+    """
+    count = len(lasts)
+    rows = np.concatenate([rows, np.arange(count), np.arange(count)])
+    cuts = np.concatenate([cuts, np.zeros(count), lasts])
+    within = (cuts >= 0.0) & (cuts <= lasts[rows])
+    rows, cuts = rows[within], cuts[within]
+    order = np.lexsort((cuts, rows))
+    rows, cuts = rows[order], cuts[order]
+    whole = (rows[1:] == rows[:-1]) & (cuts[1:] > cuts[:-1])
+    return rows[:-1][whole], cuts[:-1][whole], cuts[1:][whole]
 
 
-def arc_nodes(centre, vertices, radius):
-    """Points, tangents and weights of the exposed part of the circle around one vertex."""
-    low, high = pieces_between(circle_crossings(centre, vertices, radius), 0.0, 2.0 * np.pi)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+def nodes_on(starts, ends):
+    """Quadrature places (k, 16) and weights (k, 16) of intervals."""
+    middle, half = 0.5 * (starts + ends), 0.5 * (ends - starts)
+    return middle[:, None] + half[:, None] * QUADRATURE_NODES, half[:, None] * QUADRATURE_WEIGHTS
+
+
+def chord_nodes(vertices, radius):
+    """Points, tangents and weights of the exposed parts of the edges' offsets."""
+    starts, units, lengths = unit_edges(vertices)
+    if len(vertices) == 2:
+        starts, units, lengths = vertices, np.vstack([units, -units]), np.tile(lengths, 2)
+    origins = starts + radius * np.column_stack([units[:, 1], -units[:, 0]])
+    by_circles = circle_cuts(origins, units, vertices, radius)
+    by_offsets = offset_cuts(origins, units, vertices, radius)
+    rows, low, high = pieces(*joined(by_circles, by_offsets), lengths)
+    seen = exposed(origins[rows] + (0.5 * (low + high))[:, None] * units[rows], vertices, radius)
+    rows = rows[seen]
+    place, weights = nodes_on(low[seen], high[seen])
+    points = origins[rows, None] + place[..., None] * units[rows, None]
+    tangents = np.broadcast_to(units[rows, None], points.shape)
+    return points.reshape(-1, 2), tangents.reshape(-1, 2), weights.ravel()
+
+
+def arc_nodes(vertices, radius):
+    """Points, tangents and weights of the exposed parts of the circles around vertices."""
+    by_circles = arc_circle_cuts(vertices, radius)
+    by_offsets = arc_offset_cuts(vertices, radius)
+    rows, angles = joined(by_circles, by_offsets)
+    rows, low, high = pieces(rows, np.mod(angles, 2 * np.pi), np.full(len(vertices), 2 * np.pi))
+    middle = 0.5 * (low + high)
     around = np.column_stack([np.cos(middle), np.sin(middle)])
-    seen = exposed(centre + radius * around, vertices, radius)
-    angle = (middle[seen, None] + half[seen, None] * QUADRATURE_NODES).ravel()
-    weights = (radius * half[seen, None] * QUADRATURE_WEIGHTS).ravel()
-    outward = np.column_stack([np.cos(angle), np.sin(angle)])
-    return centre + radius * outward, np.column_stack([-outward[:, 1], outward[:, 0]]), weights
+    seen = exposed(vertices[rows] + radius * around, vertices, radius)
+    place, weights = nodes_on(low[seen], high[seen])
+    outward = np.stack([np.cos(place), np.sin(place)], axis=-1)
+    points = vertices[rows[seen], None] + radius * outward
+    tangents = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+    return points.reshape(-1, 2), tangents.reshape(-1, 2), radius * weights.ravel()
 
 
 def outline_nodes(vertices, radius):
     """Quadrature points, unit tangents and weights of the whole outline of a core with edges."""
-    starts, ends = edges_of(vertices)
-    if len(vertices) == 2:
-        starts, ends = vertices, vertices[::-1]
-    nodes = [chord_nodes(a, b, vertices, radius) for a, b in zip(starts, ends, strict=True)]
-    nodes += [arc_nodes(vertex, vertices, radius) for vertex in vertices]
-    return tuple(np.concatenate(part) for part in zip(*nodes, strict=True))
+    return joined(chord_nodes(vertices, radius), arc_nodes(vertices, radius))
 
 
 def swept_moments(vertices, radius):

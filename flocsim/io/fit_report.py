@@ -1,4 +1,4 @@
-"""What `flocsim fit` tells a person: a line on every picture, a table of the errors."""
+"""What `flocsim fit` tells a person: progress, a line on every picture, a table."""
 
 import sys
 
@@ -9,6 +9,13 @@ CLASS_LIMIT = 5.0
 def plural(count, noun):
     """ "1 floc", "2 flocs"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def show_progress(name, done, total):
+    """How far a picture is, on a line that the next one replaces; only on a terminal."""
+    if sys.stderr.isatty():
+        end = "\r\x1b[K" if done + 1 == total else ""
+        print(f"\r{name}: floc {done + 1} of {total}{end}", end="", file=sys.stderr, flush=True)
 
 
 def describe(name, found, fitted):

@@ -114,6 +114,7 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--vertices", "0"),
         ("--vertices", "2.5"),
         ("--max-flocs", "0"),
+        ("--overlay", "picture.gif"),
     ],
 )
 def test_wrong_numbers_are_named(frame, option, value):
