@@ -15,7 +15,7 @@ from flocsim.integrators import Status
 from flocsim.layout import CANDIDATES, ERROR, NOW, REJECTED, STEPS, TIME, UNTIL
 from flocsim.state import with_capacity, work_of
 
-WATER = 8.9e-4
+WATER_VISCOSITY = 8.9e-4
 
 
 @attrs.frozen

@@ -1,11 +1,13 @@
 """The command `python -m flocsim.ensemble cfg.toml`, with and without mpirun."""
 
 import argparse
+import contextlib
+import io
 import os
 import sys
 import traceback
 
-from flocsim.ensembles.team import Alone, find_team
+from flocsim.ensembles.team import Alone, find_team, launched_rank
 from flocsim.errors import FlocsimError
 
 INTERRUPTED = 130
@@ -36,11 +38,13 @@ def overrides(arguments):
 
 
 def checked_config(arguments):
-    """The config, and proof that the results can be written where they should go."""
+    """The config, found to make a study whose results can be written where they should go."""
     from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.preflight import check_study
     from flocsim.io.files import check_writable
 
     config = load_config(arguments.config, overrides(arguments))
+    check_study(config)
     if not arguments.dry_run:
         check_writable(config.output.file)
     return config
@@ -132,9 +136,22 @@ def run_command(arguments):
     return guarded(team, arguments)
 
 
+@contextlib.contextmanager
+def silent_unless_first():
+    """Let one rank alone print the help, or what is wrong with the arguments."""
+    if launched_rank() == 0:
+        yield
+        return
+    nowhere = io.StringIO()
+    with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
+        yield
+
+
 def main(argv=None):
     """Entry of `python -m flocsim.ensemble`; the exit code."""
     parser = argparse.ArgumentParser(
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
     )
-    return run_command(add_arguments(parser).parse_args(argv))
+    with silent_unless_first():
+        arguments = add_arguments(parser).parse_args(argv)
+    return run_command(arguments)

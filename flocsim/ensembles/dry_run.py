@@ -1,29 +1,23 @@
 """What a study would do, without doing it."""
 
-from flocsim.ensembles.scene import make_encounter
-from flocsim.ensembles.settling import turn_time
-from flocsim.ensembles.zone import zone_distance
-from flocsim.geometry.sphere import Sphere
+from flocsim.ensembles.preflight import sphere_pairs
 
 
 def condition_lines(config):
     """A line for every collision type: sizes, zone, settling of the equivalent spheres."""
-    for name, radius_i, radius_j in config.scene.conditions:
-        zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
-        pair = make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
+    for name, pair in sphere_pairs(config):
+        radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         falls = [1e3 * -velocity[1] for velocity, _ in pair.settling]
         yield (
-            f"  {name}: r_i = {1e6 * radius_i:.4g} um, r_j = {1e6 * radius_j:.4g} um, D_0 = "
-            f"{1e6 * zone:.4g} um; settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time "
-            f"{turn_time(radius_i, radius_j, pair.drift):.3g} s"
+            f"  {name}: r_i = {1e6 * radius_i:.4g} um, r_j = {1e6 * radius_j:.4g} um, "
+            f"D_0 = {1e6 * pair.zone_distance:.4g} um; "
+            f"settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time {pair.turn_time:.3g} s"
         )
 
 
 def scene_lines(config):
     """What is compiled in and what is left out, for spheres and for polygons."""
-    _, radius_i, radius_j = config.scene.conditions[0]
-    zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
-    pair = make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
+    _, pair = next(sphere_pairs(config))
     pieces = pair.system.pieces
     yield from (f"  in:  {force}" for force in pieces.used.values())
     yield from (f"  out: {force}: {reason}" for force, reason in pieces.left_out.items())

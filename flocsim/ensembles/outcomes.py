@@ -25,8 +25,9 @@ from flocsim.slots import centre_force, has_centre_force, surface_force, surface
 
 (
     ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J,
-    COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION, REST_SINCE, MEMO_SIZE,
-) = range(16)  # fmt: skip
+    COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION,
+    REST_SINCE, REST_X, REST_Y, REST_ANGLE, MEMO_SIZE,
+) = range(19)  # fmt: skip
 """The observer's memo. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
 relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m], times [s]."""
 
@@ -41,7 +42,7 @@ CALM = 0.02
 certificate …"""
 
 REST = 1e-3
-"""… and rests below this share."""
+"""… and one that has moved by less than this share of the drift's way over the rest time rests."""
 
 HANGING = 0.99
 """Cosine between line of centres and drift above which the load is at its worst."""
@@ -185,12 +186,28 @@ def is_certain(scene, work, memo, time, nx, ny, distance):
     return arms_hold(work, centres, load, nx, ny, distance)
 
 
+def doublet_pose(work):
+    """Place and angle of body 1 in the frame of body 0, which turns with it."""
+    now = work.motion
+    x, y = now[NOW, 1, 0] - now[NOW, 0, 0], now[NOW, 1, 1] - now[NOW, 0, 1]
+    c, s = math.cos(now[NOW, 0, 2]), math.sin(now[NOW, 0, 2])
+    return c * x + s * y, c * y - s * x, now[NOW, 1, 2] - now[NOW, 0, 2]
+
+
+def start_rest(work, memo, time):
+    """From now on the doublet may be resting as it is."""
+    memo[REST_SINCE] = time
+    memo[REST_X], memo[REST_Y], memo[REST_ANGLE] = doublet_pose(work)
+
+
 def has_rested(scene, work, memo, time, nx, ny):
-    """Whether the doublet has rested long enough, its load at the worst."""
-    _, shear = relative_speeds(scene, work, nx, ny)
+    """Whether the doublet has kept its pose for long enough, its load at the worst."""
+    x, y, angle = doublet_pose(work)
+    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
+    moved = math.hypot(x - memo[REST_X], y - memo[REST_Y]) + abs(angle - memo[REST_ANGLE]) * size
     drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
-    if shear > REST * drift:
-        memo[REST_SINCE] = time
+    if moved > REST * drift * memo[REST_TIME]:
+        start_rest(work, memo, time)
         return False
     hanging = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y] >= HANGING * drift
     hanging = hanging or scene.bodies[0, FREE] == 0.0
@@ -217,7 +234,7 @@ def watch_pair(scene, work, memo, time, at_event):
     if is_parting(scene, work, memo, time, nx, ny) and is_away(scene, work, memo, distance, gap):
         return MISSED if memo[COLLIDED] == 0.0 else DEPARTED
     if memo[COLLIDED] == 0.0 or gap >= 0.0:
-        memo[REST_SINCE] = time
+        start_rest(work, memo, time)
         return 0
     if is_certain(scene, work, memo, time, nx, ny, distance):
         return BOUND

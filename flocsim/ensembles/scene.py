@@ -17,6 +17,7 @@ from flocsim.io.results_schema import NOT_APPLICABLE
 from flocsim.layout import (
     CODE,
     ERROR,
+    NOW,
     RECORDED,
     REJECTED,
     STEPS,
@@ -129,7 +130,7 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None):
     integrator = encounter.system.integrator
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
     clock[UNTIL] = encounter.time_limit()
-    rows = np.zeros((0, 13)) if record is None else record.buffer
+    rows = np.zeros((0, 13)) if record is None else record.begin(work)
     while True:
         status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
         if record is not None:
@@ -169,6 +170,11 @@ class Record:
         """Room for ``rows`` rows between two copies."""
         self.buffer = np.zeros((rows, 13))
         self.saved = []
+
+    def begin(self, work):
+        """Record the state at the start; the array that the driver is to fill."""
+        self.saved = [np.concatenate([[0.0], work.motion[NOW].ravel()])[None]]
+        return self.buffer
 
     def take(self, counts):
         """Copy what the driver has recorded, and let it start anew."""

@@ -1,9 +1,11 @@
 """Where a binary collision starts: j above i, displaced sideways, outlines a gap apart."""
 
 import math
+from functools import cache
 
 import numpy as np
 
+from flocsim.composer import compose
 from flocsim.geometry.kernels import edge_count, segment_distance2
 
 MOST_ADVANCES = 1000
@@ -59,7 +61,13 @@ def start_height(core_i, core_j, contact, reach, displacement, gap):
     return clear
 
 
-def place_pair(shapes, angles, displacement, gap, height_kernel=start_height):
+@cache
+def compiled_height():
+    """`start_height` as machine code."""
+    return compose(start_height, {})
+
+
+def place_pair(shapes, angles, displacement, gap):
     """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
     cores = [
         np.ascontiguousarray(shape.placed_vertices(angle=angle))
@@ -67,5 +75,5 @@ def place_pair(shapes, angles, displacement, gap, height_kernel=start_height):
     ]
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
-    height = height_kernel(*cores, contact, reach, displacement, gap)
+    height = compiled_height()(*cores, contact, reach, float(displacement), gap)
     return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])

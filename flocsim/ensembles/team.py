@@ -46,6 +46,12 @@ def launched_size():
     return None if any(name in os.environ for name in LAUNCHER_RANKS) else 0
 
 
+def launched_rank():
+    """This process's rank according to its launcher, 0 without one; needs no MPI library."""
+    said = [os.environ.get(name, "") for name in LAUNCHER_RANKS]
+    return next((int(rank) for rank in said if rank.isdigit()), 0)
+
+
 def find_team():
     """The ranks of this job: MPI only where a launcher started more than one."""
     size = launched_size()

@@ -124,7 +124,7 @@ def arc_offset_cuts(vertices, radius):
     found = [(own, facing[edges]), (own, facing[edges] + np.pi)]
     for side in (-radius, radius):
         cosine = (level + side) / radius
-        rows, edges = np.nonzero(np.abs(cosine) < 1.0)
+        rows, edges = np.nonzero((np.abs(cosine) < 1.0) & (np.abs(level) >= 1e-9 * radius))
         opening = np.arccos(cosine[rows, edges])
         for angle in (facing[edges] - opening, facing[edges] + opening):
             met = vertices[rows] - starts[edges]

@@ -41,6 +41,11 @@ def reduced(a, b):
     return 1 / (1 / a + 1 / b)
 
 
+def contact_mass(body):
+    """The mass [kg] with which a body takes part in M; a fixed one never gives way."""
+    return np.inf if body.fixed else body.mass
+
+
 @dataclass(frozen=True)
 class Gravity:
     """m g (1 − ρ_f/ρ) to −y (3); no buoyancy without a fluid density."""
@@ -81,7 +86,10 @@ class Drag:
 
 
 class PairLaw:
-    """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d."""
+    """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d.
+
+    At gaps from `reach` on the force is left out.
+    """
 
     def loads(self, scene):
         total = np.zeros((len(scene.bodies), 3))
@@ -91,18 +99,22 @@ class PairLaw:
             apply(total, scene, i, j, radii)
         return total
 
+    def within_reach(self, d, reduced_radius):
+        """The repulsion [N] at a gap, zero beyond the reach."""
+        return self.repulsion(d, reduced_radius) if d < self.reach else 0.0
+
     def along_centres(self, total, scene, i, j, radii):
         """d = d_c − r_i − r_j with equivalent radii; along the line of centres, no torque."""
         between = scene.positions[i, :2] - scene.positions[j, :2]
         centre_distance = np.hypot(*between)
-        force = self.repulsion(centre_distance - sum(radii), reduced(*radii))
+        force = self.within_reach(centre_distance - sum(radii), reduced(*radii))
         total[i, :2] += force * between / centre_distance
         total[j, :2] -= force * between / centre_distance
 
     def at_surfaces(self, total, scene, i, j, radii):
         """d = least distance of the outlines; at the closest points, so with torque."""
         pair = closest(scene, i, j)
-        force = self.repulsion(-pair.overlap[0], reduced(*radii)) * pair.normal[0]
+        force = self.within_reach(-pair.overlap[0], reduced(*radii)) * pair.normal[0]
         vertex_body, _, edge_body, _ = pair.pair[0]
         add_force(total, scene, vertex_body, force, pair.point[0])
         add_force(total, scene, edge_body, -force, pair.point[0])
@@ -115,6 +127,7 @@ class VanDerWaals(PairLaw):
     hamaker: float
     d_min: float = 1e-9
     gap: str = "equivalent_spheres"
+    reach: float = np.inf
 
     def repulsion(self, d, reduced_radius):
         return -self.hamaker * reduced_radius / (6 * max(d, self.d_min) ** 2)
@@ -122,18 +135,22 @@ class VanDerWaals(PairLaw):
 
 @dataclass(frozen=True)
 class DoubleLayer(PairLaw):
-    """Repulsion 4π ε0 ε_r κ φ² r* exp(−κ d) (6); flat below `least_gap` (−∞: the bare law)."""
+    """Repulsion 4π ε0 ε_r κ φ² r* exp(−κ d) (6), with contact counting as d = 0.
+
+    The law describes two charged surfaces that are apart; exp(−κ d) would explode as soon as an
+    overlap, or the gap of equivalent spheres, is some Debye lengths below zero.
+    """
 
     potential: float
     debye_length: float
     permittivity: float = 78.5
     gap: str = "equivalent_spheres"
-    least_gap: float = -np.inf
+    reach: float = np.inf
 
     def repulsion(self, d, reduced_radius):
         permittivity = VACUUM_PERMITTIVITY * self.permittivity
         contact_value = 4 * np.pi * permittivity * self.potential**2 / self.debye_length
-        decay = np.exp(-max(d, self.least_gap) / self.debye_length)
+        decay = np.exp(-max(d, 0.0) / self.debye_length)
         return contact_value * reduced_radius * decay
 
 
@@ -183,7 +200,7 @@ class Contact:
         total = np.zeros((len(scene.bodies), 3))
         for row, displacement in enumerate(displacements):
             vertex_body, _, edge_body, _ = pairs.pair[row]
-            mass = reduced(scene.bodies[vertex_body].mass, scene.bodies[edge_body].mass)
+            mass = reduced(*(contact_mass(scene.bodies[k]) for k in (vertex_body, edge_body)))
             normal, tangential = self.components(
                 mass,
                 pairs.overlap[row],

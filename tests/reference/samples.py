@@ -14,7 +14,7 @@ VISCOSITY, WATER = 8.9e-4, 997.0
 CONTACT = Contact(k_n=20.0, k_t=2.0, damping_n=2e5, damping_t=7e4)
 SURFACE = [
     VanDerWaals(1e-18, gap="surface"),
-    DoubleLayer(15e-3, 0.98e-6, gap="surface", least_gap=0.0),
+    DoubleLayer(15e-3, 0.98e-6, gap="surface"),
 ]
 CENTRES = [VanDerWaals(1e-18), DoubleLayer(15e-3, 0.98e-6)]
 PAIR_LAWS = [CONTACT, *SURFACE, *CENTRES]

@@ -9,7 +9,10 @@ from reference.outline import area_centroid_inertia
 
 @dataclass(frozen=True)
 class Body:
-    """Core vertices (N, 2) [m] about the centroid of the swept outline, and the inertial data."""
+    """Core vertices (N, 2) [m] about the centroid of the swept outline, and the inertial data.
+
+    A `fixed` body counts as infinitely heavy in the damping of its contacts.
+    """
 
     vertices: np.ndarray
     radius: float
@@ -17,6 +20,7 @@ class Body:
     inertia: float
     equivalent_radius: float
     density: float | None = None
+    fixed: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,55 @@
+"""What is wrong with a study can mostly be known before anything is compiled or run."""
+
+from flocsim.ensembles.flocs import read_flocs
+from flocsim.ensembles.scene import make_encounter
+from flocsim.ensembles.zone import zone_distance
+from flocsim.errors import ConfigError
+from flocsim.forces import ContactForce
+from flocsim.geometry.sphere import Sphere
+
+
+def sphere_pairs(config):
+    """(name, Encounter) of the equivalent spheres of every collision type."""
+    for name, radius_i, radius_j in config.scene.conditions:
+        zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
+        yield name, make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
+
+
+def check_study(config):
+    """Raise the FlocsimError that the study would meet: zone, method, settling, sizes, library."""
+    check_contact(config)
+    check_spheroradius(config)
+    for name, pair in sphere_pairs(config):
+        check_approach(config, name, pair)
+    if config.shapes.source == "library":
+        read_flocs(config.shapes)
+
+
+def check_contact(config):
+    """ConfigError without a contact force: nothing would notice that two bodies touch."""
+    if not any(isinstance(force, ContactForce) for force in config.forces):
+        raise ConfigError(
+            "a collision needs a contact force, found none among "
+            f"{', '.join(config.force_names)}: add [forces.contact]"
+        )
+
+
+def check_spheroradius(config):
+    """ConfigError where the spheroradius leaves no room for a core in the smallest body."""
+    least = min(min(radii) for _, *radii in config.scene.conditions)
+    if max(config.shapes.vertices) > 1 and config.shapes.radius >= least:
+        raise ConfigError(
+            f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
+            f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
+        )
+
+
+def check_approach(config, name, pair):
+    """ConfigError where the upper body j never reaches the lower one; a shear flow may bring it."""
+    if pair.drift[1] >= 0.0 and not any(config.fluid.gradient):
+        fall_i, fall_j = (-1e3 * velocity[1] for velocity, _ in pair.settling)
+        raise ConfigError(
+            f"{name}: the approaching body j (above) settles at {fall_j:.4g} mm/s and never "
+            f"reaches the receiving body i (below) at {fall_i:.4g} mm/s: give scene.pairs as "
+            "[smaller radius, larger radius], or set scene.receiver = 'fixed'"
+        )

@@ -1,0 +1,106 @@
+"""The compiled right-hand side held against the plain reference, on scenes of every kind."""
+
+import numpy as np
+import pytest
+from fast_cases import GAPS, SURFACE_DENSITY, random_case, silenced
+from fast_scene import FastScene, shape_of
+
+from reference.contacts import contacts
+from reference.forces import loads
+from reference.samples import scene_of
+
+SCENES = range(220)
+ONE_BY_ONE = range(50)
+UNCOMPILED = range(20)
+
+FORCES = ("gravity", "drag", "contact", *(f"attraction at {gap}" for gap in GAPS),
+          *(f"repulsion at {gap}" for gap in GAPS))  # fmt: skip
+TOGETHER = {gap: tuple(name for name in FORCES if not name.endswith(other))
+            for gap, other in zip(GAPS, GAPS[::-1], strict=True)}  # fmt: skip
+
+
+def expected(case, names):
+    """The reference's loads, and the greatest force of any single law [N]."""
+    parts = [
+        loads(case.plain, case.laws(name), case.slips if name == "contact" else None)
+        for name in names
+    ]
+    scale = max(np.abs(part[:, :2]).max() for part in parts)
+    return sum(parts), scale
+
+
+def assert_loads(found, wanted, scale, case):
+    """Forces to 1e-9 of the greatest one, torques to that times the largest body."""
+    size = max(shape_of(body).bounding_radius for body in case.plain.bodies)
+    error = np.abs(found - wanted)
+    assert error[:, :2].max() <= 1e-9 * scale
+    assert error[:, 2].max() <= 1e-9 * scale * size + 1e-9 * np.abs(wanted[:, 2]).max()
+
+
+def slips_of(case, names):
+    """Tangential displacements, where a contact law is there to hold them."""
+    return case.slips if "contact" in names else None
+
+
+@pytest.mark.parametrize("seed", SCENES)
+def test_shape_integrals(seed):
+    for body in scene_of(seed).bodies:
+        shape = shape_of(body)
+        assert shape.area == pytest.approx(body.mass / SURFACE_DENSITY, rel=1e-12)
+        assert shape.second_moment == pytest.approx(body.inertia / SURFACE_DENSITY, rel=1e-12)
+        # The reference has put its centroid at the origin, and the package must agree.
+        offset = getattr(shape, "centroid", np.zeros(2))
+        assert np.abs(offset).max() < 1e-12 * shape.equivalent_radius
+
+
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("seed", SCENES)
+def test_all_forces_together_compiled(seed, gap):
+    case, names = random_case(seed), TOGETHER[gap]
+    fast = FastScene(silenced(case, *names))
+    assert_loads(fast.loads(slips_of(case, names)), *expected(case, names), case)
+
+
+@pytest.mark.parametrize("seed", SCENES)
+def test_contact_pairs(seed):
+    plain = random_case(seed).plain
+    fast = FastScene(silenced(random_case(seed), "contact"))
+    fast.loads()
+    found, wanted = fast.overlapping(), contacts(plain)
+    keys = [key if key in found else fast.other_way_round(key) for key in wanted.pair_keys()]
+    assert sorted(found) == sorted(keys)
+    for row, key in enumerate(keys):
+        side = 1.0 if key == wanted.pair_keys()[row] else -1.0
+        geometry = found[key]
+        assert -geometry[2] == pytest.approx(wanted.overlap[row], rel=1e-9, abs=1e-18)
+        assert geometry[:2] == pytest.approx(side * wanted.normal[row], abs=1e-9)
+        assert fast.contact_point(key, geometry) == pytest.approx(wanted.point[row], abs=1e-15)
+
+
+@pytest.mark.parametrize("name", FORCES)
+@pytest.mark.parametrize("seed", ONE_BY_ONE)
+def test_every_force_alone(seed, name):
+    # Uncompiled, each scene is made of this one force's code, all other forces left out.
+    case = random_case(seed)
+    fast = FastScene(case.system(name), jit=False)
+    assert_loads(fast.loads(slips_of(case, [name])), *expected(case, [name]), case)
+
+
+@pytest.mark.parametrize("seed", UNCOMPILED)
+def test_compiled_and_uncompiled_code_agree(seed):
+    case = random_case(seed)
+    compiled, plain = (FastScene(case.system(), jit=jit).loads(case.slips) for jit in (True, False))
+    assert compiled == pytest.approx(plain, rel=1e-13, abs=1e-14 * np.abs(plain).max())
+
+
+def test_the_scenes_cover_what_they_are_meant_to():
+    cases = [random_case(seed) for seed in SCENES]
+    counts = [len(contacts(case.plain).overlap) for case in cases]
+    assert np.mean(np.array(counts) > 1) > 0.5 and max(counts) > 10
+    assert {len(case.plain.bodies) for case in cases} == {2, 3}
+    sizes = {len(body.vertices) for case in cases for body in case.plain.bodies}
+    assert {1, 2, 3, 4, 24} <= sizes
+    for option in ("tension", "friction", "damping_n", "damping_t"):
+        assert len({getattr(case.pairs["contact"][0], option) for case in cases}) > 1
+    assert any(case.plain.bodies[0].fixed for case in cases)
+    assert any(case.slips for case in cases) and any(case.fluid.buoyancy for case in cases)

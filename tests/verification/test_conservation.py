@@ -1,0 +1,84 @@
+"""Energy, momentum and angular momentum over many contacts of non-convex bodies.
+
+A weak spring along the line of centres brings the bodies back; nothing dissipates.
+"""
+
+import numpy as np
+import pytest
+
+from flocsim import Body, System
+from flocsim.integrators import Implicit, VelocityVerlet
+from reference import shapes as plain
+from reference.contacts import contacts
+from trial_scenes import ELASTIC, Spring, hook, kinetic_energy, momenta, star, watched
+
+SPRING = Spring(stiffness=0.1, rest=-6e-6)
+SPEED, ARM = 0.02, 1e-5
+
+
+def tied():
+    """A star and a hook in each other's reach, turning."""
+    left = Body(star(), velocity=(SPEED, 0.0), spin=5e2, surface_density=2.0)
+    right = Body(hook(), (17e-6, -3e-6), 1.0, (-SPEED, 0.0), surface_density=2.0)
+    return [left, right]
+
+
+def plain_scene(bodies, position, velocity):
+    """The bodies as a scene of the independent reference."""
+    made = [
+        plain.Body(np.array(b.shape.vertices), b.shape.radius, b.mass, b.inertia,
+                   b.shape.equivalent_radius)
+        for b in bodies
+    ]  # fmt: skip
+    return plain.Scene(tuple(made), position, velocity)
+
+
+def energy(bodies, position, velocity):
+    """Kinetic + ½ k_n Σ Δ² of all vertex–edge pairs + that of the spring [J]."""
+    overlaps = contacts(plain_scene(bodies, position, velocity)).overlap
+    distance = np.hypot(*(position[0] - position[1])[:2])
+    stretch = distance - sum(b.shape.equivalent_radius for b in bodies) - SPRING.rest
+    elastic = 0.5 * ELASTIC.k_n * np.sum(overlaps**2) + 0.5 * SPRING.stiffness * stretch**2
+    return kinetic_energy(bodies, velocity) + elastic
+
+
+def drift(integrator, until):
+    """(contacts, energy's relative change, momenta's change in units of m v and m v · 10 µm)."""
+    system = System(tied(), [ELASTIC, SPRING], integrator)
+    start, end = system.motion(), watched(system, until)
+    assert end.status.name == "FINISHED"
+    energies = [energy(system.bodies, *m) for m in (start, (end.position, end.velocity))]
+    change = momenta(system.bodies, end.position, end.velocity) - momenta(system.bodies, *start)
+    unit = system.bodies[0].mass * SPEED * np.array([1.0, 1.0, ARM])
+    return end.contacts, energies[1] / energies[0] - 1.0, np.abs(change / unit).max()
+
+
+def test_velocity_verlet_over_two_thousand_contacts():
+    count, energy_change, momenta_change = drift(VelocityVerlet(5e-8), 0.075)
+    assert count >= 2000
+    assert abs(energy_change) < 0.01
+    assert momenta_change < 1e-10
+
+
+def test_implicit_loses_less_energy_at_a_finer_tolerance():
+    coarse, fine = (drift(Implicit(tolerance=t), 1.5e-3) for t in (1e-10, 1e-12))
+    assert min(coarse[0], fine[0]) >= 25
+    assert abs(fine[1]) < 2e-3
+    assert abs(fine[1]) < 0.1 * abs(coarse[1])
+    assert max(coarse[2], fine[2]) < 1e-5
+
+
+@pytest.mark.slow
+def test_velocity_verlet_over_a_hundred_thousand_contacts():
+    count, energy_change, momenta_change = drift(VelocityVerlet(5e-8), 3.8)
+    assert count >= 100_000
+    assert abs(energy_change) < 0.05
+    assert momenta_change < 1e-8
+
+
+@pytest.mark.slow
+def test_implicit_over_a_thousand_contacts():
+    count, energy_change, momenta_change = drift(Implicit(tolerance=1e-13), 0.04)
+    assert count >= 1000
+    assert abs(energy_change) < 5e-3
+    assert momenta_change < 1e-6

@@ -1,0 +1,93 @@
+"""Two bodies on a user's own spring, against the closed form of the two-body problem."""
+
+import numpy as np
+import pytest
+
+from flocsim import Body, Sphere, SpheroPolygon
+from flocsim.integrators import Implicit, VelocityVerlet
+from trial_scenes import ELASTIC, PolygonSystem, Spring, hook, star, watched
+
+STIFFNESS = 1e-2
+
+
+def orbit(a, b):
+    """Two bodies on an ellipse about their common centroid, which drifts; they never touch."""
+    left = Body(a, (-30e-6, 5e-6), 0.2, (1e-3, 8e-3), 50.0, surface_density=2.0)
+    right = Body(b, (25e-6, 0.0), -1.0, (2e-3, -0.2), -70.0, surface_density=2.0)
+    return [left, right]
+
+
+def isotropic(bodies):
+    """The spring whose force is −k times the vector between the centroids."""
+    return Spring(STIFFNESS, rest=-sum(body.shape.equivalent_radius for body in bodies))
+
+
+def exact_motion(bodies, t):
+    """Position (2, 3) at a time: relative vector d0 cos ωt + u0/ω sin ωt, even drift and spin."""
+    place = np.array([body.position for body in bodies])
+    speed = np.array([body.velocity for body in bodies])
+    m = np.array([body.mass for body in bodies])
+    omega = np.sqrt(STIFFNESS * m.sum() / m.prod())
+    share = m[::-1] / m.sum() * [1.0, -1.0]
+    middle = m @ (place + speed * t) / m.sum()
+    apart = (place[0] - place[1]) * np.cos(omega * t)
+    apart += (speed[0] - speed[1]) / omega * np.sin(omega * t)
+    angles = [body.angle + body.spin * t for body in bodies]
+    return np.column_stack([middle + share[:, None] * apart, angles])
+
+
+def period(bodies):
+    """2π/ω [s]."""
+    a, b = (body.mass for body in bodies)
+    return 2.0 * np.pi * np.sqrt(a * b / (a + b) / STIFFNESS)
+
+
+def miss(bodies, integrator, turns):
+    """Largest error of a place [m] after so many turns."""
+    until = turns * period(bodies)
+    end = watched(PolygonSystem(bodies, [ELASTIC, isotropic(bodies)], integrator), until)
+    assert end.contacts == 0
+    return np.abs((end.position - exact_motion(bodies, until))[:, :2]).max()
+
+
+@pytest.mark.parametrize("shapes", [(star(), hook()), (Sphere(5e-6), Sphere(3e-6))])
+@pytest.mark.parametrize(
+    ("integrator", "allowed"), [(VelocityVerlet(2e-8), 1e-10), (Implicit(1e-13), 2e-9)]
+)
+def test_elliptic_orbit(shapes, integrator, allowed):
+    assert miss(orbit(*shapes), integrator, 1.3) < allowed
+
+
+def test_velocity_verlet_is_of_second_order():
+    bodies = orbit(star(), hook())
+    errors = [miss(bodies, VelocityVerlet(period(bodies) / n), 0.8) for n in (250, 500, 1000)]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders == pytest.approx([2.0, 2.0], abs=0.1)
+
+
+def test_error_of_implicit_falls_in_proportion_to_its_tolerance():
+    """The local error goes with h² and so does the error at the end: second order."""
+    bodies = orbit(star(), hook())
+    errors = [miss(bodies, Implicit(tolerance=t), 0.8) for t in (1e-10, 1e-11, 1e-12, 1e-13)]
+    falls = np.divide(errors[:-1], errors[1:])
+    assert falls == pytest.approx([10.0] * 3, rel=0.35)
+
+
+def test_spins_and_the_common_drift_are_kept():
+    bodies = orbit(star(), hook())
+    end = watched(PolygonSystem(bodies, [ELASTIC, isotropic(bodies)], Implicit(1e-11)), 1e-3)
+    assert end.position[:, 2] == pytest.approx(exact_motion(bodies, 1e-3)[:, 2], rel=1e-12)
+    assert end.velocity[:, 2].tolist() == [50.0, -70.0]
+
+
+def test_hinge_of_a_segment_on_a_fixed_body_swings_back():
+    """A body tied to a fixed one oscillates with its own mass."""
+    post = Body(SpheroPolygon([[-1e-6, 0.0], [1e-6, 0.0]], 1e-6), fixed=True, surface_density=2.0)
+    ball = Body(Sphere(5e-6), (60e-6, 0.0), surface_density=2.0)
+    rest = 30e-6
+    equilibrium = rest + 5e-6 + post.shape.equivalent_radius
+    half = np.pi * np.sqrt(ball.mass / STIFFNESS)
+    system = PolygonSystem([post, ball], [ELASTIC, Spring(STIFFNESS, rest)], Implicit(1e-12))
+    end = watched(system, half)
+    assert end.position[1, 0] == pytest.approx(2.0 * equilibrium - 60e-6, abs=1e-9)
+    assert end.position[0].tolist() == [0.0, 0.0, 0.0]
