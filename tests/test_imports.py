@@ -28,7 +28,7 @@ ROWS = [
     ["forces", "integrators"],
     ["state"],
     ["geometry"],
-    ["composer", "slots", "fields", "constants", "errors"],
+    ["composer", "slots", "layout", "fields", "constants", "errors"],
 ]
 SIBLING_IMPORTS = {("composer", "constants"), ("composer", "errors")}
 

@@ -80,8 +80,8 @@ def test_spins_and_the_common_drift_are_kept():
     assert end.velocity[:, 2].tolist() == [50.0, -70.0]
 
 
-def test_hinge_of_a_segment_on_a_fixed_body_swings_back():
-    """A body tied to a fixed one oscillates with its own mass."""
+def test_body_tied_to_a_fixed_one_swings_back():
+    """It oscillates with its own mass, and the fixed one stays."""
     post = Body(SpheroPolygon([[-1e-6, 0.0], [1e-6, 0.0]], 1e-6), fixed=True, surface_density=2.0)
     ball = Body(Sphere(5e-6), (60e-6, 0.0), surface_density=2.0)
     rest = 30e-6
