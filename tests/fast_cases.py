@@ -5,18 +5,26 @@ from functools import cache
 
 import numpy as np
 from fast_scene import fast_system
-
-from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
-from flocsim.state import Fluid
 from reference import forces as plain_forces
 from reference.contacts import contacts
 from reference.samples import scene_of
 from reference.shapes import Scene
 
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.state import Fluid
+
 GAPS = ("equivalent_spheres", "surface")
 VISCOSITY, WATER, DENSITY = 8.9e-4, 997.0, 2650.0
 SURFACE_DENSITY = 2.0
 """ρ_s of the reference's random scenes [kg/m²]."""
+
+FORCES = (
+    "gravity",
+    "drag",
+    "contact",
+    *(f"attraction at {gap}" for gap in GAPS),
+    *(f"repulsion at {gap}" for gap in GAPS),
+)
 
 NOTHING = 1e-300
 """A strength that no sum notices, while the force stays compiled in."""
@@ -131,7 +139,5 @@ def silenced(case, *names):
     """The case's system with all but the named forces made silent: no new code to compile."""
     chosen = [case.pairs[name][0] if name in names else SILENT[name] for name in case.pairs]
     viscosity = VISCOSITY if "drag" in names else NOTHING
-    fluid = Fluid(
-        viscosity, WATER, case.fluid.buoyancy, case.fluid.velocity, case.fluid.gradient
-    )
+    fluid = Fluid(viscosity, WATER, case.fluid.buoyancy, case.fluid.velocity, case.fluid.gradient)
     return fast_system(case.plain, chosen, fluid, **case.material)

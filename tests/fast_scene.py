@@ -30,7 +30,9 @@ def shape_from(coordinates, radius):
 def shape_of(body):
     """The package's shape of a reference body; its vertices keep their numbers."""
     shape = shape_from(body.vertices.tobytes(), body.radius)
-    np.testing.assert_allclose(shape.vertices, body.vertices, rtol=0.0, atol=1e-11 * shape.bounding_radius)
+    np.testing.assert_allclose(
+        shape.vertices, body.vertices, rtol=0.0, atol=1e-11 * shape.bounding_radius
+    )
     return shape
 
 
@@ -43,6 +45,15 @@ def bodies_of(plain, **material):
         )
         for body, place, speed in zip(plain.bodies, plain.positions, plain.velocities, strict=True)
     ]  # fmt: skip
+
+
+def keys_of(scene, work):
+    """(vertex's body, vertex, edge's body, edge) of every listed pair."""
+    first = scene.first
+    return [
+        (int(a), int(point - first[a]), int(b), int(start - first[b]))
+        for a, point, b, start in work.candidates[: work.tally[CANDIDATES], :4]
+    ]
 
 
 class FastScene:
@@ -66,7 +77,7 @@ class FastScene:
 
     def put_slips(self, slips):
         """Write displacements {pair: ξ} into the list; every pair must be in it."""
-        keys = self.keys()
+        keys = keys_of(self.scene, self.work)
         for key, slip in slips.items():
             row = keys.index(key if key in keys else self.other_way_round(key))
             self.work.slip[NOW, row] = slip
@@ -76,19 +87,10 @@ class FastScene:
         assert all(self.scene.first[body + 1] - self.scene.first[body] == 1 for body in key[::2])
         return key[2:] + key[:2]
 
-    def keys(self):
-        """(vertex's body, vertex, edge's body, edge) of every listed pair."""
-        rows = self.work.candidates[: self.work.tally[CANDIDATES]]
-        first = self.scene.first
-        return [
-            (int(a), int(point - first[a]), int(b), int(start - first[b]))
-            for a, point, b, start in rows[:, :4]
-        ]
-
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
         rows = self.work.geometry[: self.work.tally[CANDIDATES]]
-        return {key: row for key, row in zip(self.keys(), rows, strict=True) if row[2] < 0.0}
+        return {key: row for key, row in zip(keys_of(self.scene, self.work), rows, strict=True) if row[2] < 0.0}
 
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""

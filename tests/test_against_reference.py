@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from fast_cases import GAPS, SURFACE_DENSITY, random_case, silenced
+from fast_cases import FORCES, GAPS, SURFACE_DENSITY, random_case, silenced
 from fast_scene import FastScene, shape_of
-
 from reference.contacts import contacts
 from reference.forces import loads
 from reference.samples import scene_of
@@ -13,8 +12,6 @@ SCENES = range(220)
 ONE_BY_ONE = range(50)
 UNCOMPILED = range(20)
 
-FORCES = ("gravity", "drag", "contact", *(f"attraction at {gap}" for gap in GAPS),
-          *(f"repulsion at {gap}" for gap in GAPS))  # fmt: skip
 TOGETHER = {gap: tuple(name for name in FORCES if not name.endswith(other))
             for gap, other in zip(GAPS, GAPS[::-1], strict=True)}  # fmt: skip
 

@@ -136,10 +136,10 @@ class Watched:
         return self.motion[:, 3:]
 
 
-def watched(system, until, *, max_steps=50_000_000, awaited=False, jit=True):
+def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit=True):
     """Run a system to a time under the observer above, nothing recorded."""
     driver = system.compose(observer=WATCH, jit=jit)
-    scene, work = system.scene(), work_of(system.scene(), *system.motion())
+    scene, work = system.scene(), work_of(system.scene(), *system.motion(), capacity)
     clock, counts = system.integrator.fresh_clock(), system.integrator.fresh_counts(max_steps)
     clock[UNTIL] = until
     memo = np.zeros(MEMO_SIZE)
@@ -159,7 +159,8 @@ def star(points=7, size=6e-6, radius=1e-6, inner=0.45):
     """A non-convex star with rays of unequal length."""
     angles = np.arange(2 * points) * np.pi / points
     lengths = np.where(np.arange(2 * points) % 2, inner, 1.0 + 0.15 * np.cos(3 * angles))
-    return SpheroPolygon(size * lengths[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]), radius)
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    return SpheroPolygon(size * lengths[:, None] * rays, radius)
 
 
 def hook(size=7e-6, radius=0.8e-6):
@@ -169,13 +170,12 @@ def hook(size=7e-6, radius=0.8e-6):
     return SpheroPolygon(size * np.concatenate([ring, 0.55 * ring[::-1]]), radius)
 
 
-def comb(teeth=50, pitch=4e-6, depth=6e-6, radius=0.5e-6):
-    """A comb with teeth up: a polygon of 4 · teeth vertices."""
-    x = np.repeat(np.arange(teeth) * pitch, 4) + np.tile([0.0, 0.4, 0.6, 1.0], teeth) * pitch
-    y = np.tile([0.0, 1.0, 1.0, 0.0], teeth) * depth
-    vertices = np.column_stack([x, y])
-    vertices = vertices[np.r_[True, np.any(np.diff(vertices, axis=0) != 0.0, axis=1)]]
-    return SpheroPolygon(np.vstack([vertices, [[x[-1], -2e-6], [0.0, -2e-6]]]), radius)
+def comb(teeth=50, pitch=5e-6, depth=8e-6, radius=0.5e-6):
+    """A comb with its teeth up: 4 · teeth vertices, the back included."""
+    x = np.repeat(np.arange(teeth), 4) + np.tile([0.0, 0.05, 0.2, 0.25], teeth)
+    y = np.tile([0.0, 1.0, 1.0, 0.0], teeth)
+    x, y = np.append(x, [x[-1], 0.0]), np.append(y, [-0.3, -0.3])
+    return SpheroPolygon(np.column_stack([pitch * x, depth * y]), radius)
 
 
 def head_on(v0=1e-3, gap=1e-7, r=5e-6, fixed=False):

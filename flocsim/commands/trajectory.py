@@ -54,6 +54,19 @@ def select(config, args):
     return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
 
 
+def check_outputs(config_path, figures, others):
+    """FlocsimError now, rather than after the run, for files that could not be written."""
+    from flocsim.ensembles.preflight import check_output
+    from flocsim.io.plots import FORMATS
+
+    for path in figures:
+        if Path(path).suffix.lower().removeprefix(".") not in FORMATS:
+            known = ", ".join(f".{name}" for name in FORMATS)
+            raise UsageError(f"{path}: a figure's name must end in one of {known}")
+    for path in [*figures, *others]:
+        check_output(path, config_path)
+
+
 def describe(config, place, replicate, row):
     """One line on what happened."""
     from flocsim.ensembles.failures import FAILURES
@@ -73,11 +86,16 @@ def describe(config, place, replicate, row):
     )
 
 
-def draw(args, frames, motion, row, zone, title):
+def strip_path(args):
+    """Where the strip of frames goes."""
+    return Path(args.output or f"trajectory-{args.replicate}.png")
+
+
+def draw(args, frames, motion, zone, title):
     """Draw and save what was asked for; the paths written."""
     from flocsim.io.plots import draw_distance, draw_strip, save
 
-    output = Path(args.output or f"trajectory-{args.replicate}.png")
+    output = strip_path(args)
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
         centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
@@ -97,6 +115,7 @@ def run(args):
 
     from flocsim.ensembles.frames import frames_of
     from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.preflight import check_study
     from flocsim.ensembles.sampling import draws
     from flocsim.ensembles.scene import Record
     from flocsim.ensembles.study import Study
@@ -104,6 +123,9 @@ def run(args):
 
     config = load_config(args.config, {} if args.seed is None else {"seed": args.seed})
     place = select(config, args)
+    check_study(config)
+    figures = [path for path in (strip_path(args), args.distance) if path]
+    check_outputs(args.config, figures, [args.save] if args.save else [])
     study = Study(config)
     record = Record()
     row = study.run(*place, args.replicate, record)
@@ -114,7 +136,7 @@ def run(args):
     title = describe(config, place, args.replicate, row)
     print(title)
     zone = encounter.zone_distance
-    for path in draw(args, frames, (times, distance), row, zone, title.split(";")[0]):
+    for path in draw(args, frames, (times, distance), zone, title.split(";")[0]):
         print(path)
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate, "zone_distance": zone}

@@ -40,13 +40,13 @@ def overrides(arguments):
 def checked_config(arguments):
     """The config, found to make a study whose results can be written where they should go."""
     from flocsim.ensembles.loader import load_config
-    from flocsim.ensembles.preflight import check_study
-    from flocsim.io.files import check_writable
+    from flocsim.ensembles.preflight import check_output, check_study
 
     config = load_config(arguments.config, overrides(arguments))
     check_study(config)
     if not arguments.dry_run:
-        check_writable(config.output.file)
+        sources = [arguments.config, config.shapes.file]
+        check_output(config.output.file, *(source for source in sources if source))
     return config
 
 

@@ -1,11 +1,14 @@
 """What is wrong with a study can mostly be known before anything is compiled or run."""
 
+import os
+
 from flocsim.ensembles.flocs import read_flocs
 from flocsim.ensembles.scene import make_encounter
 from flocsim.ensembles.zone import zone_distance
 from flocsim.errors import ConfigError
 from flocsim.forces import ContactForce
 from flocsim.geometry.sphere import Sphere
+from flocsim.io.files import check_writable
 
 
 def sphere_pairs(config):
@@ -53,3 +56,11 @@ def check_approach(config, name, pair):
             f"reaches the receiving body i (below) at {fall_i:.4g} mm/s: give scene.pairs as "
             "[smaller radius, larger radius], or set scene.receiver = 'fixed'"
         )
+
+
+def check_output(path, *inputs):
+    """FileError for a file that could not be written, ConfigError for one that the study reads."""
+    for source in inputs:
+        if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
+            raise ConfigError(f"writing {path} would replace {source}, which is read: name another")
+    check_writable(path)

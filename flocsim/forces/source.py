@@ -11,9 +11,9 @@ import math
 import attrs
 
 from flocsim import slots
-from flocsim.composer import refuse_closure, where
-from flocsim.errors import KernelError, UsageError
+from flocsim.errors import UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.forces.check import check_kernel, kernel_arguments, reach_of
 from flocsim.state import PairView
 
 VELOCITIES = {"vx", "vy", "spin"}
@@ -30,46 +30,20 @@ class Pieces:
     left_out: dict = attrs.Factory(dict)
 
 
-def parameter_names(kernel):
-    """Names of a kernel's parameters after its view."""
-    return list(inspect.signature(kernel).parameters)[1:]
-
-
-def parameter_value(force, fluid, name, kernel):
-    """The force's own value of a parameter, else the fluid's; KernelError where neither has it."""
-    for owner in (force, fluid):
-        if hasattr(owner, name):
-            return getattr(owner, name)
-    known = [f.name for f in attrs.fields(type(force))]
-    raise KernelError(
-        f"{type(force).__name__}: kernel {where(kernel)} asks for {name!r}, which is no field or "
-        f"property of the force ({', '.join(known) or 'it has none'}) or of the fluid"
-    )
-
-
 def append_value(parameters, value):
     """Append a number or a tuple of numbers; the source text that reads it back."""
     if isinstance(value, tuple):
         return "(" + "".join(append_value(parameters, each) + ", " for each in value) + ")"
-    parameters.append(float(value))
+    parameters.append(value)
     return f"parameters[{len(parameters) - 1}]"
 
 
 def call_text(pieces, namespace, force, fluid, kernel, view):
     """Source of a call of the kernel with its parameters read from the array."""
-    refuse_closure(kernel)
     name = f"{type(force).__name__}_{kernel.__name__}_{len(namespace)}"
     namespace[name] = kernel
-    values = []
-    for asked in parameter_names(kernel):
-        value = parameter_value(force, fluid, asked, kernel)
-        try:
-            values.append(append_value(pieces.parameters, value))
-        except (TypeError, ValueError):
-            raise KernelError(
-                f"{type(force).__name__}: kernel {where(kernel)} asks for {asked!r}, which is "
-                f"{value!r}; a kernel takes numbers only"
-            ) from None
+    arguments = kernel_arguments(force, fluid, kernel)
+    values = [append_value(pieces.parameters, value) for value in arguments]
     return name, f"{name}({', '.join([view, *values])})"
 
 
@@ -138,7 +112,7 @@ def pair_text(pieces, namespace, forces, fluid, kind):
     force_terms, slope_terms, damping_terms = [], [], []
     reaches = []
     for force in forces:
-        reach = append_value(pieces.parameters, force.reach)
+        reach = append_value(pieces.parameters, reach_of(force))
         reaches.append(reach)
         condition = f"pair.gap < {reach}"
         name, call = call_text(pieces, namespace, force, fluid, force.kernel, "pair")
@@ -182,8 +156,11 @@ def contact_text(pieces, namespace, forces, fluid):
     return text
 
 
-def sort_forces(pieces, forces):
-    """Forces by kind, absent ones noted as left out; UsageError for what is no force."""
+def sort_forces(pieces, forces, fluid):
+    """Forces by kind, absent ones noted as left out.
+
+    UsageError for what is no force, KernelError for a force whose kernel cannot be used.
+    """
     kinds = {"body": [], "centre": [], "surface": [], "contact": []}
     for force in forces:
         if not isinstance(force, Force):
@@ -192,6 +169,7 @@ def sort_forces(pieces, forces):
         if force.absent:
             pieces.left_out[name] = force.absent
             continue
+        check_kernel(force, fluid)
         pieces.used[name] = force
         if isinstance(force, BodyForce):
             kinds["body"].append(force)
@@ -209,7 +187,7 @@ def sort_forces(pieces, forces):
 def scene_functions(forces, fluid):
     """Pieces of the scene with these forces in this fluid."""
     pieces = Pieces()
-    kinds = sort_forces(pieces, forces)
+    kinds = sort_forces(pieces, forces, fluid)
     namespace = {"PairView": PairView, "max": max, "min": min, "abs": abs, "math": math}
     text = body_text(pieces, namespace, kinds["body"], fluid)
     for kind in ("centre", "surface"):

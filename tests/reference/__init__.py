@@ -6,7 +6,7 @@ It imports nothing from flocsim, so that agreement between the two means somethi
 - `shapes`: `Body`, `make_body`, `Scene`.
 - `contacts`: every vertex-edge pair of a scene and its kinematics.
 - `forces`: the laws of MODEL section 2 and `loads(scene, laws, displacement)`.
-- `integrate`: `simulate(scene, laws, duration)`, DOP853 restarted at every opening and closing.
+- `integrate`, `motion`: `simulate(scene, laws, duration)`, DOP853 restarted at every event.
 - `closed_forms`: roots, terminal velocities and restitution (sections 5 and 7).
 - `scenes`: `random_scene(rng)`.
 """

@@ -1,31 +1,14 @@
 """Equations of motion by DOP853, restarted at the instant each pair opens or closes."""
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from reference.contacts import all_pairs, check_overlaps, measure
-from reference.forces import Contact, loads, refuse_strangers
+from reference.motion import Motion
 from reference.shapes import Scene
 
-AT_CONTACT = 1e-15
-"""An overlap [m] this small after an event is read as zero: its rate decides on or off."""
-
-HYSTERESIS = 1e-18
-"""A pair switches this far [m] past zero, so that it cannot switch back in the same instant."""
-
-MISSED = 1e-12
-"""An overlap [m] of this size on the wrong side of the on-off record: an event was missed."""
-
-SCALES = np.array([1e-6, 1e-6, 1e-1, 1e-4, 1e-4, 10.0])
-"""x, y [m], θ [rad], vx, vy [m/s], ω [rad/s]: rtol times these are the absolute tolerances."""
-
-DISPLACEMENT_SCALE = 1e-8
-
-LONGEST_TRAVEL = 0.25
-"""Relative motion of two bodies in one step, as a share of the least radius of a scene."""
+MOST_EVENTS = 5000
+"""A corner that rests at zero overlap opens and closes endlessly; past this many, give up."""
 
 
 @dataclass(frozen=True)
@@ -47,153 +30,14 @@ class Trajectory:
         return Scene(self.bodies, self.positions[k], self.velocities[k])
 
 
-def ends_leg(direction):
-    """Mark an event function of solve_ivp: stop where it rises (1) or falls (−1) through 0."""
-
-    def mark(function):
-        function.terminal, function.direction = True, direction
-        return function
-
-    return mark
-
-
-class Motion:
-    """The state y = positions, velocities, ξ of the active pairs, and its derivative."""
-
-    def __init__(self, scene, laws, displacement):
-        self.bodies, self.count = scene.bodies, len(scene.bodies)
-        self.contact = next((law for law in laws if isinstance(law, Contact)), None)
-        self.others = [law for law in laws if not isinstance(law, Contact)]
-        self.pairs = all_pairs(scene.bodies) if self.contact else np.empty((0, 4), dtype=int)
-        every = measure(scene, self.pairs)
-        self.active = every.overlap > 0
-        refuse_strangers(displacement, every.select(self.active).pair_keys())
-        self.xi = np.array([displacement.get(key, 0.0) for key in every.pair_keys()])
-        self.least_radius = min(body.radius for body in self.bodies)
-        self.inverse_mass = np.array([[1 / b.mass, 1 / b.mass, 1 / b.inertia] for b in self.bodies])
-
-    def pack(self, scene):
-        """y of a scene, with the ξ of the active pairs."""
-        state = [scene.positions.ravel(), scene.velocities.ravel(), self.xi[self.active]]
-        return np.concatenate(state)
-
-    def scene(self, y):
-        """The scene of a state y."""
-        positions, velocities = y[: 6 * self.count].reshape(2, self.count, 3)
-        return Scene(self.bodies, positions, velocities)
-
-    def rate(self, t, y):
-        """dy/dt: v, F/m and τ/I, and ξ̇ = v_t of each active pair."""
-        scene = self.scene(y)
-        total = loads(scene, self.others)
-        pairs = measure(scene, self.pairs[self.active])
-        if self.contact:
-            total += self.contact.loads_at(scene, pairs, y[6 * self.count :])
-        acceleration = total * self.inverse_mass
-        return np.concatenate(
-            [scene.velocities.ravel(), acceleration.ravel(), pairs.tangential_velocity]
-        )
-
-    def tolerances(self, rtol):
-        """Absolute tolerances of y."""
-        state = np.concatenate([np.tile(SCALES[:3], self.count), np.tile(SCALES[3:], self.count)])
-        return rtol * np.append(state, np.full(self.active.sum(), DISPLACEMENT_SCALE))
-
-    @ends_leg(direction=1)
-    def closing(self, t, y):
-        """Largest overlap among the pairs that are off; it rises through 0 when one closes."""
-        off = measure(self.scene(y), self.pairs[~self.active])
-        return off.overlap.max(initial=-1.0) - HYSTERESIS
-
-    @ends_leg(direction=-1)
-    def opening(self, t, y):
-        """Least overlap among the pairs that are on; it falls through 0 when one opens."""
-        on = measure(self.scene(y), self.pairs[self.active])
-        return on.overlap.min(initial=1.0) + HYSTERESIS
-
-    def switch(self, y):
-        """Turn pairs on and off after an event; returns the keys that closed and that opened."""
-        every = measure(self.scene(y), self.pairs)
-        at_contact = np.abs(every.overlap) < AT_CONTACT
-        touching = np.where(at_contact, every.normal_velocity < 0, every.overlap > 0)
-        closed, opened = touching & ~self.active, self.active & ~touching
-        for row in np.flatnonzero(opened):
-            hand_over(every, row, np.flatnonzero(touching), self.xi)
-        self.xi[~touching] = 0.0
-        self.active = touching
-        return every.select(closed).pair_keys(), every.select(opened).pair_keys()
-
-    def leg(self, start, y, end, rtol, max_step):
-        """The solution of solve_ivp up to the next event or the end."""
-        solution = solve_ivp(
-            self.rate,
-            (start, end),
-            y,
-            method="DOP853",
-            events=[self.closing, self.opening],
-            rtol=rtol,
-            atol=self.tolerances(rtol),
-            max_step=max_step or self.longest_step(y),
-        )
-        if solution.status < 0:
-            raise RuntimeError(f"the solver stopped at {solution.t[-1]} s: {solution.message}")
-        self.xi[self.active] = solution.y[6 * self.count :, -1]
-        if self.contact:
-            self.refuse_missed_events(solution.y)
-            for state in solution.y.T:
-                check_overlaps(self.scene(state))
-        return solution
-
-    def longest_step(self, y):
-        """The step in which, at its present velocity, no body moves far against another."""
-        speed = relative_motion(self.bodies, self.scene(y).velocities)
-        free = self.contact is None or speed == 0
-        return np.inf if free else LONGEST_TRAVEL * self.least_radius / speed
-
-    def refuse_missed_events(self, states):
-        """RuntimeError if a contact may have come and gone unseen within one of the steps."""
-        places = states[: 3 * self.count].T.reshape(-1, self.count, 3)
-        travel = max(relative_motion(self.bodies, step) for step in np.diff(places, axis=0))
-        overlap = measure(self.scene(states[:, -1]), self.pairs).overlap
-        contradicted = np.any(np.where(self.active, -overlap, overlap) > MISSED)
-        if contradicted or travel > self.least_radius:
-            raise RuntimeError("a contact may have passed unseen: give a smaller max_step")
-
-
-def relative_motion(bodies, change):
-    """Greatest relative motion of the outlines of two bodies, of changes (or rates) x, y, θ."""
-    turn = [
-        abs(angle) * (np.hypot(*body.vertices.T).max() + body.radius)
-        for body, angle in zip(bodies, change[:, 2], strict=True)
-    ]
-    pairs = combinations(range(len(bodies)), 2)
-    motions = [np.hypot(*(change[i] - change[j])[:2]) + turn[i] + turn[j] for i, j in pairs]
-    return max(motions, default=0.0)
-
-
-def hand_over(every, row, receivers, xi):
-    """Give the ξ of an opening pair to the nearest pair of the same bodies that stays closed.
-
-    As a vector ξ t on the vertex's body, projected on the receiver's tangent; with the last
-    pair of the two bodies it vanishes.
-    """
-    same = [r for r in receivers if set(every.pair[r, ::2]) == set(every.pair[row, ::2])]
-    if same:
-        apart = [np.hypot(*(every.point[r] - every.point[row])) for r in same]
-        nearest = same[int(np.argmin(apart))]
-        side = 1.0 if every.pair[nearest, 0] == every.pair[row, 0] else -1.0
-        xi[nearest] += side * (every.tangent[row] @ every.tangent[nearest]) * xi[row]
-    xi[row] = 0.0
-
-
 def simulate(scene, laws, duration, displacement=None, rtol=1e-10, max_step=None):
     """The motion of a scene for `duration` [s], every accepted step recorded, as a Trajectory.
 
     ξ of a pair is the plain integral of v_t while its Δ > 0, under a friction limit too (the
     limit then clips the force and not ξ). Steps are at most `max_step` [s], by default a quarter
     of the least radius over the relative speed of the bodies after the last event.
-    OverlapTooDeepError as in `contacts`; RuntimeError if the solver fails or a contact may have
-    passed unseen within one step.
+    OverlapTooDeepError as in `contacts`; RuntimeError if the solver fails, a contact may have
+    passed unseen within one step, or contacts chatter without end.
     """
     motion = Motion(scene, laws, displacement or {})
     t, y, events = 0.0, motion.pack(scene), []
@@ -205,6 +49,8 @@ def simulate(scene, laws, duration, displacement=None, rtol=1e-10, max_step=None
         states.extend(leg.y[: 6 * motion.count, 1:].T)
         if leg.status == 1:
             events.append((t, *motion.switch(y)))
+            if len(events) > MOST_EVENTS:
+                raise RuntimeError(f"contacts opened and closed {MOST_EVENTS} times by t = {t} s")
             y = motion.pack(motion.scene(y))
     return trajectory(motion, times, states, events)
 

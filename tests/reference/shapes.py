@@ -11,7 +11,7 @@ from reference.outline import area_centroid_inertia
 class Body:
     """Core vertices (N, 2) [m] about the centroid of the swept outline, and the inertial data.
 
-    A `fixed` body counts as infinitely heavy in the damping of its contacts.
+    A `fixed` body counts as infinitely heavy in the damping of its contacts, and no force moves it.
     """
 
     vertices: np.ndarray

@@ -1,12 +1,15 @@
 """Motion held against closed forms and conservation laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from reference.closed_forms import impact, relaxation_time, terminal_velocity
 from reference.contacts import OverlapTooDeepError, contacts
 from reference.forces import Contact, Drag, Gravity
-from reference.integrate import hand_over, simulate
+from reference.integrate import simulate
+from reference.motion import hand_over
 from reference.samples import VISCOSITY, random_core, scene_of, spheres
 from reference.scenes import spiral, star
 from reference.shapes import Scene, make_body
@@ -23,6 +26,18 @@ def test_head_on_spheres_bounce_as_one_spring(ratio, tension):
     parting = motion.velocities[-1, 1, 0] - motion.velocities[-1, 0, 0]
     assert parting == pytest.approx(1e-3 * impact(ratio, tension)[0], rel=1e-7)
     assert motion.displacement == {}
+
+
+def test_fixed_receiver_sends_the_sphere_back_by_itself():
+    scene = spheres(10.001e-6, 1e-3)
+    fixed = Scene(
+        (scene.bodies[0], replace(scene.bodies[1], fixed=True)), scene.positions, scene.velocities
+    )
+    frequency = np.sqrt(20.0 / scene.bodies[0].mass)
+    motion = simulate(fixed, [Contact(20.0, 2.0, damping_n=0.4 * frequency)], 1e-6 + 30 / frequency)
+    assert np.all(motion.velocities[:, 1] == 0.0)
+    expected = -1e-3 * impact(0.2, tension=True)[0]
+    assert motion.velocities[-1, 0, 0] == pytest.approx(expected, rel=1e-7)
 
 
 def test_relaxation_to_terminal_velocity():

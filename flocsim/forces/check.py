@@ -1,0 +1,198 @@
+"""A force's kernels tried once, uncompiled, so that a wrong one is named before it is compiled."""
+
+import difflib
+import inspect
+import math
+import traceback
+import types
+from numbers import Real
+
+import attrs
+
+from flocsim.composer import refuse_closure, where
+from flocsim.errors import KernelError
+from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.state import BodyView, ContactView, PairView
+
+SAMPLE_BODIES = (
+    BodyView(1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6),
+    BodyView(0.0, -2e-6, 3e-6, -0.5, -1e-4, 2e-4, -3.0, 2e-10, 1e-10, 2e-21, 5e-6),
+)
+SAMPLE_CONTACTS = tuple(
+    ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6)
+    for rate in (1e-4, -1e-4) for slip in (1e-9, -1e-9)
+)  # fmt: skip
+SAMPLE_GAPS = (-1e-9, 1e-10, 1e-7)
+"""Gaps [m] of the sample pairs: in contact, nearly so, apart."""
+
+
+def sample_pairs(reach):
+    """PairViews with gaps of either sign, within the reach of the force [m]."""
+    gaps = [min(gap, 0.5 * reach) for gap in SAMPLE_GAPS]
+    return tuple(
+        PairView(1e-3, gap, rate, gap + 3e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
+        for gap in gaps for rate in (-1e-4, 1e-4)
+    )  # fmt: skip
+
+
+def refusal(force, function, finding):
+    """A KernelError that names the force, the kernel, and its file and line."""
+    return KernelError(f"{type(force).__name__}: kernel {where(function)} {finding}")
+
+
+def require_plain(force, kernel):
+    """KernelError where a kernel is not a plain function that captures nothing."""
+    name = type(force).__name__
+    if kernel is Force.kernel:
+        raise KernelError(f"{name} has no kernel: give it a static method `kernel`")
+    if inspect.ismethod(kernel):
+        raise refusal(force, kernel, "is a method; put @staticmethod above it and drop `self`")
+    if hasattr(kernel, "py_func"):
+        raise refusal(force, kernel.py_func, "is compiled already; leave its @njit out")
+    if not isinstance(kernel, types.FunctionType):
+        raise KernelError(f"{name}: its kernel is {kernel!r}; write a function with `def`")
+    if kernel.__name__ == "<lambda>":
+        raise refusal(force, kernel, "is a lambda; write it with `def`")
+    refuse_closure(kernel)
+
+
+def parameter_value(force, fluid, name, kernel):
+    """The force's own value of a parameter, else the fluid's; KernelError where neither has it."""
+    for owner in (force, fluid):
+        if hasattr(type(owner), name) or name in getattr(owner, "__dict__", ()):
+            return computed(force, owner, name)
+    known = ", ".join(f.name for f in attrs.fields(type(force))) or "it has none"
+    lacking = f"no field or property of the force ({known}) or of the fluid"
+    raise refusal(force, kernel, f"asks for {name!r}, which is {lacking}")
+
+
+def computed(force, owner, name):
+    """The value of an attribute; KernelError where its property fails."""
+    try:
+        return getattr(owner, name)
+    except Exception as error:
+        raise KernelError(
+            f"{type(force).__name__}: its {name!r} cannot be computed ({failing_line(error)}: "
+            f"{type(error).__name__}: {error})"
+        ) from None
+
+
+def as_numbers(value):
+    """A number, or a tuple of numbers, as the compiled kernel will see it."""
+    if isinstance(value, tuple):
+        return tuple(as_numbers(each) for each in value)
+    return float(value)
+
+
+def kernel_arguments(force, fluid, kernel):
+    """What a kernel is called with after its view; KernelError for what is no number."""
+    arguments = []
+    for name in list(inspect.signature(kernel).parameters)[1:]:
+        value = parameter_value(force, fluid, name, kernel)
+        try:
+            arguments.append(as_numbers(value))
+        except (TypeError, ValueError):
+            raise refusal(
+                force, kernel, f"asks for {name!r}, which is {value!r}; a kernel takes numbers only"
+            ) from None
+    return arguments
+
+
+def failing_line(error):
+    """ "file:line" of the innermost Python line that raised."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{frame.filename}:{frame.lineno}"
+
+
+def misread(view, error):
+    """What is wrong with a read of an attribute that a view has not."""
+    fields = type(view)._fields
+    near = difflib.get_close_matches(error.name, fields, n=1)
+    advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
+    has_not = f"which a {type(view).__name__} has not"
+    return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
+
+
+def is_arithmetic(error):
+    """Whether the numbers are to blame, which the compiled code answers with inf or nan."""
+    unpacking = "unpack" in str(error)
+    return isinstance(error, ArithmeticError) or (isinstance(error, ValueError) and not unpacking)
+
+
+def results(force, kernel, samples, arguments):
+    """What a kernel returns for the samples, those beyond its arithmetic left out."""
+    for view in samples:
+        try:
+            yield kernel(view, *arguments)
+        except Exception as error:
+            if not is_arithmetic(error):
+                raise refusal(force, kernel, failure(view, error)) from None
+
+
+def failure(view, error):
+    """What a kernel did wrong, in words, from the exception that it raised for a sample."""
+    if isinstance(error, AttributeError) and error.obj is view:
+        return misread(view, error)
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"fails in {failing_line(error)}: {what}"
+
+
+def is_kind(result, parts):
+    """Whether a result is one number, or a tuple of as many numbers as there are parts."""
+    if parts == 1:
+        return isinstance(result, Real)
+    return (
+        isinstance(result, tuple)
+        and len(result) == parts
+        and all(isinstance(part, Real) for part in result)
+    )
+
+
+def check_results(force, fluid, kernel, samples, *parts):
+    """KernelError unless a kernel can be called and returns the named parts, each a number."""
+    require_plain(force, kernel)
+    arguments = kernel_arguments(force, fluid, kernel)
+    for result in results(force, kernel, samples, arguments):
+        if not is_kind(result, len(parts)):
+            wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
+            raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
+
+
+def reach_of(force):
+    """The force's reach; KernelError unless it is a number."""
+    reach = computed(force, force, "reach")
+    if not isinstance(reach, Real) or math.isnan(reach):
+        raise KernelError(f"{type(force).__name__}: its reach is {reach!r}; it must be a gap [m]")
+    return float(reach)
+
+
+def check_pair_force(force, fluid):
+    """KernelError for a pair force whose place, reach, kernel or slope is wrong."""
+    if type(force).acts_on is PairForce.acts_on:
+        raise KernelError(f"{type(force).__name__} must subclass CentreForce or SurfaceForce")
+    samples = sample_pairs(reach_of(force))
+    check_results(force, fluid, force.kernel, samples, "repulsion [N]")
+    if force.slope is not None:
+        check_results(force, fluid, force.slope, samples, "slope [N/m]")
+
+
+def check_contact_force(force, fluid):
+    """KernelError for a contact force whose kernel or slip limit is wrong."""
+    check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
+    if force.slip_limit is not None:
+        check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
+
+
+def check_kernel(force, fluid):
+    """KernelError, with force, file and line, unless all kernels of a force can be used.
+
+    Each is called uncompiled on samples of the view that it will get, which finds misspelt
+    attributes, unknown parameters, and results of the wrong kind.
+    """
+    if isinstance(force, BodyForce):
+        kernel = force.kernel_in(fluid)
+        check_results(force, fluid, kernel, SAMPLE_BODIES, "fx", "fy", "torque")
+    elif isinstance(force, ContactForce):
+        check_contact_force(force, fluid)
+    elif isinstance(force, PairForce):
+        check_pair_force(force, fluid)

@@ -1,0 +1,269 @@
+"""What is decided stays decided, and what cannot be decided says so."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon
+from small_study import small_study
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.ensembles import outcomes
+from flocsim.ensembles.failures import FAILURES
+from flocsim.ensembles.outcomes import BOUND, DEPARTED, MEMO_SIZE, outline_gap, watch_pair
+from flocsim.ensembles.sampling import draws, orientations
+from flocsim.ensembles.scene import OBSERVER, make_encounter, run_encounter
+from flocsim.ensembles.start import largest_displacement, place_pair
+from flocsim.errors import UsageError
+from flocsim.integrators.status import Status
+from flocsim.io.results_schema import NOT_APPLICABLE, OUTCOMES
+from flocsim.layout import CODE, NOW, STEPS, TIME, UNTIL
+from flocsim.slots import observe
+from flocsim.state import work_of
+
+DECISION, DECIDED_AT, TIGHTEST, WIDEST = range(MEMO_SIZE, MEMO_SIZE + 4)
+"""What `keep_watching` adds to the memo: the first decision, its time, and the smallest and
+largest distance of the outlines from then on."""
+
+
+def keep_watching(scene, work, memo, time, at_event):
+    """As `watch_pair`, but it notes the first decision instead of stopping there."""
+    code = watch_pair(scene, work, memo, time, at_event)
+    if memo[DECISION] == 0.0:
+        memo[DECISION] = code
+        memo[DECIDED_AT] = time
+    else:
+        gap = outline_gap(scene, work)
+        memo[TIGHTEST] = min(memo[TIGHTEST], gap)
+        memo[WIDEST] = max(memo[WIDEST], gap)
+    return 0
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The small study with all three types, and a displacement between the others."""
+    scene = {"types": ["I", "II", "III"], "delta": [0.0, 0.25, 0.5, 1.0, 1.5]}
+    return small_study(tmp_path_factory.mktemp("study"), {"scene": scene, "replicates": 10})
+
+
+def outcome(row):
+    """The outcome's word."""
+    return OUTCOMES[row["outcome"]]
+
+
+def test_spheres_always_aggregate_inside(study):
+    for condition in range(3):
+        for share in (0.0, 0.25, 0.5, 1.0):
+            assert outcome(study.run(condition, 1, share, 0)) == "A"
+
+
+@cache
+def watcher(study):
+    """The compiled driver that goes on after the decision; it serves polygons and spheres."""
+    encounter = study.encounter(0, 4, draws(1, 0))
+    return encounter.system.compose(observer=OBSERVER | {observe: keep_watching})
+
+
+def go_on(study, condition, vertices, share, replicate, factor=11.0):
+    """(the row as decided, the memo after ``factor`` times as long, how the run ended)."""
+    row = study.run(condition, vertices, share, replicate)
+    numbers = draws(study.config.seed, replicate)
+    encounter = study.encounter(condition, vertices, numbers)
+    work = encounter.start(orientations(numbers), share)
+    memo = np.concatenate([encounter.memo(), [0.0, 0.0, math.inf, -math.inf]])
+    integrator = encounter.system.integrator
+    clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
+    clock[UNTIL] = factor * row["t_end"]
+    status = watcher(study)(encounter.scene, work, memo, clock, counts, np.zeros((0, 13)))
+    return row, memo, Status(status)
+
+
+@pytest.mark.parametrize("vertices", [1, 4, 16])
+@pytest.mark.parametrize("condition", [0, 2], ids=["type I", "type III"])
+def test_no_decision_is_overturned_in_ten_times_the_time(study, condition, vertices):
+    decisions = set()
+    for replicate in range(2 if vertices == 1 else 6):
+        for share in (0.0, 0.5):
+            row, memo, status = go_on(study, condition, vertices, share, replicate)
+            decisions.add(outcome(row))
+            assert status == Status.FINISHED
+            # The sphere code and the polygon code differ in the last bits.
+            assert memo[DECIDED_AT] == pytest.approx(row["t_end"], rel=1e-6)
+            if row["outcome"] in (0, 2):
+                assert memo[DECISION] == BOUND
+                assert memo[WIDEST] <= 0.0
+            elif row["outcome"] in (1, 3):
+                assert memo[DECISION] == DEPARTED
+                assert memo[TIGHTEST] > 0.0
+    assert decisions & {"A", "B", "C", "D"}
+
+
+def test_all_kinds_of_decision_were_put_to_that_test(study):
+    rows = [study.run(0, n, share, k) for n in (4, 16) for share in (0.0, 0.5) for k in range(6)]
+    assert {outcome(row) for row in rows} >= {"A", "B", "D"}
+
+
+def mirrored(shape):
+    """The shape with left and right exchanged."""
+    return SpheroPolygon(shape.vertices * [-1.0, 1.0], shape.radius)
+
+
+class Placed:
+    """An encounter that starts at given places, for `run_encounter`."""
+
+    def __init__(self, encounter, places):
+        """The places (2, 3) [m, m, rad] to start at."""
+        self.encounter, self.places = encounter, places
+
+    def __getattr__(self, name):
+        return getattr(self.encounter, name)
+
+    def start(self, angles, share):
+        """Work arrays at the places, at terminal velocity."""
+        velocity = np.zeros((2, 3))
+        for body in range(2):
+            velocity[body, :2] = self.encounter.settling[body][0]
+        return work_of(self.encounter.scene, self.places, velocity)
+
+
+def start_places(encounter, angles, share):
+    """The places at which an encounter starts."""
+    i, j = encounter.shapes
+    largest = largest_displacement("projected", i, angles[0], j, angles[1])
+    return place_pair((i, j), angles, share * largest, encounter.options.start_gap)
+
+
+@pytest.mark.parametrize("condition", [0, 1, 2])
+@pytest.mark.parametrize("image", ["mirror", "full turn"])
+def test_the_same_scene_seen_otherwise_has_the_same_outcome(study, condition, image):
+    driver = study.driver(study.encounter(0, 4, draws(1, 0)))
+    for replicate in range(5):
+        numbers = draws(study.config.seed, replicate)
+        angles = np.array(orientations(numbers))
+        encounter = study.encounter(condition, 16, numbers)
+        row = study.run(condition, 16, 0.5, replicate)
+        places = start_places(encounter, angles, 0.5)
+        if image == "mirror":
+            shapes = [mirrored(shape) for shape in encounter.shapes]
+            encounter = make_encounter(study.config, shapes, encounter.zone_distance)
+            places = places * [-1.0, 1.0, -1.0]
+        else:
+            places = places + [0.0, 0.0, 2.0 * np.pi]
+        other = run_encounter(Placed(encounter, places), driver, angles, 0.5, 10**6)
+        assert outcome(other) == outcome(row)
+        assert other["inside"] == row["inside"]
+        assert other["d_c_collision"] == pytest.approx(row["d_c_collision"], abs=1e-10, nan_ok=True)
+        assert other["t_collision"] == pytest.approx(row["t_collision"], rel=1e-4, nan_ok=True)
+
+
+def test_beyond_the_largest_displacement_all_miss(study):
+    for condition in range(3):
+        for vertices in (1, 4, 16):
+            row = study.run(condition, vertices, 1.5, 1)
+            assert outcome(row) == "missed"
+            assert row["inside"] == row["crossed_zone"] == NOT_APPLICABLE
+            assert np.isnan([row["d_c_collision"], row["d_c_max"], row["t_collision"]]).all()
+            assert np.isfinite([row["d_c_last"], row["t_end"]]).all()
+
+
+def test_what_is_written_down_of_a_collision_agrees_with_itself(study):
+    for condition in range(3):
+        zone = list(study.zones.values())[condition]
+        for replicate in range(8):
+            row = study.run(condition, 16, 0.25, replicate)
+            assert row["inside"] == (row["d_c_collision"] < zone)
+            assert outcome(row) in ("AB" if row["inside"] else "CD")
+            assert row["d_c_max"] >= max(row["d_c_collision"], row["d_c_last"])
+            assert 0.0 < row["t_collision"] <= row["t_end"]
+            if (row["d_c_last"] < zone) != row["inside"]:
+                assert row["crossed_zone"] == 1
+
+
+def test_the_zone_decides_the_class_but_not_the_motion(study, tmp_path):
+    near = small_study(tmp_path, {"zone": {"centre": "1 um"}})
+    far = small_study(tmp_path, {"zone": {"centre": "1 mm"}})
+    for replicate in range(3):
+        outside, inside = near.run(0, 16, 0.0, replicate), far.run(0, 16, 0.0, replicate)
+        assert (outside["inside"], inside["inside"]) == (0, 1)
+        assert {"C": "A", "D": "B"}[outcome(outside)] == outcome(inside)
+        assert (outside["t_end"], outside["steps"]) == (inside["t_end"], inside["steps"])
+
+
+def test_the_step_budget_ends_a_replicate_undecided(tmp_path):
+    row = small_study(tmp_path, {"integrator": {"max_steps": 5}}).run(0, 16, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("undecided", "step budget")
+    assert row["steps"] + row["rejected"] == 5
+
+
+def test_the_time_limit_ends_a_replicate_undecided(tmp_path):
+    row = small_study(tmp_path, {"scene": {"time_limit": 2e-4}}).run(0, 16, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("undecided", "time limit")
+    assert row["t_end"] == pytest.approx(2e-4)
+    # Where it touched is known all the same.
+    assert row["inside"] in (0, 1)
+
+
+def test_contacts_too_soft_for_the_weight_fail(tmp_path):
+    soft = {"forces": {"contact": {"k_n": 1e-9, "k_t": 1e-10}}}
+    row = small_study(tmp_path, soft).run(0, 4, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("failed", "too deep")
+
+
+def test_bodies_that_settle_alike_never_meet(tmp_path):
+    study = small_study(tmp_path, {"scene": {"pairs": [["10 um", "10 um"]]}})
+    with pytest.raises(UsageError, match="settle at the same speed and never meet") as caught:
+        study.run(0, 1, 0.0, 0)
+    assert "\n" not in str(caught.value)
+
+
+def test_bodies_of_one_size_meet_where_the_lower_one_is_held(tmp_path):
+    scene = {"pairs": [["10 um", "10 um"]], "receiver": "fixed"}
+    study = small_study(tmp_path, {"scene": scene})
+    assert outcome(study.run(0, 1, 0.0, 0)) == "A"
+    encounter = study.encounter(0, 1, draws(1, 0))
+    assert encounter.settling[0][1] == 0.0
+
+
+def test_the_gap_of_the_outlines_is_that_of_shapely(study):
+    rng = np.random.default_rng(5)
+    for replicate in range(3):
+        encounter = study.encounter(0, 16, draws(1, replicate))
+        reach = 1.2 * sum(shape.bounding_radius for shape in encounter.shapes)
+        for _ in range(10):
+            way, *angles = rng.uniform(0.0, 2.0 * np.pi, 3)
+            places = np.array(
+                [[0.0, 0.0, angles[0]], [reach * np.cos(way), reach * np.sin(way), angles[1]]]
+            )
+            cores = [
+                Polygon(1e6 * shape.placed_vertices(*place))
+                for shape, place in zip(encounter.shapes, places, strict=True)
+            ]
+            work = work_of(encounter.scene, places, np.zeros((2, 3)))
+            touching = sum(shape.radius for shape in encounter.shapes)
+            expected = 1e-6 * cores[0].distance(cores[1]) - touching
+            assert outline_gap(encounter.scene, work) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_pair_apart_and_parting_has_departed(study):
+    # The observer by itself, uncompiled: the heavier body below and away, drifting on.
+    encounter = study.encounter(0, 1, draws(1, 0))
+    work = encounter.start((0.0, 0.0), 0.0)
+    memo = encounter.memo()
+    work.motion[NOW, 1, 1] *= -1.0
+    assert watch_pair(encounter.scene, work, memo, 0.0, False) == 0
+    work.motion[NOW, 1, 1] -= 1e-7
+    assert watch_pair(encounter.scene, work, memo, 0.0, False) == outcomes.MISSED
+    memo[outcomes.COLLIDED] = 1.0
+    assert watch_pair(encounter.scene, work, memo, 0.0, False) == DEPARTED
+    work.motion[NOW, 1, 4] *= -1.0
+    assert watch_pair(encounter.scene, work, memo, 0.0, False) == 0
+
+
+def test_codes_of_the_run_reach_the_row(study):
+    # CODE, STEPS and TIME are where `replicate_row` reads them: a shifted layout shows here.
+    assert len({CODE, STEPS}) == 2
+    row = study.run(2, 16, 0.0, 0)
+    assert row["steps"] > 10
+    assert row["t_end"] > TIME
+    assert isinstance(study.encounter(0, 1, draws(1, 0)).shapes[0], Sphere)
