@@ -16,8 +16,9 @@ FORCE, LISTED, COSINE, SINE = 0, 3, 6, 7
 BASE, NEWTON = range(2)
 """Systems in ``Work.system``."""
 
-CANDIDATES, EVALUATIONS, REBUILDS, SOLVES = range(4)
-"""Places in ``Work.tally``: pairs listed; forces evaluated, lists made, systems solved so far."""
+CANDIDATES, EVALUATIONS, REBUILDS, SOLVES, KEPT, TALLY_SIZE = range(6)
+"""Places in ``Work.tally``: pairs listed; forces evaluated, lists made, systems solved so far; one
+more than the displacements set aside for a list that found no room (0: none are)."""
 
 TIME, UNTIL, STEP, TOLERANCE, ERROR, LARGEST_STEP, CLOCK_SIZE = range(7)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), summed

@@ -10,7 +10,7 @@ from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import UsageError
 from flocsim.fields import flag, is_number, quantity
 from flocsim.geometry.shape import Shape
-from flocsim.layout import NOW
+from flocsim.layout import NOW, TALLY_SIZE
 
 
 class BodyView(NamedTuple):
@@ -227,7 +227,7 @@ class Work(NamedTuple):
     last core point of the edge, 1 where the contact acts in this step.
     ``geometry`` (capacity, 7): see flocsim.geometry.contacts.  ``kept`` (capacity, 3): point, edge
     and displacement of pairs while the list is made anew.  ``budget`` (n (n − 1)/2,): motion after
-    which it must be.  ``placed`` (V, 2): core points at the listing.  ``tally`` (4,): see below.
+    which it must be.  ``placed`` (V, 2): core points at the listing.  ``tally``: see flocsim.layout.
     """
 
     motion: np.ndarray
@@ -257,7 +257,7 @@ def work_of(scene, position, velocity, capacity=256):
         kept=np.zeros((capacity, 3)),
         budget=np.full(n * (n - 1) // 2, -1.0),
         placed=np.zeros_like(scene.vertices),
-        tally=np.zeros(4, dtype=np.int64),
+        tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
 
 

@@ -106,20 +106,22 @@ def skin_of(scene, a, b):
 def list_for_surface_force(scene, work, a, b, skin, reach):
     """List what can become the closest pair before the budget is spent; the budget [m]."""
     before = work.tally[CANDIDATES]
+    furthest = reach + 2.0 * skin
     margin = skin
-    while True:
+    least = list_polygons(scene, work, a, b, margin)
+    # A list up to a margin finds the least gap only where that lies below the margin.
+    while margin < least < math.inf or (least == math.inf and margin < furthest):
+        if margin >= furthest:
+            break
+        margin = min(4.0 * margin, furthest)
         work.tally[CANDIDATES] = before
         least = list_polygons(scene, work, a, b, margin)
-        if least == -math.inf:
-            return -math.inf
-        if least <= margin or margin >= reach:
-            break
-        margin = min(4.0 * margin, reach)
-    if least > reach:
-        work.tally[CANDIDATES] = before
-        return min(least, reach + skin) - reach + 0.5 * skin
-    spend = max(0.5 * skin, 0.25 * least)
     work.tally[CANDIDATES] = before
+    if least == -math.inf:
+        return -math.inf
+    if min(least, margin) > reach + skin:
+        return min(least, margin) - reach
+    spend = max(0.5 * skin, 0.25 * least)
     if list_polygons(scene, work, a, b, max(skin, least + 2.0 * spend)) == -math.inf:
         return -math.inf
     return spend
@@ -189,5 +191,6 @@ def list_candidates(scene, work):
             work.budget[pair] = budget
             room = room and budget > 0.0
             pair += 1
-    restore_slips(work, kept)
+    if room:
+        restore_slips(work, kept)
     return room

@@ -2,11 +2,16 @@
 
 import math
 
-from flocsim.layout import CANDIDATES, NOW
+from flocsim.layout import CANDIDATES, KEPT, NOW
 
 
 def keep_slips(work):
-    """Set aside the tangential displacements of the listed pairs; how many there are."""
+    """Set aside the tangential displacements of the listed pairs; how many there are.
+
+    Those that an earlier attempt has set aside, whose list found no room, are still the ones.
+    """
+    if work.tally[KEPT] > 0:
+        return work.tally[KEPT] - 1
     count = 0
     for row in range(work.tally[CANDIDATES]):
         if work.slip[NOW, row] != 0.0:
@@ -14,6 +19,7 @@ def keep_slips(work):
             work.kept[count, 1] = work.candidates[row, 3]
             work.kept[count, 2] = work.slip[NOW, row]
             count += 1
+    work.tally[KEPT] = count + 1
     return count
 
 
@@ -25,6 +31,7 @@ def restore_slips(work, count):
             same = work.kept[k, 0] == work.candidates[row, 1]
             if same and work.kept[k, 1] == work.candidates[row, 3]:
                 work.slip[NOW, row] = work.kept[k, 2]
+    work.tally[KEPT] = 0
 
 
 def nearest_active(work, row):

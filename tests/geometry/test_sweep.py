@@ -119,7 +119,7 @@ def test_edges_bent_ever_so_little(size, sign):
 @pytest.mark.parametrize("radius", [0.05, 0.3])
 def test_five_hundred_vertices(radius):
     angles = np.arange(512) * 2 * np.pi / 512
-    core = (1 + 0.3 * np.cos(9 * angles))[:, None] * np.column_stack(
+    core = (1 + 0.3 * np.cos(8 * angles))[:, None] * np.column_stack(
         [np.cos(angles), np.sin(angles)]
     )
     drawn = shapely.Polygon(core).buffer(radius, quad_segs=3000)
