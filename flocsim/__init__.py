@@ -2,7 +2,7 @@
 
 from flocsim.geometry.sphere import Sphere
 from flocsim.geometry.spheropolygon import SpheroPolygon
-from flocsim.state import Body, Fluid
+from flocsim.body import Body, Fluid
 from flocsim.system import System, Trajectory
 
 __version__ = "0.1.0"

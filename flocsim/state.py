@@ -1,15 +1,9 @@
-"""Body, Fluid, and the tuples of scalars and arrays that kernels see."""
+"""The tuples of scalars and of arrays that kernels and drivers see."""
 
-import math
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
-from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
-from flocsim.errors import UsageError
-from flocsim.fields import flag, is_number, quantity
-from flocsim.geometry.shape import Shape
 from flocsim.layout import NOW, TALLY_SIZE
 
 
@@ -76,124 +70,6 @@ class Scene(NamedTuple):
     parameters: np.ndarray
 
 
-def read_vector(name, length, unit):
-    """An attrs converter: ``length`` finite numbers as a tuple of floats."""
-
-    def convert(values):
-        try:
-            numbers = tuple(float(value) for value in values)
-        except (TypeError, ValueError):
-            numbers = ()
-        if len(numbers) != length or not all(math.isfinite(number) for number in numbers):
-            raise UsageError(f"{name} must be {length} finite numbers [{unit}], found {values!r}")
-        return numbers
-
-    return convert
-
-
-@attrs.frozen(eq=False)
-class Fluid:
-    """The water around the bodies, with an optional linear background flow.
-
-    u(x) = velocity + gradient · x, Ω = ½ (∂u_y/∂x − ∂u_x/∂y); still by default.
-    ``gradient`` = (∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y) [1/s].
-    """
-
-    viscosity: float = quantity("Pa s", above=0.0, default=WATER_VISCOSITY, help="γ")
-    density: float = quantity("kg/m^3", at_least=0.0, default=WATER_DENSITY, help="ρ_f")
-    buoyancy: bool = flag(default=False, help="subtract the displaced fluid's weight")
-    velocity: tuple = attrs.field(
-        default=(0.0, 0.0), converter=read_vector("velocity", 2, "m/s"), metadata={"vector": 2}
-    )
-    gradient: tuple = attrs.field(
-        default=(0.0, 0.0, 0.0, 0.0),
-        converter=read_vector("gradient", 4, "1/s"),
-        metadata={"vector": 4},
-    )
-
-    @property
-    def flow(self):
-        """Velocity and gradient as the parameters (u_x, u_y, g_xx, g_xy, g_yx, g_yy)."""
-        return (*self.velocity, *self.gradient)
-
-
-def check_shape(instance, attribute, value):
-    """attrs validator: the body's shape is a Shape."""
-    if not isinstance(value, Shape):
-        raise UsageError(f"shape must be a Sphere or a SpheroPolygon, found {value!r}")
-
-
-def check_positive_or_none(instance, attribute, value):
-    """attrs validator: None, or a finite number above zero."""
-    if value is not None and not (is_number(value) and value > 0.0):
-        raise UsageError(f"{attribute.name} must be a finite number above 0, found {value!r}")
-
-
-def check_depth(instance, attribute, value):
-    """attrs validator: a depth is "sphere" or a length above zero."""
-    if value != "sphere":
-        check_positive_or_none(instance, attribute, value)
-
-
-@attrs.frozen(eq=False)
-class Body:
-    """A rigid shape with a mass, a place and a motion.
-
-    Mass m = ρ_s A and inertia I = ρ_s J, with ρ_s [kg/m²] either ``surface_density`` or
-    ``density`` · ``depth``; depth is a length [m] or "sphere" = 4/3 r_eq (then m is the mass of the
-    equivalent solid sphere). ``fixed`` bodies do not move.
-    """
-
-    shape: Shape = attrs.field(validator=check_shape)
-    position: tuple = attrs.field(default=(0.0, 0.0), converter=read_vector("position", 2, "m"))
-    angle: float = quantity("rad", default=0.0)
-    velocity: tuple = attrs.field(default=(0.0, 0.0), converter=read_vector("velocity", 2, "m/s"))
-    spin: float = quantity("rad/s", default=0.0)
-    surface_density: float = attrs.field(
-        default=None, kw_only=True, validator=check_positive_or_none
-    )
-    density: float = attrs.field(default=None, kw_only=True, validator=check_positive_or_none)
-    depth: float = attrs.field(default="sphere", kw_only=True, validator=check_depth)
-    fixed: bool = flag(default=False)
-
-    def __attrs_post_init__(self):
-        if (self.surface_density is None) == (self.density is None):
-            raise UsageError(
-                "a body needs either surface_density [kg/m^2] or density [kg/m^3], not both: "
-                f"found surface_density={self.surface_density}, density={self.density}"
-            )
-
-    @property
-    def areal_density(self):
-        """ρ_s [kg/m²]."""
-        if self.surface_density is not None:
-            return self.surface_density
-        if self.depth == "sphere":
-            return self.density * 4.0 / 3.0 * self.shape.equivalent_radius
-        return self.density * self.depth
-
-    @property
-    def mass(self):
-        """m = ρ_s A [kg]."""
-        return self.areal_density * self.shape.area
-
-    @property
-    def inertia(self):
-        """I = ρ_s J [kg m²]."""
-        return self.areal_density * self.shape.second_moment
-
-    def buoyant_mass(self, fluid):
-        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known."""
-        if not fluid.buoyancy:
-            return self.mass
-        if self.density is None:
-            raise UsageError(
-                "buoyancy needs the bodies' density [kg/m^3], but only surface_density is given: "
-                "set bodies.density and bodies.depth, or fluid.buoyancy = false"
-            )
-        return self.mass * (1.0 - fluid.density / self.density)
-
-
 def scene_of(bodies, fluid, parameters):
     """The bodies as one Scene of fresh arrays; ``parameters`` are the forces' numbers."""
     shapes = [body.shape for body in bodies]
@@ -225,8 +101,8 @@ class Work(NamedTuple):
     ``system`` (2, 3n, 3n + 1): linear systems BASE and NEWTON, the load in the last column.
     ``candidates`` (capacity, 6): body of the vertex, its core point, body of the edge, first and
     last core point of the edge, 1 where the contact acts in this step.
-    ``geometry`` (capacity, 7): see flocsim.geometry.contacts.  ``kept`` (capacity, 3): point, edge
-    and displacement of pairs while the list is made anew.  ``budget`` (n (n − 1)/2,): motion after
+    ``geometry`` (capacity, 7): see flocsim.geometry.contacts.  ``kept`` (capacity, 3): point,
+    edge and displacement of pairs while the list is made anew.  ``budget`` (n (n − 1)/2,): motion after
     which it must be.  ``placed`` (V, 2): core points at the listing.  ``tally``: see flocsim.layout.
     """
 

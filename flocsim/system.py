@@ -29,7 +29,8 @@ from flocsim.layout import (
     TOLERANCE,
     UNTIL,
 )
-from flocsim.state import Body, Fluid, scene_of, with_capacity, work_of
+from flocsim.body import Body, Fluid
+from flocsim.state import scene_of, with_capacity, work_of
 
 RECORD_ROWS = 4096
 """Rows of the record between two copies; also the steps between two looks at Ctrl-C."""

@@ -11,7 +11,7 @@ from reference.samples import scene_of
 from reference.shapes import Scene
 
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
-from flocsim.state import Fluid
+from flocsim.body import Fluid
 
 GAPS = ("equivalent_spheres", "surface")
 VISCOSITY, WATER, DENSITY = 8.9e-4, 997.0, 2650.0

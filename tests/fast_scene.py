@@ -90,7 +90,11 @@ class FastScene:
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
         rows = self.work.geometry[: self.work.tally[CANDIDATES]]
-        return {key: row for key, row in zip(keys_of(self.scene, self.work), rows, strict=True) if row[2] < 0.0}
+        return {
+            key: row
+            for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)
+            if row[2] < 0.0
+        }
 
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""

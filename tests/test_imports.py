@@ -26,7 +26,7 @@ ROWS = [
     ["ensembles"],
     ["system", "io"],
     ["forces", "integrators"],
-    ["state"],
+    ["body", "state"],
     ["geometry"],
     ["composer", "slots", "layout", "fields", "constants", "errors"],
 ]

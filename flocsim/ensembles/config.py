@@ -22,7 +22,7 @@ from flocsim.ensembles.config_scene import SceneConfig
 from flocsim.ensembles.presets import PRESETS
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, quantity, word_or_quantity
-from flocsim.state import Fluid
+from flocsim.body import Fluid
 
 LARGEST_SEED = 2**63 - 1
 MOST_REPLICATES = 10**7
@@ -182,7 +182,7 @@ class Config:
 
     @property
     def body_options(self):
-        """The bodies' weight as keyword arguments of flocsim.state.Body."""
+        """The bodies' weight as keyword arguments of flocsim.body.Body."""
         if self.bodies.density is None:
             return {"surface_density": self.bodies.surface_density}
         return {"density": self.bodies.density, "depth": self.bodies.depth}

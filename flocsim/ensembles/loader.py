@@ -27,7 +27,7 @@ from flocsim.ensembles.values import (
     show,
     suggestion,
 )
-from flocsim.state import Fluid
+from flocsim.body import Fluid
 
 TABLES = {
     "scene": SceneConfig,

@@ -24,7 +24,8 @@ from flocsim.layout import (
     TIME,
     UNTIL,
 )
-from flocsim.state import Body, with_capacity, work_of
+from flocsim.body import Body
+from flocsim.state import with_capacity, work_of
 from flocsim.system import System
 
 OBSERVER = {slots.event_value: outcomes.event_of_touch, slots.observe: outcomes.watch_pair}

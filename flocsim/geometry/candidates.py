@@ -138,7 +138,7 @@ def list_pair(scene, work, a, b):
         - scene.bodies[a, BOUNDING_RADIUS]
         - scene.bodies[b, BOUNDING_RADIUS]
     )
-    if apart > max(skin, reach):
+    if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
     if reach > 0.0:
         return list_for_surface_force(scene, work, a, b, skin, reach)

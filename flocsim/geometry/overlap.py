@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.geometry.sweep import cross, distance_to_edges, edges_of, inside_polygon
+from flocsim.geometry.cores import cross, distance_to_edges, edges_of, inside_polygon
 
 
 def edges_cross(a, b):
@@ -55,8 +55,8 @@ def touching_points(a, radius_a, b, radius_b):
     found = []
     for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):
         starts, ends = edges_of(core)
-        if len(starts) == 0:
-            starts = ends = core
+        if len(core) == 1 < len(points):
+            continue  # A sphere has no edge for the vertices of a polygon to touch.
         if len(core) == 1:
             feet = np.broadcast_to(core, (len(points), 1, 2))
         else:

@@ -7,7 +7,8 @@ from flocsim.errors import ShapeError
 from flocsim.geometry.outline import require_simple
 from flocsim.geometry.shape import Shape
 from flocsim.geometry.sphere import positive_radius
-from flocsim.geometry.sweep import signed_area, swept_moments
+from flocsim.geometry.cores import signed_area
+from flocsim.geometry.sweep import swept_moments
 
 TOO_CLOSE = 1e-12
 """Vertices nearer than this share of the polygon's extent count as repeated."""

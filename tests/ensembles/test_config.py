@@ -24,7 +24,7 @@ from flocsim.ensembles.presets import PRESETS
 from flocsim.ensembles.schema_page import schema_page
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.sphere import Sphere
-from flocsim.state import Body
+from flocsim.body import Body
 
 ROOT = Path(__file__).resolve().parents[2]
 

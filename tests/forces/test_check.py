@@ -24,7 +24,7 @@ from flocsim.forces import (
 )
 from flocsim.forces.check import check_kernel
 from flocsim.forces.source import scene_functions
-from flocsim.state import Fluid
+from flocsim.body import Fluid
 
 
 @attrs.frozen
@@ -226,7 +226,7 @@ def test_a_compiled_kernel_is_refused():
 
 
 def test_a_property_that_fails_is_named():
-    with pytest.raises(KernelError, match="'kappa' cannot be computed .*ZeroDivisionError"):
+    with pytest.raises(KernelError, match=r"'kappa' cannot be computed .*ZeroDivisionError"):
         check_kernel(FailingProperty(), Fluid())
 
 

@@ -7,17 +7,18 @@ import pytest
 from fast_scene import bodies_of, keys_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-
-from flocsim import slots
-from flocsim.composer import compose
-from flocsim.geometry.candidates import list_candidates, list_pair, moved
-from flocsim.geometry.contacts import locate_contacts
-from flocsim.layout import CANDIDATES, NOW
-from flocsim.state import Fluid, scene_of, with_capacity, work_of
 from reference import scenes
 from reference.contacts import all_pairs, measure
 from reference.samples import scene_of as random_scene
 from reference.shapes import Scene, make_body
+
+from flocsim import slots
+from flocsim.body import Fluid
+from flocsim.composer import compose
+from flocsim.geometry.candidates import list_candidates, list_pair, moved
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.layout import CANDIDATES, NOW
+from flocsim.state import scene_of, with_capacity, work_of
 
 seeds = st.integers(0, 39)
 directions = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9)
@@ -135,9 +136,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
             for pair, overlap in zip(every.pair, every.overlap, strict=True)
             if {pair[0], pair[2]} == two
         )
-        known = [
-            work.geometry[row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two
-        ]
+        known = [work.geometry[row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two]
         if least < reach:
             assert min(known, default=np.inf) == pytest.approx(least, rel=1e-9, abs=1e-17)
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon
+from flocsim.body import Fluid
 from flocsim.geometry.candidates import list_candidates, spent
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.geometry.handover import hand_over
 from flocsim.integrators.slips import advance_slips
 from flocsim.layout import CANDIDATES, NEW, NOW
-from flocsim.state import Fluid, scene_of, work_of
+from flocsim.state import scene_of, work_of
 
 OVERLAP, RADIUS, BALL = 5e-8, 1e-6, 2e-6
 

@@ -5,12 +5,13 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-
-from flocsim.geometry.sweep import distance_to_edges, edges_of, inside_polygon, swept_moments
 from reference.outline import area_centroid_inertia
 from reference.samples import random_core
 from reference.scenes import c_shape, convex, spiral, star
 from reference.shapes import rotation
+
+from flocsim.geometry.cores import distance_to_edges, edges_of, inside_polygon
+from flocsim.geometry.sweep import swept_moments
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
 

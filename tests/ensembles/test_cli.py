@@ -1,0 +1,209 @@
+"""The command `python -m flocsim.ensemble` without a launcher: options, messages, exit codes."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from small_study import run_command, write_small
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.ensembles import cli
+from flocsim.io.results import read_results, same_data
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with the small config in it, spheres only."""
+    monkeypatch.chdir(tmp_path)
+    write_small(tmp_path, vertices="[1]")
+    return tmp_path
+
+
+def call(capsys, *words):
+    """(exit code, output, errors) of the command, run in this process."""
+    code = cli.main([*map(str, words)])
+    return code, *capsys.readouterr()
+
+
+def failure(capsys, *words):
+    """(exit code, the one line of errors) of a command that stops before it runs anything."""
+    code, output, errors = call(capsys, *words)
+    assert output == ""
+    [line] = errors.splitlines()
+    return code, line
+
+
+def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
+    code, output, errors = call(capsys, "small.toml")
+    assert (code, errors) == (0, "")
+    lines = output.splitlines()
+    assert lines[0].startswith("12 replicates: 2 types x 1 numbers of vertices x 2 displacements")
+    assert "type I" in lines
+    assert lines[-1].startswith("small.h5: 12 replicates in ")
+    assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
+
+
+def test_quiet_prints_nothing(folder, capsys):
+    assert call(capsys, "small.toml", "--quiet") == (0, "", "")
+    assert (folder / "small.h5").exists()
+
+
+def test_options_replace_the_configs_values(folder, capsys):
+    words = ["--seed", 9, "--replicates", 2, "--output", "other.h5", "--quiet"]
+    assert call(capsys, "small.toml", *words) == (0, "", "")
+    assert not (folder / "small.h5").exists()
+    results = read_results(folder / "other.h5")
+    assert results.replicates["outcome"].shape[-1] == 2
+    assert results.run["seed"] == 9
+    # The same as a config that says so itself.
+    write_small(folder, name="same.toml", vertices="[1]", seed=9, replicates=2)
+    assert call(capsys, "same.toml", "--quiet")[0] == 0
+    assert same_data(folder / "small.h5", folder / "other.h5") == []
+    assert call(capsys, "small.toml", "--quiet", "--output", "seed1.h5")[0] == 0
+    assert "replicates/angle_i" in same_data(folder / "seed1.h5", folder / "other.h5")
+
+
+def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
+    code, output, errors = call(capsys, "small.toml", "--dry-run", "--output", "no/where.h5")
+    assert (code, errors) == (0, "")
+    assert output.startswith("4 conditions x 3 replicates = 12, seed 1, 1 rank(s), ")
+    for said in ("D_0 = 45.35 um", "settling 60.29 and 84.58 mm/s", "in:  StokesDrag(",
+                 "out: vertex-edge pairs", "nothing was run (--dry-run)"):  # fmt: skip
+        assert said in output
+    assert [path.name for path in folder.iterdir()] == ["small.toml"]
+
+
+def test_a_dry_run_names_what_is_left_out(folder, capsys):
+    write_small(folder, name="weak.toml", text=(folder / "small.toml").read_text()
+                + '[zone]\ndistance = "1 um"\n[forces.van_der_waals]\nhamaker = 0\n')  # fmt: skip
+    code, output, _ = call(capsys, "weak.toml", "--dry-run")
+    assert code == 0
+    assert "out: VanDerWaals: " in output
+
+
+WRONG = [
+    ({}, ["--output", "."], 74, ". is not an ordinary file"),
+    ({}, ["--output", "no/folder.h5"], 74, "no/folder.h5 could not be written: No such file"),
+    ({}, ["--output", "small.toml"], 2, "writing small.toml would replace small.toml"),
+    ({}, ["--output", ""], 2, "output.file must be a string that is not blank"),
+    ({}, ["--seed", -1], 2, "seed must be an integer from 0"),
+    ({}, ["--replicates", 0], 2, "replicates must be an integer from 1"),
+    ({"replicates": "="}, [], 2, "small.toml:3: not valid TOML"),
+    ({"pool": 'pool = "many"'}, [], 2, "small.toml:9: "),
+    ({"preset": '"tang2014-literal"'}, [], 2, "no attraction zone"),
+    ({"types": "[]\npairs = [[1e-5, 1e-5]]"}, [], 2, "scene.pairs: excludes types"),
+]
+
+
+@pytest.mark.parametrize(("changes", "words", "code", "said"), WRONG)
+def test_what_is_wrong_is_one_line(folder, capsys, changes, words, code, said):
+    write_small(folder, **({"vertices": "[1]"} | changes))
+    found, line = failure(capsys, "small.toml", *words)
+    assert found == code
+    assert said in line
+
+
+MORE = [
+    ('[integrator]\nname = "implicite"', "found 'implicite' (did you mean 'implicit'?)"),
+    ('[integrator]\nname = "velocity_verlet"', "needs integrator.step"),
+    ("[forces]\ndrag = false", "no terminal velocity"),
+    ("[forces]\ncontact = false", "a collision needs a contact force"),
+    ("[forces]\ngravity = false", "settle at the same speed"),
+]
+
+
+@pytest.mark.parametrize(("more", "said"), MORE)
+@pytest.mark.parametrize("words", [[], ["--dry-run"]], ids=["run", "dry run"])
+def test_a_study_that_cannot_be_run_says_so_before_it_starts(folder, capsys, more, said, words):
+    path = folder / "small.toml"
+    path.write_text(f"{path.read_text()}{more}\n")
+    code, line = failure(capsys, "small.toml", *words)
+    assert code == 2
+    assert said in line
+
+
+@pytest.mark.parametrize(
+    ("pair", "said"),
+    [
+        ('["20 um", "10 um"]', "(above) settles at 36.74 mm/s and never reaches the receiving"),
+        ('["10 um", "10 um"]', "settle at the same speed and never meet"),
+    ],
+)
+def test_bodies_that_never_meet_are_found_out(folder, capsys, pair, said):
+    path = folder / "small.toml"
+    path.write_text(path.read_text().replace('types = ["I", "III"]', f"pairs = [{pair}]"))
+    code, line = failure(capsys, "small.toml")
+    assert code == 2
+    assert said in line
+
+
+def test_a_spheroradius_that_fills_the_smallest_body(folder, capsys):
+    write_small(folder, vertices="[1, 4]\nradius = 4.7e-6")
+    code, line = failure(capsys, "small.toml")
+    assert code == 2
+    assert "leaves no room for a core in the smallest body, of r_eq = 4.62e-06 m" in line
+
+
+def write_library(path):
+    """A shape library of one floc, with N = 4 alone."""
+    from flocsim.geometry.fit import fit_mask
+    from flocsim.geometry.synthetic import synthetic_floc
+    from flocsim.io.shape_library import LibraryEntry, write_library
+
+    fit = fit_mask(synthetic_floc((1, 0), 20, 1.8), vertices=4, radius=1.5)
+    write_library(path, [LibraryEntry.of("floc", {4: fit})])
+
+
+def test_no_config_is_not_a_traceback(folder, capsys):
+    assert failure(capsys, "other.toml") == (
+        2,
+        "other.toml: there is no such file; `flocsim init other.toml` writes one",
+    )
+    code, line = failure(capsys, ".")
+    assert code == 2
+    assert "not an ordinary file" in line
+
+
+@pytest.mark.parametrize("words", [[], ["small.toml", "--seed", "x"], ["small.toml", "--bogus"]])
+def test_wrong_arguments_end_with_2(folder, capsys, words):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(words)
+    assert caught.value.code == 2
+    assert "flocsim.ensemble: error: " in capsys.readouterr().err
+
+
+def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypatch):
+    monkeypatch.setattr(cli, "study", lambda *_: 1 / 0)
+    code, _, errors = call(capsys, "small.toml")
+    assert code == 70
+    assert errors.startswith("flocsim: internal error, please report it:\nTraceback")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "flocsim: interrupted; nothing was saved\n"),
+        (MemoryError, 70, "flocsim: out of memory: ask for fewer replicates at a time\n"),
+    ],
+)
+def test_other_ends(folder, capsys, monkeypatch, error, code, said):
+    def end(*_):
+        raise error
+
+    monkeypatch.setattr(cli, "study", end)
+    assert call(capsys, "small.toml") == (code, "", said)
+
+
+def test_the_module_is_a_command(folder):
+    done = run_command(folder, "small.toml", "--replicates", 1, "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    outcome = read_results(folder / "small.h5").replicates["outcome"]
+    assert np.all(outcome[:, :, 0] == 0)
+
+
+def test_help_is_quick_and_loads_no_numba(folder):
+    code = "import sys; from flocsim.ensembles.cli import main\ntry:\n    main(['--help'])\n"
+    code += "finally:\n    print({'numba', 'h5py', 'matplotlib'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.endswith("set()\n")
