@@ -10,8 +10,8 @@ from reference.contacts import contacts
 from reference.samples import scene_of
 from reference.shapes import Scene
 
-from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.body import Fluid
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 
 GAPS = ("equivalent_spheres", "surface")
 VISCOSITY, WATER, DENSITY = 8.9e-4, 997.0, 2650.0

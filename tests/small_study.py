@@ -5,10 +5,12 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flocsim.ensembles.loader import load_config
 from flocsim.ensembles.study import Study
+from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 
 SMALL = """\
 preset = "tang2014"
@@ -60,6 +62,25 @@ def small_study(folder, overrides=None):
     polygons = any(n > 1 for n in shapes.vertices)
     flocs = grown(config.seed, shapes.vertices, shapes.pool) if polygons else []
     return Study(config, flocs=flocs)
+
+
+def write_star_library(path, vertices=(4,), ratios=(8.0, 16.0, 24.0)):
+    """A shape library of one star per size-to-spheroradius ratio, fitted at these N."""
+    entries = [
+        ShapeEntry(
+            f"star {ratio:g}", "stars.png", 1e-6, (0.0, 0.0), 100, ratio, 1.0,
+            {count: star_fit(count, ratio) for count in vertices},
+        )
+        for ratio in ratios
+    ]  # fmt: skip
+    write_library(path, entries)
+
+
+def star_fit(count, ratio):
+    """A star of ``count`` vertices around a spheroradius of 1 um."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    rays = ratio * 1e-6 * np.where(np.arange(count) % 2, 0.7, 1.0)
+    return StoredFit((rays * np.array([np.cos(angles), np.sin(angles)])).T, 1e-6, 3.0)
 
 
 def mpirun():

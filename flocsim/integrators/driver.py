@@ -192,7 +192,8 @@ def advance(scene, work, memo, clock, counts, record):
             continue
         value = event_value(scene, work, memo, NEW) if at_low > 0.0 else math.inf
         at_event = at_low > 0.0 and value <= 0.0
-        close = abs(value) <= event_accuracy(clock) or high - low <= 1e-15 * high
+        narrow = trials > 0 and high - low <= 1e-15 * high
+        close = narrow or abs(value) <= event_accuracy(clock)
         if (at_event or trials > 0) and not close and trials < EVENT_TRIALS:
             # Illinois: halve the value of the end that stays, so that both ends close in.
             if trials == 0:

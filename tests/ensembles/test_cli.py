@@ -5,9 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-from small_study import run_command, write_small
+from small_study import run_command, write_small, write_star_library
 
-from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles import cli
 from flocsim.io.results import read_results, same_data
 
@@ -145,14 +144,22 @@ def test_a_spheroradius_that_fills_the_smallest_body(folder, capsys):
     assert "leaves no room for a core in the smallest body, of r_eq = 4.62e-06 m" in line
 
 
-def write_library(path):
-    """A shape library of one floc, with N = 4 alone."""
-    from flocsim.geometry.fit import fit_mask
-    from flocsim.geometry.synthetic import synthetic_floc
-    from flocsim.io.shape_library import LibraryEntry, write_library
+@pytest.mark.parametrize("ranks", [None, 2])
+def test_a_library_without_the_wanted_number_of_vertices(folder, ranks):
+    write_star_library(folder / "stars.h5", vertices=(4, 8))
+    write_small(folder, vertices='[1, 4, 16]\nsource = "library"\nfile = "stars.h5"', pool=10)
+    done = run_command(folder, "small.toml", ranks=ranks)
+    assert (done.returncode, done.stdout) == (2, "")
+    [line] = done.stderr.splitlines()
+    assert "asks for N = 16, but stars.h5 holds N = 4, 8: fit again" in line
 
-    fit = fit_mask(synthetic_floc((1, 0), 20, 1.8), vertices=4, radius=1.5)
-    write_library(path, [LibraryEntry.of("floc", {4: fit})])
+
+def test_a_library_that_is_none(folder, capsys):
+    (folder / "stars.h5").write_text("no library")
+    write_small(folder, vertices='[4]\nsource = "library"\nfile = "stars.h5"')
+    code, line = failure(capsys, "small.toml")
+    assert code == 74
+    assert line.startswith("stars.h5 is not an HDF5 file")
 
 
 def test_no_config_is_not_a_traceback(folder, capsys):

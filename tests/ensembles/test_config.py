@@ -8,6 +8,7 @@ from pathlib import Path
 import attrs
 import pytest
 
+from flocsim.body import Body
 from flocsim.commands import init
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.ensembles.config import (
@@ -24,7 +25,6 @@ from flocsim.ensembles.presets import PRESETS
 from flocsim.ensembles.schema_page import schema_page
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.sphere import Sphere
-from flocsim.body import Body
 
 ROOT = Path(__file__).resolve().parents[2]
 

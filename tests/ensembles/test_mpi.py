@@ -74,7 +74,9 @@ class Late(CentreForce):
         return 0.0
 """
 
-FAILS_EARLY = 'import os\nif os.environ.get("PMI_RANK") == "1":\n    raise RuntimeError("no licence")\n'
+FAILS_EARLY = (
+    'import os\nif os.environ.get("PMI_RANK") == "1":\n    raise RuntimeError("no licence")\n'
+)
 
 
 def with_force(folder, source, name):

@@ -7,6 +7,7 @@ import attrs
 import numba
 import pytest
 
+from flocsim.body import Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.fields import quantity
 from flocsim.forces import (
@@ -24,7 +25,6 @@ from flocsim.forces import (
 )
 from flocsim.forces.check import check_kernel
 from flocsim.forces.source import scene_functions
-from flocsim.body import Fluid
 
 
 @attrs.frozen

@@ -1,0 +1,137 @@
+"""`flocsim trajectory`: one replicate as pictures and as a file."""
+
+import h5py
+import numpy as np
+import pytest
+from small_study import write_small
+
+from flocsim.__main__ import main
+from flocsim.io.files import read_sealed, seal
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with the small config in it."""
+    monkeypatch.chdir(tmp_path)
+    write_small(tmp_path)
+    return tmp_path
+
+
+def call(capsys, *words):
+    """(exit code, lines of output, lines of errors) of `flocsim trajectory`."""
+    code = main(["trajectory", *map(str, words)])
+    output, errors = capsys.readouterr()
+    return code, output.splitlines(), errors.splitlines()
+
+
+def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
+    words = ["--distance", "d.svg", "--save", "motion.h5", "--type", "III", "--vertices", 4]
+    code, output, errors = call(capsys, "small.toml", *words)
+    assert (code, errors) == (0, [])
+    assert output[0].startswith("type III, N = 4, delta = 0, replicate 0: A; collision at ")
+    assert output[1:] == ["trajectory-0.png", "d.svg", "motion.h5"]
+    assert (folder / "trajectory-0.png").read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in (folder / "d.svg").read_bytes()
+    with h5py.File(folder / "motion.h5") as file:
+        assert file["position"].shape == (len(file["time"]), 2, 3)
+        assert file["vertices_0"].shape == (4, 2)
+        assert file.attrs["config"] == (folder / "small.toml").read_text()
+    sealed = read_sealed(folder / "motion.h5")
+    assert seal(sealed) == (folder / "motion.h5").read_bytes()
+
+
+def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
+    from flocsim.ensembles.cli import main as ensemble
+    from flocsim.io.results import read_results
+
+    assert ensemble(["small.toml", "--quiet"]) == 0
+    words = ["--replicate", 2, "--type", "I", "--vertices", 16, "--delta", 0, "--save", "m.h5"]
+    assert call(capsys, "small.toml", *words)[0] == 0
+    table = read_results(folder / "small.h5").replicates
+    with h5py.File(folder / "m.h5") as file:
+        assert file["time"][-1] == table["t_end"][0, 2, 0, 2]
+        assert file["centre_distance"][-1] == table["d_c_last"][0, 2, 0, 2]
+        assert file["position"][0, :, 2].tolist() == [
+            table["angle_i"][0, 2, 0, 2],
+            table["angle_j"][0, 2, 0, 2],
+        ]
+
+
+def test_the_same_command_makes_the_same_picture(folder, capsys):
+    for name in ("a.png", "b.png"):
+        assert call(capsys, "small.toml", "--vertices", 1, "-o", name)[0] == 0
+    assert (folder / "a.png").read_bytes() == (folder / "b.png").read_bytes()
+    assert call(capsys, "small.toml", "--vertices", 1, "-o", "c.png", "--frames", 3)[0] == 0
+    assert (folder / "a.png").read_bytes() != (folder / "c.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('types = ["III"]\ntime_limit = 1e-4', "undecided (time limit)"),
+        ("", "missed; end at "),
+    ],
+)
+def test_other_ends_are_drawn_as_well(folder, capsys, more, said):
+    write_small(folder, types=more.removeprefix("types = ") or '["III"]', delta="[1.5]")
+    code, output, errors = call(capsys, "small.toml", "--distance", "d.png")
+    assert (code, errors) == (0, [])
+    assert said in output[0]
+    assert "collision" not in output[0]
+
+
+def test_seeds_draw_other_angles(folder, capsys):
+    ends = []
+    for seed in (1, 2, 1):
+        code, output, _ = call(capsys, "small.toml", "--seed", seed, "--vertices", 4)
+        assert code == 0
+        ends.append(output[0])
+    assert ends[0] == ends[2] != ends[1]
+
+
+WRONG = [
+    (["--type", "II"], 2, "--type must be one of I, III, found II"),
+    (["--vertices", 3], 2, "--vertices must be one of 1, 4, 16, found 3"),
+    (["--delta", 0.3], 2, "--delta must be one of 0.0, 1.0, found 0.3"),
+    (["--delta", "nan"], 2, "--delta must be one of 0.0, 1.0, found nan"),
+    (["--replicate", -1], 2, "--replicate must be at least 0, found -1"),
+    (["--frames", 1], 2, "--frames must be from 2 to 50, found 1"),
+    (["--frames", 51], 2, "--frames must be from 2 to 50, found 51"),
+    (["--seed", -3], 2, "seed must be an integer from 0"),
+    (["-o", "strip.gif"], 2, "strip.gif: a figure's name must end in one of .png, .pdf, .svg"),
+    (["--distance", "d"], 2, "d: a figure's name must end in one of .png"),
+    (["-o", "no/folder.png"], 74, "no/folder.png could not be written"),
+    (["--save", "no/folder.h5"], 74, "no/folder.h5 could not be written"),
+    (["--save", "small.toml"], 2, "writing small.toml would replace small.toml"),
+]
+
+
+@pytest.mark.parametrize(("words", "code", "said"), WRONG)
+def test_wrong_options_are_one_line_before_anything_runs(folder, capsys, words, code, said):
+    found, output, errors = call(capsys, "small.toml", *words)
+    assert (found, output, len(errors)) == (code, [], 1)
+    assert said in errors[0]
+    assert [path.name for path in folder.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"preset": '"tang2014-literal"'}, "flocsim: no attraction zone"),
+        ({"seed": "="}, "flocsim: small.toml:2: not valid TOML"),
+    ],
+)
+def test_wrong_configs_are_one_line(folder, capsys, changes, said):
+    write_small(folder, **changes)
+    code, output, errors = call(capsys, "small.toml")
+    assert (code, output, len(errors)) == (2, [], 1)
+    assert errors[0].startswith(said)
+
+
+def test_numbers_of_the_line_are_finite_and_in_order(folder, capsys):
+    _, output, _ = call(capsys, "small.toml", "--vertices", 1)
+    words = output[0].split()
+    touch = float(words[words.index("at") + 1])
+    end = float(words[len(words) - 1 - words[::-1].index("at") + 1])
+    assert np.isfinite([touch, end]).all()
+    assert 0.0 < touch <= end

@@ -1,0 +1,42 @@
+"""Every config in examples/ loads, can be run, and means what its comments say."""
+
+import shutil
+
+import pytest
+from small_study import ROOT, run_command
+
+from flocsim.ensembles.loader import load_config
+from flocsim.ensembles.preflight import check_study
+from flocsim.io.results import read_results
+
+EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+
+
+def test_there_are_examples():
+    assert EXAMPLES
+
+
+@pytest.fixture
+def examples(tmp_path):
+    """A copy of the folder, as a user would make one."""
+    return shutil.copytree(ROOT / "examples", tmp_path / "examples")
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_loads_and_describes_itself(path, examples):
+    check_study(load_config(path))
+    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "nothing was run" in done.stdout
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_a_reduced_example_runs(path, examples):
+    words = ["--replicates", 2, "--output", "out.h5", "--quiet"]
+    done = run_command(examples, path.name, *words, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    table = read_results(examples / "out.h5").probabilities
+    assert table["n_total"].min() == 2
+    assert table["n_failed"].sum() == 0
+    assert table["n_undecided"].sum() == 0
+    assert table["n_collided"].sum() > 0

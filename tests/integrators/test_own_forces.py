@@ -1,0 +1,153 @@
+"""A user's own force of every kind at once, compiled and not, in scenes of one to five bodies."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from flocsim import Body, Sphere, SpheroPolygon, system
+from flocsim.integrators import Implicit, VelocityVerlet
+from trial_scenes import (
+    WATER_VISCOSITY,
+    Hertz,
+    Lubrication,
+    PolygonSystem,
+    Spring,
+    Trap,
+    head_on,
+    hook,
+    momenta,
+    star,
+)
+
+METHODS = [VelocityVerlet(5e-8), Implicit(tolerance=1e-10)]
+by_method = pytest.mark.parametrize("integrator", METHODS, ids=lambda m: type(m).__name__)
+
+
+def own(trap=0.02, upright=1e-13, spring=5e-3, film=2e-6, modulus=1e4, loss=20.0, k_t=2.0):
+    """All four kinds; a film of no reach to speak of and a zero strength switch one off."""
+    return [Trap(trap, upright), Spring(spring, -2e-6), Lubrication(film=film),
+            Hertz(modulus, loss, k_t)]  # fmt: skip
+
+
+def crowd(n):
+    """Up to five bodies of every shape that fall towards each other."""
+    shapes = [star(), hook(), Sphere(4e-6), SpheroPolygon([[-4e-6, 0], [4e-6, 0]], 1e-6),
+              star(5, 4e-6, 0.8e-6)]  # fmt: skip
+    places = [(0, 0), (18e-6, -4e-6), (-15e-6, 3e-6), (0, 16e-6), (3e-6, -19e-6)]
+    speeds = [(0.02, 0.0), (-0.05, 0.01), (0.04, 0), (0, -0.04), (0, 0.05)]
+    return [
+        Body(shapes[k], places[k], 0.3 * k, speeds[k], 200.0 * (k - 1), surface_density=2.0)
+        for k in range(n)
+    ]
+
+
+@by_method
+@pytest.mark.parametrize("n", [1, 3, 5])
+def test_compiled_and_uncompiled_runs_agree(n, integrator):
+    scene = PolygonSystem(crowd(n), own(), integrator)
+    compiled, plain = scene.run(4e-5), scene.run(4e-5, jit=False)
+    assert len(compiled.t) == len(plain.t)
+    grain = [1e-16, 1e-16, 1e-11]
+    assert np.all(np.abs(compiled.position - plain.position) <= grain)
+    assert compiled.evaluations == plain.evaluations
+
+
+@by_method
+@pytest.mark.parametrize("n", [1, 3, 5])
+def test_crowds_reach_the_end_with_few_steps(n, integrator):
+    """Bodies that come within the reach of a surface force do not creep up to it."""
+    found = PolygonSystem(crowd(n), own(), integrator).run(4e-4, max_steps=20_000)
+    assert found.status.name == "FINISHED"
+    assert found.position.shape == (len(found.t), n, 3)
+    assert np.isfinite(found.position).all()
+
+
+@by_method
+def test_crowd_keeps_its_momenta_without_the_trap(integrator):
+    """All pair forces and contacts obey the third law; drift is that of the method alone."""
+    bodies = crowd(5)
+    found = PolygonSystem(bodies, own(trap=0.0, upright=0.0), integrator).run(4e-4)
+    first, last = (momenta(bodies, found.position[k], found.velocity[k]) for k in (0, -1))
+    unit = bodies[0].mass * 0.05 * np.array([1.0, 1.0, 1e-5])
+    allowed = [1e-11, 1e-11, 1e-11 if np.isinf(integrator.tolerance) else 1e-3]
+    assert np.all(np.abs(last - first) / unit < allowed)
+
+
+def test_trap_and_its_torque_against_closed_forms():
+    body = Body(hook(), (3e-6, 0.0), 1e-3, (0.0, 2e-3), surface_density=2.0)
+    linear, turning = math.sqrt(0.02 / body.mass), math.sqrt(1e-13 / body.inertia)
+    system_ = PolygonSystem([body], own(), Implicit(1e-12))
+    t = 2.0 / linear
+    found = system_.run(t)
+    assert found.position[-1, 0, 0] == pytest.approx(3e-6 * math.cos(linear * t), abs=1e-9)
+    assert found.position[-1, 0, 1] == pytest.approx(2e-3 / linear * math.sin(linear * t), abs=1e-9)
+    # Small angles: sin is straight to 2e-7.
+    assert found.position[-1, 0, 2] == pytest.approx(1e-3 * math.cos(turning * t), abs=1e-6)
+
+
+def film_and_contact(t, state, mass, reduced, film):
+    """Two spheres on one line: gap and its rate under lubrication and Hertz's contact."""
+    gap, rate = state
+    force = 0.0
+    if gap < film:
+        force -= 6.0 * math.pi * WATER_VISCOSITY * reduced**2 * rate / max(gap, 1e-8)
+    if gap < 0.0:
+        force += 1e4 * (-gap) ** 1.5 * (1.0 - 20.0 * rate)
+    return [rate, force / mass]
+
+
+@pytest.mark.parametrize(
+    ("integrator", "allowed"), [(VelocityVerlet(2e-9), 1e-9), (Implicit(1e-12), 1e-9)]
+)
+def test_film_and_hertzian_contact_against_an_independent_solver(integrator, allowed):
+    speed, gap, until = 0.5, 1e-6, 6e-5
+    bodies = head_on(speed, gap)
+    mass, reduced, film = bodies[0].mass / 2.0, 2.5e-6, 0.3e-6
+    exact = solve_ivp(
+        film_and_contact, (0.0, until), [gap, -speed], args=(mass, reduced, film),
+        method="LSODA", rtol=1e-10, atol=1e-15, max_step=1e-8,
+    )  # fmt: skip
+    assert exact.y[0].min() < -1e-7
+    forces = own(trap=0.0, upright=0.0, spring=0.0, film=film)
+    found = PolygonSystem(bodies, forces, integrator).run(until)
+    ended = found.position[-1, 1, 0] - found.position[-1, 0, 0] - 1e-5
+    assert ended == pytest.approx(exact.y[0, -1], abs=allowed)
+
+
+@by_method
+def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
+    scene = PolygonSystem(crowd(3), own(), integrator)
+    whole = scene.run(3e-4)
+    monkeypatch.setattr(system, "RECORD_ROWS", 37)
+    pieces = scene.run(3e-4)
+    assert len(whole.t) > 300
+    for name in ("t", "position", "velocity"):
+        assert np.array_equal(getattr(whole, name), getattr(pieces, name))
+    assert (whole.steps, whole.evaluations) == (pieces.steps, pieces.evaluations)
+
+
+def test_more_rows_than_the_record_holds():
+    found = PolygonSystem(crowd(3), own(), VelocityVerlet(5e-8)).run(5e-4)
+    assert found.steps > 2 * system.RECORD_ROWS
+    assert len(found.t) == found.steps + 1
+    assert np.all(np.diff(found.t) > 0.0)
+    assert np.allclose(np.diff(found.t)[:-1], 5e-8, rtol=1e-6)
+
+
+@by_method
+def test_without_a_record_only_start_and_end_are_kept(integrator):
+    scene = PolygonSystem(crowd(3), own(), integrator)
+    full, short = scene.run(1e-4), scene.run(1e-4, record=False)
+    assert short.position.shape == (2, 3, 3)
+    for name in ("t", "position", "velocity"):
+        assert np.array_equal(getattr(short, name), getattr(full, name)[[0, -1]])
+
+
+@by_method
+def test_runs_repeat_to_the_last_bit(integrator):
+    scene = PolygonSystem(crowd(5), own(), integrator)
+    first, again = scene.run(2e-4), scene.run(2e-4)
+    assert np.array_equal(first.position, again.position)
+    assert np.array_equal(first.velocity, again.velocity)

@@ -1,0 +1,65 @@
+"""Trajectory files: what is written can be read, by any HDF5 library."""
+
+import h5py
+import numpy as np
+import pytest
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.errors import FileError
+from flocsim.io.files import read_sealed
+from flocsim.io.trajectory import DATASETS, write_trajectory
+
+SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
+
+
+def motion(count=5):
+    """Times (k,), positions and velocities (k, 2, 3) of random numbers."""
+    rng = np.random.default_rng(4)
+    return np.sort(rng.random(count)), rng.random((count, 2, 3)), rng.random((count, 2, 3))
+
+
+def written(path, **facts):
+    """The motion that was written to the path."""
+    arrays = motion()
+    write_trajectory(path, *arrays, SHAPES, facts)
+    return arrays
+
+
+def test_arrays_come_back_with_units(tmp_path):
+    times, position, velocity = written(tmp_path / "m.h5")
+    with h5py.File(tmp_path / "m.h5") as file:
+        for name, array in (("time", times), ("position", position), ("velocity", velocity)):
+            np.testing.assert_array_equal(file[name][()], array)
+        gaps = position[:, 1, :2] - position[:, 0, :2]
+        np.testing.assert_allclose(file["centre_distance"][()] ** 2, (gaps**2).sum(axis=1))
+        for name, (units, text) in DATASETS.items():
+            assert (file[name].attrs["units"], file[name].attrs["long_name"]) == (units, text)
+
+
+def test_shapes_and_facts_come_back(tmp_path):
+    written(tmp_path / "m.h5", config='preset = "si"', replicate=17, zone_distance=4.5e-5)
+    with h5py.File(tmp_path / "m.h5") as file:
+        for body, shape in enumerate(SHAPES):
+            np.testing.assert_array_equal(file[f"vertices_{body}"][()], shape.vertices)
+            assert file[f"vertices_{body}"].attrs["radius"] == shape.radius
+            assert file[f"vertices_{body}"].attrs["units"] == "m"
+        assert file.attrs["kind"] == "flocsim trajectory"
+        assert file.attrs["config"] == 'preset = "si"'
+        assert file.attrs["replicate"] == 17
+        assert file.attrs["zone_distance"] == 4.5e-5
+
+
+def test_the_same_motion_gives_the_same_sealed_bytes(tmp_path):
+    written(tmp_path / "a.h5", replicate=1)
+    written(tmp_path / "b.h5", replicate=1)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    damaged = bytearray((tmp_path / "a.h5").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "a.h5").write_bytes(damaged)
+    with pytest.raises(FileError, match="is damaged"):
+        read_sealed(tmp_path / "a.h5")
+
+
+def test_a_file_that_cannot_be_written(tmp_path):
+    with pytest.raises(FileError, match="could not be written"):
+        written(tmp_path / "no" / "m.h5")
