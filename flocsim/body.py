@@ -81,7 +81,8 @@ class Body:
 
     Mass m = ρ_s A and inertia I = ρ_s J, with ρ_s [kg/m²] either ``surface_density`` or
     ``density`` · ``depth``; depth is a length [m] or "sphere" = 4/3 r_eq (then m is the mass of the
-    equivalent solid sphere). ``fixed`` bodies do not move.
+    equivalent solid sphere). A ``fixed`` body is held: no force
+    changes its velocity, which is zero unless given.
     """
 
     shape: Shape = attrs.field(validator=check_shape)

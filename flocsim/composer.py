@@ -11,77 +11,18 @@ numba's symbol table, where two of them can collide and silently return each oth
 """
 
 import builtins
-import hashlib
 import os
+import re
 import sys
 import types
 import warnings
 from pathlib import Path
 
 from flocsim.errors import KernelError
-
-LITERALS = (bool, int, float, complex, str, bytes, type(None))
-"""Types of globals that a kernel may read: their value is part of the hash."""
+from flocsim.fingerprint import fingerprint, reached, refuse_closure
 
 _composed = {}
 _warned = []
-
-
-def where(function):
-    """ "name (file:line)" of a function, for messages."""
-    code = function.__code__
-    return f"{function.__qualname__} ({code.co_filename}:{code.co_firstlineno})"
-
-
-def refuse_closure(function):
-    """KernelError where the function captures variables."""
-    if function.__closure__:
-        captured = ", ".join(function.__code__.co_freevars)
-        raise KernelError(
-            f"kernel {where(function)} captures {captured}; "
-            "make it a parameter (a field of the force) or a module constant"
-        )
-
-
-def names_in(code):
-    """Global names that the code reads, those of nested code included."""
-    names = set(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            names |= names_in(constant)
-    return names
-
-
-def plain(value):
-    """The Python function behind a compiled one; anything else as it is."""
-    return getattr(value, "py_func", value)
-
-
-def reached(function):
-    """The globals that a function reads: {name: value}."""
-    known = function.__globals__
-    names = sorted(names_in(function.__code__))
-    return {name: plain(known[name]) for name in names if name in known}
-
-
-def code_digest(code):
-    """A hash of what the code does; line numbers and file names do not matter."""
-    constants = [
-        code_digest(c) if isinstance(c, types.CodeType) else repr(c) for c in code.co_consts
-    ]
-    parts = (code.co_code, constants, code.co_names, code.co_varnames, code.co_argcount)
-    return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
-
-
-def describe(name, value):
-    """One line about a global that is no function, for the hash; None for what may change."""
-    if isinstance(value, types.ModuleType):
-        return f"{name}=module {value.__name__}"
-    if isinstance(value, type):
-        return f"{name}=class {value.__name__} {getattr(value, '_fields', ())}"
-    if isinstance(value, LITERALS) or callable(value):
-        return f"{name}={value!r}" if isinstance(value, LITERALS) else f"{name}={value.__name__}"
-    return None
 
 
 class Linker:
@@ -112,39 +53,6 @@ class Linker:
         copy.__qualname__ = f"{function.__qualname__}_{len(self.clones)}"
         copy.__module__ = function.__module__
         return copy
-
-
-def fingerprint(entry, fillings):
-    """A hash of everything that the composed function does."""
-    import numba
-    import numpy
-
-    lines = [sys.version, numba.__version__, numpy.__version__]
-    seen = set()
-
-    def visit(function):
-        function = fillings.get(function, function)
-        if function in seen:
-            return
-        seen.add(function)
-        refuse_closure(function)
-        lines.append(f"{function.__qualname__} {code_digest(function.__code__)}")
-        lines.append(repr(function.__defaults__))
-        for name, value in reached(function).items():
-            if isinstance(value, types.FunctionType):
-                lines.append(f"{name}->{fillings.get(value, value).__qualname__}")
-                visit(value)
-                continue
-            line = describe(name, value)
-            if line is None:
-                raise KernelError(
-                    f"kernel {where(function)} reads the global {name!r}, a "
-                    f"{type(value).__name__} that can change; make it a parameter or a number"
-                )
-            lines.append(line)
-
-    visit(entry)
-    return hashlib.blake2b("\n".join(lines).encode(), digest_size=12).hexdigest()
 
 
 def cache_folder():
@@ -208,7 +116,33 @@ def compiled(entry, fillings, name):
     sys.modules[name] = module
     module.driver = Linker(fillings, transform).link(entry)
     exec(compile(text, str(path), "exec"), module.__dict__)
-    return numba.njit(module.run, nogil=True, cache=folder is not None, error_model="numpy")
+    dispatcher = numba.njit(module.run, nogil=True, cache=folder is not None, error_model="numpy")
+    return guarded(dispatcher, numba.core.errors.NumbaError)
+
+
+def guarded(dispatcher, compiler_error):
+    """The compiled function; code that cannot be compiled gives a KernelError, one line."""
+
+    def call(*arguments):
+        try:
+            return dispatcher(*arguments)
+        except compiler_error as error:
+            raise KernelError(compiler_complaint(str(error))) from None
+
+    return call
+
+
+def compiler_complaint(text):
+    """ "file:line: what is wrong" from numba's many lines: the innermost place that it names."""
+    words, complaint = "", ""
+    for line in text.splitlines():
+        found = re.match(r'\s*File "(.+)", line (\d+)', line)
+        if found:
+            complaint = f"{found[1]}:{found[2]}: {words}"
+        elif line.strip():
+            words = line.strip()
+    complaint = complaint or text.strip().splitlines()[0]
+    return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
 
 
 def compose(entry, fillings, *, jit=True):

@@ -101,9 +101,10 @@ class Work(NamedTuple):
     ``system`` (2, 3n, 3n + 1): linear systems BASE and NEWTON, the load in the last column.
     ``candidates`` (capacity, 6): body of the vertex, its core point, body of the edge, first and
     last core point of the edge, 1 where the contact acts in this step.
-    ``geometry`` (capacity, 7): see flocsim.geometry.contacts.  ``kept`` (capacity, 3): point,
-    edge and displacement of pairs while the list is made anew.  ``budget`` (n (n − 1)/2,): motion after
-    which it must be.  ``placed`` (V, 2): core points at the listing.  ``tally``: see flocsim.layout.
+    ``geometry`` (capacity, 7): see flocsim.geometry.contacts.
+    ``kept`` (capacity, 3): point, edge and displacement of pairs while the list is made anew.
+    ``budget`` (n (n − 1)/2,): how far two bodies may move until it must be.
+    ``placed`` (V, 2): core points at the listing.  ``tally``: counts, see flocsim.layout.
     """
 
     motion: np.ndarray

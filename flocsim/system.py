@@ -6,6 +6,7 @@ from itertools import combinations
 import attrs
 import numpy as np
 
+from flocsim.body import Body, Fluid
 from flocsim.composer import compose
 from flocsim.errors import UsageError
 from flocsim.forces.base import Force
@@ -29,7 +30,6 @@ from flocsim.layout import (
     TOLERANCE,
     UNTIL,
 )
-from flocsim.body import Body, Fluid
 from flocsim.state import scene_of, with_capacity, work_of
 
 RECORD_ROWS = 4096

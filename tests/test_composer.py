@@ -7,8 +7,9 @@ import warnings
 import pytest
 
 from flocsim import Body, Sphere, System, composer
-from flocsim.composer import compose, fingerprint
+from flocsim.composer import compose
 from flocsim.errors import KernelError
+from flocsim.fingerprint import fingerprint
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators.explicit import sum_forces
 

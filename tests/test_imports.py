@@ -28,9 +28,14 @@ ROWS = [
     ["forces", "integrators"],
     ["body", "state"],
     ["geometry"],
-    ["composer", "slots", "layout", "fields", "constants", "errors"],
+    ["composer", "fingerprint", "slots", "layout", "fields", "constants", "errors"],
 ]
-SIBLING_IMPORTS = {("composer", "constants"), ("composer", "errors")}
+SIBLING_IMPORTS = {
+    ("composer", "constants"),
+    ("composer", "errors"),
+    ("composer", "fingerprint"),
+    ("fingerprint", "errors"),
+}
 
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {

@@ -7,6 +7,7 @@ import os
 import sys
 import traceback
 
+from flocsim.ensembles.progress import tell
 from flocsim.ensembles.team import Alone, find_team, launched_rank
 from flocsim.errors import FlocsimError
 
@@ -77,12 +78,11 @@ def study(config, team, arguments):
     write_results(config.output.file, results)
     if not arguments.quiet:
         table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-        print(table)
+        tell(table)
         seconds = results.run["wall_time"]
-        print(
+        tell(
             f"{config.output.file}: {results.replicates['outcome'].size} replicates in "
-            f"{seconds:.1f} s, {results.replicates['outcome'].size / seconds:.0f}/s",
-            flush=True,
+            f"{seconds:.1f} s, {results.replicates['outcome'].size / seconds:.0f}/s"
         )
 
 
@@ -95,7 +95,7 @@ def work(team, arguments):
         from flocsim.ensembles.dry_run import dry_run
 
         if team.rank == 0:
-            print(dry_run(config, team), flush=True)
+            tell(dry_run(config, team))
         return 0
     study(config, team, arguments)
     return 0

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.body import Fluid
 from flocsim.ensembles.config_fields import (
     LARGEST_LENGTH,
     items_reader,
@@ -22,7 +23,6 @@ from flocsim.ensembles.config_scene import SceneConfig
 from flocsim.ensembles.presets import PRESETS
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, quantity, word_or_quantity
-from flocsim.body import Fluid
 
 LARGEST_SEED = 2**63 - 1
 MOST_REPLICATES = 10**7

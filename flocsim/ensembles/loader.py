@@ -5,6 +5,7 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.body import Fluid
 from flocsim.ensembles.config import (
     BodiesConfig,
     Config,
@@ -27,7 +28,6 @@ from flocsim.ensembles.values import (
     show,
     suggestion,
 )
-from flocsim.body import Fluid
 
 TABLES = {
     "scene": SceneConfig,

@@ -1,8 +1,12 @@
 """Ranks under MPI. The only importer of mpi4py."""
 
 import sys
+import time
 
 from flocsim.errors import UsageError
+
+LAST_WORDS = 0.5
+"""Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
 
 
 def load_mpi():
@@ -53,4 +57,5 @@ class MpiTeam:
         """End the whole job: every rank, wherever it is."""
         sys.stdout.flush()
         sys.stderr.flush()
+        time.sleep(LAST_WORDS)
         self.world.Abort(code)

@@ -1,5 +1,6 @@
 """How far a study has come, as whole lines or as one line that renews itself on a terminal."""
 
+import os
 import sys
 import time
 
@@ -19,6 +20,15 @@ def duration(seconds):
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
 
 
+def tell(text, stream=None, end="\n"):
+    """Print; a reader that has gone (`| head`) must not cost a study its results."""
+    stream = stream or sys.stdout
+    try:
+        print(text, end=end, file=stream, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 class Progress:
     """Reports on rank 0; its own share of the work stands for everybody's."""
 
@@ -34,7 +44,7 @@ class Progress:
     def say(self, text):
         """Print a line, unless quiet."""
         if not self.quiet:
-            print(text, file=self.stream, flush=True)
+            tell(text, self.stream)
 
     def report(self, share):
         """Report that a share of the work is done, if it is time to."""
@@ -46,12 +56,12 @@ class Progress:
         text = f"{share:4.0%}  {int(share * self.total)} of {self.total} replicates, "
         text += f"{duration(left)} left"
         if self.tty:
-            print(f"\r{text:<70}", end="", file=self.stream, flush=True)
+            tell(f"\r{text:<70}", self.stream, end="")
         else:
-            print(text, file=self.stream, flush=True)
+            tell(text, self.stream)
 
     def finish(self):
         """End the line that renews itself; the seconds since the start."""
         if self.tty and not self.quiet:
-            print("\r" + " " * 70 + "\r", end="", file=self.stream, flush=True)
+            tell("\r" + " " * 70 + "\r", self.stream, end="")
         return time.monotonic() - self.began

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from flocsim import slots
+from flocsim.body import Body
 from flocsim.ensembles import outcomes
 from flocsim.ensembles.failures import collided, outcome_of
 from flocsim.ensembles.methods import make_integrator
@@ -24,7 +25,6 @@ from flocsim.layout import (
     TIME,
     UNTIL,
 )
-from flocsim.body import Body
 from flocsim.state import with_capacity, work_of
 from flocsim.system import System
 

@@ -8,9 +8,10 @@ import types
 from numbers import Real
 
 import attrs
+import numpy as np
 
-from flocsim.composer import refuse_closure, where
 from flocsim.errors import KernelError
+from flocsim.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.state import BodyView, ContactView, PairView
 
@@ -156,6 +157,38 @@ def check_results(force, fluid, kernel, samples, *parts):
         if not is_kind(result, len(parts)):
             wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
             raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
+
+
+class Watched:
+    """A view that notes which of its fields are read, by name, by index, or by unpacking."""
+
+    def __init__(self, view):
+        """``read`` collects the names."""
+        self.view, self.read = view, set()
+
+    def __getattr__(self, name):
+        self.read.add(name)
+        return getattr(self.view, name)
+
+    def __getitem__(self, index):
+        self.read.update(np.atleast_1d(self.view._fields[index]).tolist())
+        return self.view[index]
+
+
+def fields_read(force, fluid, kernel, samples):
+    """Names that a kernel reads of its view: those in its code and its helpers', and those that
+    it is seen to read without a name."""
+    names, pending, known = set(), [kernel], set()
+    while pending:
+        function = pending.pop()
+        known.add(function)
+        names |= names_in(function.__code__)
+        called = [value for value in reached(function).values() if inspect.isfunction(value)]
+        pending += [each for each in called if each not in known]
+    watched = [Watched(view) for view in samples]
+    for _ in results(force, kernel, watched, kernel_arguments(force, fluid, kernel)):
+        pass
+    return names.union(*(each.read for each in watched))
 
 
 def reach_of(force):

@@ -5,7 +5,6 @@ values never recompile. What a scene does not need (absent forces, forces out of
 derivatives of what no kernel reads) is not written.
 """
 
-import inspect
 import math
 
 import attrs
@@ -13,7 +12,14 @@ import attrs
 from flocsim import slots
 from flocsim.errors import UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
-from flocsim.forces.check import check_kernel, kernel_arguments, reach_of
+from flocsim.forces.check import (
+    SAMPLE_BODIES,
+    check_kernel,
+    fields_read,
+    kernel_arguments,
+    reach_of,
+    sample_pairs,
+)
 from flocsim.state import PairView
 
 VELOCITIES = {"vx", "vy", "spin"}
@@ -45,15 +51,6 @@ def call_text(pieces, namespace, force, fluid, kernel, view):
     arguments = kernel_arguments(force, fluid, kernel)
     values = [append_value(pieces.parameters, value) for value in arguments]
     return name, f"{name}({', '.join([view, *values])})"
-
-
-def attributes_read(kernel):
-    """Names of the view's fields that the kernel reads."""
-    names = set(kernel.__code__.co_names)
-    for value in kernel.__globals__.values():
-        if inspect.isfunction(value) and value.__name__ in names:
-            names |= set(value.__code__.co_names)
-    return names
 
 
 def sum_function(name, view, terms, zeros):
@@ -95,7 +92,7 @@ def body_text(pieces, namespace, forces, fluid):
     for force in forces:
         kernel = force.kernel_in(fluid)
         _, call = call_text(pieces, namespace, force, fluid, kernel, "body")
-        reads = attributes_read(kernel)
+        reads = fields_read(force, fluid, kernel, SAMPLE_BODIES)
         terms["body_force"].append(("", call))
         if reads & VELOCITIES:
             terms["velocity_force"].append(("", call))
@@ -123,7 +120,8 @@ def pair_text(pieces, namespace, forces, fluid, kind):
         else:
             _, slope = call_text(pieces, namespace, force, fluid, force.slope, "pair")
             slope_terms.append((condition, slope))
-        if "gap_rate" in attributes_read(force.kernel):
+        samples = sample_pairs(reach_of(force))
+        if "gap_rate" in fields_read(force, fluid, force.kernel, samples):
             size = "(1e-3 * abs(pair.gap_rate) + 1e-9)"
             change = difference_text(call, name, "gap_rate", size)
             damping_terms.append((condition, f"-({change})"))

@@ -4,10 +4,10 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ShapeError
+from flocsim.geometry.cores import signed_area
 from flocsim.geometry.outline import require_simple
 from flocsim.geometry.shape import Shape
 from flocsim.geometry.sphere import positive_radius
-from flocsim.geometry.cores import signed_area
 from flocsim.geometry.sweep import swept_moments
 
 TOO_CLOSE = 1e-12

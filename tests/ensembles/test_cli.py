@@ -91,7 +91,7 @@ WRONG = [
     ({"replicates": "="}, [], 2, "small.toml:3: not valid TOML"),
     ({"pool": 'pool = "many"'}, [], 2, "small.toml:9: "),
     ({"preset": '"tang2014-literal"'}, [], 2, "no attraction zone"),
-    ({"types": "[]\npairs = [[1e-5, 1e-5]]"}, [], 2, "scene.pairs: excludes types"),
+    ({"types": '["I"]\npairs = [[1e-5, 2e-5]]'}, [], 2, "excludes"),
 ]
 
 

@@ -5,11 +5,11 @@ import math
 import attrs
 import numpy as np
 import pytest
+from trial_scenes import ELASTIC, PolygonSystem, Spring, comb, encounter, head_on, watched
 
 from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Contact, StokesDrag
 from flocsim.integrators import Implicit, Status, VelocityVerlet
-from trial_scenes import ELASTIC, PolygonSystem, Spring, comb, encounter, head_on, watched
 
 METHODS = [VelocityVerlet(1e-8), Implicit(tolerance=1e-10)]
 ROUGH = Contact(k_n=20.0, k_t=2.0, damping_n=3e4, friction=0.4)
@@ -29,7 +29,7 @@ class Undefined(BodyForce):
 
 @attrs.frozen
 class Relay(BodyForce):
-    """A force of one strength that always points to x = 0: it jumps where the body comes to rest."""
+    """A force of one strength that always points to x = 0, where it jumps."""
 
     size: float = 1e-6
 

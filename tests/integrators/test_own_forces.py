@@ -5,9 +5,6 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-
-from flocsim import Body, Sphere, SpheroPolygon, system
-from flocsim.integrators import Implicit, VelocityVerlet
 from trial_scenes import (
     WATER_VISCOSITY,
     Hertz,
@@ -20,6 +17,9 @@ from trial_scenes import (
     momenta,
     star,
 )
+
+from flocsim import Body, Sphere, SpheroPolygon, system
+from flocsim.integrators import Implicit, VelocityVerlet
 
 METHODS = [VelocityVerlet(5e-8), Implicit(tolerance=1e-10)]
 by_method = pytest.mark.parametrize("integrator", METHODS, ids=lambda m: type(m).__name__)

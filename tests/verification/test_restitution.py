@@ -6,11 +6,11 @@ The bodies are spheres, run through the code for polygons: the same compiled sce
 import math
 
 import pytest
+from reference.closed_forms import impact
+from trial_scenes import PolygonSystem, Spring, head_on, watched
 
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit, VelocityVerlet
-from reference.closed_forms import impact
-from trial_scenes import PolygonSystem, Spring, head_on, watched
 
 K_N, SPEED, GAP = 20.0, 1e-3, 1e-7
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from reference.closed_forms import relaxation_time, terminal_velocity
+from trial_scenes import WATER_VISCOSITY, hook
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Gravity, StokesDrag
 from flocsim.integrators import Implicit, VelocityVerlet
-from reference.closed_forms import relaxation_time, terminal_velocity
-from trial_scenes import WATER_VISCOSITY, hook
 
 RADIUS = 5e-6
 BUOYANT = Fluid(viscosity=WATER_VISCOSITY, density=997.0, buoyancy=True)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from trial_scenes import ELASTIC, PolygonSystem, Spring, hook, star, watched
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.integrators import Implicit, VelocityVerlet
-from trial_scenes import ELASTIC, PolygonSystem, Spring, hook, star, watched
 
 STIFFNESS = 1e-2
 

@@ -1,0 +1,219 @@
+"""System and Trajectory: arguments, records, what is left out. Every run is uncompiled."""
+
+import attrs
+import numpy as np
+import pytest
+from trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
+
+from flocsim import Body, Fluid, Sphere, System
+from flocsim.errors import FlocsimError, UsageError
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.geometry import contacts, spheres_only
+from flocsim.integrators import Implicit, Status, VelocityVerlet
+
+BALL = Body(Sphere(5e-6), surface_density=2.0)
+NAN, INF = float("nan"), float("inf")
+
+REFUSED = {
+    "no bodies": (lambda: System([]), "at least one Body"),
+    "a class for a body": (lambda: System([Body]), "must be flocsim Body objects"),
+    "a shape for a body": (lambda: System([Sphere(1e-6)]), "must be flocsim Body objects"),
+    "a class for a force": (lambda: System([BALL], [Gravity]), r"write Gravity\(…\)"),
+    "a word for a force": (lambda: System([BALL], ["gravity"]), "'gravity'"),
+    "a class for an integrator": (lambda: System([BALL], [], Implicit), "Integrator object"),
+    "a word for an integrator": (lambda: System([BALL], [], "implicit"), "'implicit'"),
+    "until 0": (lambda: System([BALL]).run(0.0), "above 0 s, found 0"),
+    "until negative": (lambda: System([BALL]).run(-1.0), "found -1"),
+    "until not a number": (lambda: System([BALL]).run(NAN), "found nan"),
+    "position not finite": (lambda: attrs.evolve(BALL, position=(NAN, 0.0)), "position must be 2"),
+    "position of three": (lambda: attrs.evolve(BALL, position=(0, 0, 0)), "position must be 2"),
+    "velocity not finite": (lambda: attrs.evolve(BALL, velocity=(0, INF)), "velocity must be 2"),
+    "no density": (lambda: Body(Sphere(1e-6)), "either surface_density"),
+    "both densities": (lambda: Body(Sphere(1e-6), surface_density=2.0, density=1.0), "not both"),
+    "negative density": (lambda: Body(Sphere(1e-6), density=-1.0), "above 0, found -1"),
+    "depth a word": (lambda: Body(Sphere(1e-6), density=1.0, depth="flat"), "found 'flat'"),
+    "a number for a shape": (lambda: Body(3, surface_density=2.0), "Sphere or a SpheroPolygon"),
+    "buoyancy without density": (
+        lambda: System([BALL], [Gravity()], fluid=Fluid(buoyancy=True)).run(1e-3),
+        "buoyancy needs the bodies' density",
+    ),
+    "too deep a start": (lambda: System(head_on(gap=-6e-6)).run(1e-3), "bodies 0 and 1 start"),
+    "the same place": (lambda: System([BALL, BALL]).run(1e-3), "move them apart"),
+    "one core inside another": (
+        lambda: System([Body(star(size=4e-5), surface_density=2.0), BALL]).run(1e-3),
+        "one core inside",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED.values(), ids=list(REFUSED))
+def test_wrong_arguments_get_one_line(make, says):
+    with pytest.raises(UsageError, match=says) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+UNTYPED = {
+    "a body that is not in a list": lambda: System(BALL),
+    "a number for the bodies": lambda: System(3),
+    "a force that is not in a list": lambda: System([BALL], Gravity()),
+    "a number for the fluid": lambda: System([BALL], fluid=3),
+    "until a word": lambda: System([BALL]).run("1e-3"),
+    "until None": lambda: System([BALL]).run(None),
+    "max_steps a word": lambda: System([BALL]).run(1e-3, max_steps="many"),
+    "angle not finite": lambda: attrs.evolve(BALL, angle=NAN),
+    "tolerance negative": lambda: Implicit(tolerance=-1.0),
+    "step zero": lambda: VelocityVerlet(step=0.0),
+    "viscosity zero": lambda: Fluid(viscosity=0.0),
+}
+
+
+@pytest.mark.xfail(strict=True, raises=(TypeError, ValueError), reason="error of Python or attrs")
+@pytest.mark.parametrize("make", UNTYPED.values(), ids=list(UNTYPED))
+def test_wrong_arguments_get_an_error_of_flocsim(make):
+    with pytest.raises(FlocsimError):
+        make()
+
+
+@pytest.mark.parametrize("max_steps", [0, 1, 5])
+def test_the_step_budget_is_kept(max_steps):
+    system = System([BALL], [Gravity(), StokesDrag()], VelocityVerlet(1e-6))
+    found = system.run(1.0, max_steps=max_steps, jit=False)
+    assert found.status is Status.STEP_BUDGET
+    assert found.steps == max_steps
+    assert len(found.t) == max_steps + 1
+
+
+def falling(integrator, **options):
+    """Two sand grains that fall side by side, one of them a hook."""
+    bodies = [
+        Body(Sphere(5e-6), (0.0, 0.0), 0.1, (1e-3, 0.0), 5.0, density=2650.0),
+        Body(hook(), (50e-6, 1e-6), -0.2, (0.0, 2e-3), -5.0, density=2650.0),
+    ]
+    return System(bodies, [Gravity(), StokesDrag()], integrator).run(2e-5, jit=False, **options)
+
+
+@pytest.mark.parametrize("integrator", [VelocityVerlet(1e-6), Implicit(1e-11)])
+def test_fields_and_shapes_of_a_trajectory(integrator):
+    found = falling(integrator)
+    k = len(found.t)
+    assert found.status is Status.FINISHED
+    assert found.position.shape == found.velocity.shape == (k, 2, 3)
+    assert k == found.steps + 1
+    assert found.t[0] == 0.0
+    assert found.t[-1] == pytest.approx(2e-5, rel=1e-14)
+    assert np.all(np.diff(found.t) > 0.0)
+    assert found.position[0].tolist() == [[0.0, 0.0, 0.1], [50e-6, 1e-6, -0.2]]
+    assert found.velocity[0].tolist() == [[1e-3, 0.0, 5.0], [0.0, 2e-3, -5.0]]
+    assert found.rejected >= 0
+    assert found.wall_time > 0.0
+
+
+def test_evaluations_and_error_of_both_methods():
+    fixed, adaptive = falling(VelocityVerlet(1e-6)), falling(Implicit(1e-11))
+    assert fixed.evaluations == 2 * fixed.steps
+    assert adaptive.evaluations == 3 * (adaptive.steps + adaptive.rejected)
+    assert np.isnan(fixed.error)
+    assert 0.0 < adaptive.error <= adaptive.steps * 1e-11
+
+
+def test_positions_are_the_integral_of_velocities():
+    found = falling(VelocityVerlet(1e-7))
+    steps = np.diff(found.t)[:, None, None]
+    middle = 0.5 * (found.velocity[1:] + found.velocity[:-1])
+    travelled = np.sum(steps * middle, axis=0)
+    moved = found.position[-1] - found.position[0]
+    assert np.abs(moved - travelled).max() < 1e-4 * np.abs(travelled).max()
+
+
+def test_a_system_can_be_run_again():
+    system = System([BALL], [Gravity()], Implicit())
+    first, again = system.run(1e-3, jit=False), system.run(1e-3, jit=False)
+    assert np.array_equal(first.position, again.position)
+    assert BALL.position == (0.0, 0.0)
+
+
+def test_no_force_at_all_is_free_flight():
+    body = attrs.evolve(BALL, velocity=(1e-3, -2e-3), spin=3.0)
+    found = System([body]).run(0.5, jit=False)
+    assert found.position[-1, 0] == pytest.approx([5e-4, -1e-3, 1.5], rel=1e-12)
+
+
+def test_explain_names_what_is_in_and_what_is_out():
+    forces = [Gravity(g=0.0), StokesDrag(), VanDerWaals(hamaker=0.0), DoubleLayer(potential=0.0)]
+    lines = System([BALL], [*forces, Contact()]).explain().splitlines()
+    assert lines[0].startswith("1 bod")
+    assert "spheres only" in lines[0]
+    for name in ("StokesDrag", "Contact"):
+        assert any(line.startswith(f"in:  {name}") for line in lines)
+    for name, why in (("Gravity", "g is zero"), ("VanDerWaals", "hamaker"), ("DoubleLayer", "po")):
+        assert any(line.startswith(f"out: {name}: {why}") for line in lines)
+    assert any(line.startswith("out:") and "no body has an edge" in line for line in lines)
+
+
+def test_explain_of_polygons_leaves_no_polygon_code_out():
+    text = System([attrs.evolve(BALL, shape=hook())], [Contact()]).explain()
+    assert "polygons" in text
+    assert "no body has an edge" not in text
+
+
+def test_absent_forces_are_not_called():
+    """The same run, bit for bit, with and without forces of zero strength."""
+    bodies = head_on()
+    absent = [Gravity(g=0.0), VanDerWaals(hamaker=0.0), DoubleLayer(potential=0.0)]
+    ends = [System(bodies, [ELASTIC, *more]).run(2e-4, jit=False) for more in ([], absent)]
+    assert np.array_equal(ends[0].position, ends[1].position)
+    assert (
+        System(bodies, [ELASTIC, *absent]).pieces.parameters
+        == System(bodies, [ELASTIC]).pieces.parameters
+    )
+
+
+def names_reached(function, seen=None):
+    """Names of all plain functions that an uncompiled driver reaches."""
+    seen = {} if seen is None else seen
+    if function not in seen:
+        seen[function] = function.__qualname__
+        for value in function.__globals__.values():
+            if type(value) is type(function):
+                names_reached(value, seen)
+    return set(seen.values())
+
+
+def test_spheres_alone_reach_no_polygon_code():
+    def code_of(system):
+        return " ".join(names_reached(system.compose(jit=False)))
+
+    spheres, polygons = (
+        code_of(System(head_on(), [ELASTIC])),
+        code_of(System([BALL, Body(hook(), (5e-5, 0.0), surface_density=2.0)], [ELASTIC])),
+    )
+    for name in ("locate_polygons", "list_one_way", "edge_end", "turned"):
+        assert name in polygons
+        assert name not in spheres
+    for name in ("locate_spheres", "list_spheres"):
+        assert name in spheres
+    fillings = System(head_on(), [ELASTIC]).fillings()
+    assert fillings[contacts.locate_polygons] is contacts.locate_spheres
+    assert spheres_only.FILLINGS.items() <= fillings.items()
+
+
+CLOSE_FORCES = [
+    Gravity(), StokesDrag(), VanDerWaals(1e-18, gap="surface"), VanDerWaals(1e-18),
+    DoubleLayer(15e-3, 1e-8, gap="surface"), Contact(k_n=20.0, k_t=2.0, friction=0.3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("integrator", [VelocityVerlet(4e-8), Implicit(1e-10)])
+def test_spheres_by_their_own_code_and_by_that_of_polygons(integrator):
+    bodies = [attrs.evolve(b, spin=300.0) for b in head_on(1e-2)]
+    bodies[1] = attrs.evolve(bodies[1], position=(5e-6, 2e-6))
+    own, general = (
+        kind(bodies, CLOSE_FORCES, integrator).run(6e-5, jit=False)
+        for kind in (System, PolygonSystem)
+    )
+    assert len(own.t) == len(general.t)
+    # A core point at a hair's breadth from the centroid is turned, that of a sphere is not.
+    assert np.abs(own.position - general.position).max() < 1e-14
+    gap = np.hypot(*(own.position[:, 0] - own.position[:, 1])[:, :2].T) - 1e-5
+    assert gap.min() < 0.0
