@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 
+from flocsim import __version__
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory
 from flocsim.errors import FlocsimError
 
@@ -16,6 +17,7 @@ def make_parser():
         prog="flocsim",
         description="When two flocs of real shape meet in water: do they collide, do they stick?",
     )
+    parser.add_argument("--version", action="version", version=f"flocsim {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS:
         command.add_parser(subparsers)

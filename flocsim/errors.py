@@ -20,6 +20,10 @@ class ConfigError(UsageError):
     """Wrong entries of a config file; each line names the key, the finding, the remedy."""
 
 
+class RangeError(UsageError, ValueError):
+    """A value outside what a field takes."""
+
+
 class ShapeError(UsageError, ValueError):
     """Vertices or a radius that do not make a body."""
 

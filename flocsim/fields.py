@@ -5,14 +5,26 @@ config loader read "16.41 um" and refuse "3 kg". Metadata keys: ``unit``, ``help
 """
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 
 import attrs
+
+from flocsim.errors import RangeError
 
 
 def is_number(value):
     """A finite real number; True and False are not numbers."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def is_whole(value):
+    """An integer; True and False are none."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def describe_range(above=None, at_least=None, at_most=None):
@@ -34,7 +46,7 @@ def range_validator(above=None, at_least=None, at_most=None):
         )
         if not within:
             allowed = describe_range(above, at_least, at_most)
-            raise ValueError(f"{attribute.name} must be {allowed}, found {value!r}")
+            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
     return check
 
@@ -55,7 +67,7 @@ def choice(*options, default=attrs.NOTHING, help=""):
     def check(instance, attribute, value):
         if value not in options:
             allowed = " or ".join(repr(option) for option in options)
-            raise ValueError(f"{attribute.name} must be {allowed}, found {value!r}")
+            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
     return attrs.field(
         default=default, validator=check, metadata={"choices": options, "help": help}
@@ -71,7 +83,7 @@ def word_or_quantity(word, unit, *, above=None, at_least=None, default=attrs.NOT
             return
         if isinstance(value, str):
             allowed = describe_range(above=above, at_least=at_least)
-            raise ValueError(f"{attribute.name} must be {word!r} or {allowed}, found {value!r}")
+            raise RangeError(f"{attribute.name} must be {word!r} or {allowed}, found {value!r}")
         number(instance, attribute, value)
 
     allowed = f"{word!r} or {describe_range(above=above, at_least=at_least)}"
@@ -87,6 +99,6 @@ def flag(*, default=attrs.NOTHING, help=""):
 
     def check(instance, attribute, value):
         if not isinstance(value, bool):
-            raise ValueError(f"{attribute.name} must be true or false, found {value!r}")
+            raise RangeError(f"{attribute.name} must be true or false, found {value!r}")
 
     return attrs.field(default=default, validator=check, metadata={"help": help, "flag": True})

@@ -9,6 +9,7 @@ import numpy as np
 from flocsim.body import Body, Fluid
 from flocsim.composer import compose
 from flocsim.errors import UsageError
+from flocsim.fields import is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.source import scene_functions
 from flocsim.geometry import spheres_only
@@ -57,9 +58,17 @@ class Trajectory:
     wall_time: float
 
 
+def as_tuple(values, what):
+    """A sequence as a tuple; UsageError for one lone object."""
+    try:
+        return tuple(values)
+    except TypeError:
+        raise UsageError(f"{what} must be a list, found {values!r}: write [{what}]") from None
+
+
 def check_bodies(bodies):
     """The bodies as a tuple; UsageError for none, or for what is no Body."""
-    bodies = tuple(bodies)
+    bodies = as_tuple(bodies, "bodies")
     if not bodies:
         raise UsageError("a System needs at least one Body")
     for body in bodies:
@@ -70,7 +79,7 @@ def check_bodies(bodies):
 
 def check_forces(forces):
     """The forces as a tuple; UsageError for what is no Force object."""
-    forces = tuple(forces)
+    forces = as_tuple(forces, "forces")
     for force in forces:
         if isinstance(force, type) and issubclass(force, Force):
             raise UsageError(
@@ -78,6 +87,20 @@ def check_forces(forces):
                 f"{force.__name__}(…) with its parameters"
             )
     return forces
+
+
+def check_fluid(instance, attribute, value):
+    """attrs validator: a Fluid object."""
+    if not isinstance(value, Fluid):
+        raise UsageError(f"the fluid must be a Fluid object, found {value!r}")
+
+
+def check_limits(until, max_steps):
+    """UsageError unless ``until`` is a time above zero and ``max_steps`` a whole number."""
+    if not is_number(until) or not until > 0.0:
+        raise UsageError(f"until must be a time above 0 s, found {until!r}")
+    if not is_whole(max_steps) or max_steps < 0:
+        raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
 
 
 def check_integrator(instance, attribute, value):
@@ -101,7 +124,7 @@ class System:
     bodies: tuple = attrs.field(converter=check_bodies)
     forces: tuple = attrs.field(default=(), converter=check_forces)
     integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
-    fluid: Fluid = attrs.field(factory=Fluid, validator=attrs.validators.instance_of(Fluid))
+    fluid: Fluid = attrs.field(factory=Fluid, validator=check_fluid)
     pieces: object = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self):
@@ -148,8 +171,7 @@ class System:
 
         A run that ends early says why in ``Trajectory.status``; it raises no exception.
         """
-        if not until > 0.0:
-            raise UsageError(f"until must be a time above 0 s, found {until!r}")
+        check_limits(until, max_steps)
         self.check_overlaps()
         began = time.perf_counter()
         run = Run(self, until, max_steps, record, jit)

@@ -1,6 +1,7 @@
 """What every test run shares: one thread per process, no display, repeatable random examples."""
 
 import os
+from pathlib import Path
 
 from hypothesis import settings
 
@@ -8,6 +9,10 @@ from hypothesis import settings
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# Compiled scenes of the tests are kept apart from the user's, and from one run to the next.
+CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
+os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
 
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
 settings.register_profile("repeatable", deadline=None, derandomize=True)

@@ -68,7 +68,6 @@ UNTYPED = {
 }
 
 
-@pytest.mark.xfail(strict=True, raises=(TypeError, ValueError), reason="error of Python or attrs")
 @pytest.mark.parametrize("make", UNTYPED.values(), ids=list(UNTYPED))
 def test_wrong_arguments_get_an_error_of_flocsim(make):
     with pytest.raises(FlocsimError):

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import attrs
+
 from flocsim.errors import UsageError
 
 
@@ -52,6 +54,11 @@ def select(config, args):
     vertex_count = vertices[chosen(args.vertices, vertices, "--vertices", -1)]
     delta = config.scene.delta
     return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
+
+
+def with_one_count(config, vertex_count):
+    """The config with one number of vertices: the flocs need no fits at the others."""
+    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
 
 def check_outputs(config_path, figures, others):
@@ -126,7 +133,7 @@ def run(args):
     check_study(config)
     figures = [path for path in (strip_path(args), args.distance) if path]
     check_outputs(args.config, figures, [args.save] if args.save else [])
-    study = Study(config)
+    study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)
     encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))

@@ -1,6 +1,7 @@
 """How the end of a replicate's run is written down: outcome and reason."""
 
-from flocsim.ensembles.outcomes import BOUND, COLLIDED, DEPARTED, INSIDE, MISSED
+from flocsim.ensembles.memo import COLLIDED, INSIDE
+from flocsim.ensembles.outcomes import BOUND, DEPARTED, MISSED
 from flocsim.integrators.status import Status
 from flocsim.io.results_schema import OUTCOMES
 

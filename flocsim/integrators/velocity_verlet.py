@@ -35,7 +35,9 @@ def verlet_attempt(scene, work, clock, step):
     kick(scene, work, NOW, HALF, 0.5 * step)
     advance_slips(scene, work, HALF, NOW, NEW, step)
     drift(work, step)
-    sum_forces(scene, work, time + step, NEW, HALF, NEW)
+    # Drag at the half step's velocity would be half a step late: take a whole kick's instead.
+    kick(scene, work, NOW, NEW, step)
+    sum_forces(scene, work, time + step, NEW, NEW, NEW)
     kick(scene, work, HALF, NEW, 0.5 * step)
     if not all_finite(work, NEW):
         return -1.0

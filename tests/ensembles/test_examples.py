@@ -30,8 +30,16 @@ def test_an_example_loads_and_describes_itself(path, examples):
     assert "nothing was run" in done.stdout
 
 
+REDUCED = {"own_force": ("vertices = [1, 16]", "vertices = [16]")}
+"""Name → (text, its replacement) where that saves compiling a scene of its own for spheres."""
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_a_reduced_example_runs(path, examples):
+    whole, reduced = REDUCED.get(path.stem, ("", ""))
+    assert whole in path.read_text("utf-8")
+    text = path.read_text("utf-8").replace(whole, reduced)
+    (examples / path.name).write_text(text, "utf-8")
     words = ["--replicates", 2, "--output", "out.h5", "--quiet"]
     done = run_command(examples, path.name, *words, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -9,9 +9,10 @@ from shapely.geometry import Polygon
 from small_study import small_study
 
 from flocsim import SpheroPolygon
-from flocsim.ensembles import outcomes
+from flocsim.ensembles import bonds, outcomes
+from flocsim.ensembles import memo as memo_at
 from flocsim.ensembles.failures import FAILURES
-from flocsim.ensembles.outcomes import BOUND, DEPARTED, MEMO_SIZE, outline_gap, watch_pair
+from flocsim.ensembles.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
 from flocsim.ensembles.sampling import draws, orientations
 from flocsim.ensembles.scene import OBSERVER, make_encounter, run_encounter
 from flocsim.ensembles.start import largest_displacement, place_pair
@@ -22,7 +23,7 @@ from flocsim.layout import NOW, UNTIL
 from flocsim.slots import observe
 from flocsim.state import work_of
 
-DECISION, DECIDED_AT, WIDEST, LAST = range(MEMO_SIZE, MEMO_SIZE + 4)
+DECISION, DECIDED_AT, WIDEST, LAST = range(memo_at.MEMO_SIZE, memo_at.MEMO_SIZE + 4)
 """What `keep_watching` adds to the memo: the first decision, its time, the largest distance of the
 outlines from then on, and the last."""
 
@@ -258,11 +259,29 @@ def test_a_pair_apart_and_parting_has_departed(study):
 
     def seen(gap, collided):
         work.motion[NOW, 1, :2] = 0.0, -(contact + gap)
-        memo[outcomes.COLLIDED] = collided
+        memo[memo_at.COLLIDED] = collided
         return watch_pair(encounter.scene, work, memo, 0.0, False)
 
-    escape = memo[outcomes.ESCAPE]
+    escape = memo[memo_at.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
     work.motion[NOW, 1, 4] = 0.0
     assert seen(1.01 * escape, 1.0) == 0
+
+
+def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
+    # It is at rest within itself as it swings through its lowest point; what it will do at the
+    # turning point, where the load is another, is not known yet.
+    encounter = study.encounter(0, 1, draws(1, 0))
+    work, memo = encounter.start((0.0, 0.0), 0.0), encounter.memo()
+    spin, reach = 300.0, 39e-6
+    work.motion[NOW] = 0.0
+    work.motion[NOW, :, 5] = spin
+    work.motion[NOW, 1, 1] = -reach
+    work.motion[NOW, 1, 3] = spin * reach
+    later = 2.0 * memo[memo_at.REST_TIME]
+    bonds.start_rest(work, memo, 0.0)
+    assert not bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)
+    # Without the swing it does.
+    work.motion[NOW, :, 3:] = 0.0
+    assert bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)

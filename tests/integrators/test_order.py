@@ -62,7 +62,6 @@ def fall_error(integrator):
     return abs(found.velocity[-1, 0, 1] / terminal + 1.0 - math.exp(-1.0))
 
 
-@pytest.mark.xfail(strict=True, reason="the second half kick takes drag at the half-step velocity")
 def test_velocity_verlet_is_of_second_order_with_drag():
     tau = 1.6541822721598005e-05
     errors = [fall_error(VelocityVerlet(tau / n)) for n in (20, 40, 80)]

@@ -21,7 +21,7 @@ CLIPPED = {
 """{z: e} of Schwager & Pöschel (2007)."""
 
 METHODS = [
-    pytest.param(VelocityVerlet(2e-9), 3e-3, id="velocity_verlet"),
+    pytest.param(VelocityVerlet(1e-9), 3e-3, id="velocity_verlet"),
     pytest.param(Implicit(tolerance=1e-16), 3e-3, id="implicit"),
 ]
 """Method and what it may be off: a damped contact closes with a jump of the force."""
