@@ -6,6 +6,7 @@ import sys
 
 from flocsim import __version__
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory
+from flocsim.ensembles.progress import plain_warnings
 from flocsim.errors import FlocsimError
 
 COMMANDS = (init, fit, ensemble, trajectory, plot, info)
@@ -34,6 +35,7 @@ def tolerant_streams():
 def main(argv=None):
     """Run a subcommand; the exit code. Errors are one line on stderr."""
     tolerant_streams()
+    plain_warnings()
     arguments = make_parser().parse_args(argv)
     try:
         return arguments.run(arguments)

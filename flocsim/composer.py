@@ -57,24 +57,34 @@ class Linker:
 
 def cache_folder():
     """The folder of compiled scenes, or None where it cannot be written (said once)."""
-    import platformdirs
-
-    folder = Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
+    folder = cache_path()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / f".probe-{os.getpid()}"
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        if not _warned:
-            _warned.append(folder)
-            warnings.warn(
-                f"no compiled code is kept: the cache folder {folder} cannot be written "
-                f"({error.strerror}); set FLOCSIM_CACHE to one that can",
-                stacklevel=2,
-            )
+        warn_uncached(error)
         return None
     return folder
+
+
+def warn_uncached(error):
+    """Say once that compiled code cannot be kept."""
+    if not _warned:
+        _warned.append(error)
+        warnings.warn(
+            f"no compiled code is kept: the cache folder {cache_path()} cannot be written "
+            f"({error.strerror}); set FLOCSIM_CACHE to one that can",
+            stacklevel=2,
+        )
+
+
+def cache_path():
+    """Where compiled scenes should go."""
+    import platformdirs
+
+    return Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
 
 
 def entry_source(entry):
@@ -128,6 +138,10 @@ def guarded(dispatcher, compiler_error):
             return dispatcher(*arguments)
         except compiler_error as error:
             raise KernelError(compiler_complaint(str(error))) from None
+        except OSError as error:
+            # Compiled, but the disk took no copy: go on with what is in memory.
+            warn_uncached(error)
+            return dispatcher(*arguments)
 
     return call
 

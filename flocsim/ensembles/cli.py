@@ -3,11 +3,10 @@
 import argparse
 import contextlib
 import io
-import os
 import sys
 import traceback
 
-from flocsim.ensembles.progress import tell
+from flocsim.ensembles.progress import plain_warnings, tell
 from flocsim.ensembles.team import Alone, find_team, launched_rank
 from flocsim.errors import FlocsimError
 
@@ -75,10 +74,12 @@ def study(config, team, arguments):
     results = run(config, team, quiet=arguments.quiet)
     if team.rank > 0:
         return
+    # The table first: should the disk be full, it is not lost with the file.
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    if not arguments.quiet:
+        tell(table)
     write_results(config.output.file, results)
     if not arguments.quiet:
-        table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-        tell(table)
         seconds = results.run["wall_time"]
         tell(
             f"{config.output.file}: {results.replicates['outcome'].size} replicates in "
@@ -127,12 +128,11 @@ def guarded(team, arguments):
 
 def run_command(arguments):
     """Find the ranks of the job and do the work; the exit code."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     try:
         team = find_team()
     except FlocsimError as error:
         return end_all(Alone(), str(error), error.exit_code)
+    plain_warnings(silent=team.rank > 0)
     return guarded(team, arguments)
 
 

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+import warnings
 
 LINE_SECONDS = 5.0
 """Seconds between two lines where the output is no terminal."""
@@ -18,6 +19,16 @@ def duration(seconds):
     if seconds < 6000:
         return f"{int(seconds) // 60} min {int(seconds) % 60:02d} s"
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
+
+
+def plain_warnings(silent=False):
+    """From now on a warning is one line on stderr, without the place in the code; or none."""
+
+    def show(message, category, filename, lineno, file=None, line=None):
+        if not silent:
+            print(f"flocsim: {message}", file=sys.stderr, flush=True)
+
+    warnings.showwarning = show
 
 
 def tell(text, stream=None, end="\n"):

@@ -1,0 +1,68 @@
+"""How many outcomes change with the integrator's tolerance: the numerical error of a study.
+
+    python benchmarks/tolerance.py CONFIG [--tolerances 1e-9 1e-10 1e-11] [--replicates 100]
+
+runs the config's study at every tolerance, in one process, and compares each with the tightest.
+"""
+
+import argparse
+import subprocess
+import sys
+
+import numpy as np
+
+from flocsim.ensembles.loader import load_config
+from flocsim.ensembles.runner import run
+from flocsim.io.results import CLASSES
+
+
+def commit():
+    """The commit that is measured, "-dirty" where files differ from it."""
+    command = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
+
+
+def study(arguments, tolerance):
+    """Results of the config at a tolerance [m]."""
+    changes = {"integrator": {"tolerance": tolerance}}
+    if arguments.replicates:
+        changes["replicates"] = arguments.replicates
+    return run(load_config(arguments.config, changes))
+
+
+def share(changed, among):
+    """Percent of the cells in ``among`` that have changed."""
+    return 100.0 * np.count_nonzero(changed & among) / max(np.count_nonzero(among), 1)
+
+
+def compare(found, exact):
+    """(aggregation flips, zone flips, any flips below the largest δ) in percent."""
+    a, b = found.replicates["outcome"], exact.replicates["outcome"]
+    decided = (a < len(CLASSES)) & (b < len(CLASSES))
+    polygons = np.broadcast_to((found.vertices > 1)[None, :, None, None], a.shape)
+    inner = np.broadcast_to((found.delta < found.delta.max())[None, None, :, None], a.shape)
+    zone = found.replicates["inside"] != exact.replicates["inside"]
+    return share(a % 2 != b % 2, decided), share(zone, decided), share(a != b, polygons & inner)
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("config")
+    parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-9, 1e-10, 1e-11])
+    parser.add_argument("--replicates", type=int)
+    arguments = parser.parse_args()
+    print(f"commit {commit()}; {' '.join(sys.argv)}")
+    results = {tolerance: study(arguments, tolerance) for tolerance in arguments.tolerances}
+    exact = results[min(results)]
+    print("tolerance [m]  aggregation flips  zone flips  any flip, inner delta  replicates/s")
+    for tolerance, found in sorted(results.items(), reverse=True):
+        flips = compare(found, exact)
+        rate = found.replicates["outcome"].size / found.run["wall_time"]
+        print(
+            f"{tolerance:13g}  {flips[0]:15.2f} %  {flips[1]:8.2f} %  {flips[2]:19.2f} %  {rate:12.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
