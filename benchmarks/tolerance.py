@@ -55,13 +55,12 @@ def main():
     print(f"commit {commit()}; {' '.join(sys.argv)}")
     results = {tolerance: study(arguments, tolerance) for tolerance in arguments.tolerances}
     exact = results[min(results)]
-    print("tolerance [m]  aggregation flips  zone flips  any flip, inner delta  replicates/s")
+    print("tolerance [m]  aggregation flip          zone flip    any, inner delta  replicates/s")
     for tolerance, found in sorted(results.items(), reverse=True):
         flips = compare(found, exact)
         rate = found.replicates["outcome"].size / found.run["wall_time"]
-        print(
-            f"{tolerance:13g}  {flips[0]:15.2f} %  {flips[1]:8.2f} %  {flips[2]:19.2f} %  {rate:12.0f}"
-        )
+        shares = "  ".join(f"{flip:15.2f} %" for flip in flips)
+        print(f"{tolerance:13g}  {shares}  {rate:12.0f}")
 
 
 if __name__ == "__main__":

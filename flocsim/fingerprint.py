@@ -106,9 +106,16 @@ def describe(name, value):
         return f"{name}=module {value.__name__}"
     if isinstance(value, type):
         return f"{name}=class {value.__name__} {getattr(value, '_fields', ())}"
-    if isinstance(value, LITERALS) or callable(value):
-        return f"{name}={value!r}" if isinstance(value, LITERALS) else f"{name}={value.__name__}"
-    return None
+    if is_literal(value):
+        return f"{name}={value!r}"
+    return f"{name}={value.__name__}" if callable(value) else None
+
+
+def is_literal(value):
+    """Whether a value is a number, a text, or a tuple of such: what cannot change."""
+    if isinstance(value, tuple):
+        return all(is_literal(part) for part in value)
+    return isinstance(value, LITERALS)
 
 
 def fingerprint(entry, fillings):

@@ -5,6 +5,7 @@ import math
 from flocsim.geometry.candidates import list_candidates, spent
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.geometry.handover import hand_over
+from flocsim.integrators.events import NO_BRACKET, between, is_located, narrowed
 from flocsim.layout import (
     BOUNDING_RADIUS,
     CANDIDATES,
@@ -35,18 +36,9 @@ FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED,
 SMALLEST_STEP = 1e-14
 """A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
 
-EVENT_ACCURACY = 1e-3
-"""Events are located to this share of the tolerance …"""
-
-EVENT_FLOOR = 1e-13
-"""… but not finer than this [m]."""
-
 EVENT_GRAIN = 0.02
 """While an event is awaited, a step moves the bodies by no more than 0.9 of the gap, or this share
 of r_i + r_j: what a straight step can then cut off a corner is below 1e-4 of r_i + r_j."""
-
-EVENT_TRIALS = 60
-"""Steps tried to locate one event; the bracket is then as narrow as floats allow."""
 
 DEEPEST = 0.5
 """Largest overlap as a share of r_i + r_j (constants.DEEPEST_OVERLAP)."""
@@ -107,14 +99,6 @@ def choose_step(scene, work, clock, lists, awaiting):
     return min(step, left)
 
 
-def between(low, high, at_low, at_high):
-    """Where a straight line through two values crosses zero; the middle where it does not."""
-    trial = (low * at_high - high * at_low) / (at_high - at_low)
-    if low < trial < high:
-        return trial
-    return 0.5 * (low + high)
-
-
 def accept(scene, work, clock, counts, step, ratio, lists):
     """Make the new state the current one."""
     for body in range(work.motion.shape[1]):
@@ -150,11 +134,34 @@ def record_row(work, clock, counts, record):
     counts[RECORDED] = row + 1
 
 
-def event_accuracy(clock):
-    """How near to an event's zero a located step must end [m]."""
-    if clock[TOLERANCE] == math.inf:
-        return EVENT_FLOOR
-    return max(EVENT_ACCURACY * clock[TOLERANCE], EVENT_FLOOR)
+def pause_reason(clock, counts, record):
+    """The Status that ends the loop before the next step; 0 to go on."""
+    if counts[STEPS] + counts[REJECTED] >= counts[MAX_STEPS]:
+        return STEP_BUDGET
+    if counts[STEPS] >= counts[PAUSE_AT]:
+        return PAUSED
+    if record.shape[0] > 0 and counts[RECORDED] == record.shape[0]:
+        return RECORD_FULL
+    return 0
+
+
+def keep_lists(scene, work):
+    """Make the candidate lists anew where half their budget is spent; False without room."""
+    if spent(scene, work, NOW) > 0.5:
+        if not list_candidates(scene, work):
+            return False
+        locate_contacts(scene, work, NOW)
+    return True
+
+
+def look(scene, work, memo, clock, counts, record, lists, at_event):
+    """Record and watch the state that has been accepted: a Status, or 0 to go on."""
+    if record.shape[0] > 0:
+        record_row(work, clock, counts, record)
+    if lists and too_deep(scene, work):
+        return TOO_DEEP
+    counts[CODE] = observe(scene, work, memo, clock[TIME], at_event)
+    return STOPPED if counts[CODE] != 0 else 0
 
 
 def advance(scene, work, memo, clock, counts, record):
@@ -163,62 +170,42 @@ def advance(scene, work, memo, clock, counts, record):
     ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
     """
     lists = has_contact() or surface_reach(scene.parameters) > 0.0
-    low, high, at_low, at_high, side, trials = 0.0, 0.0, 0.0, 0.0, 0, 0
+    bracket = NO_BRACKET
     while clock[TIME] < clock[UNTIL]:
-        if counts[STEPS] + counts[REJECTED] >= counts[MAX_STEPS]:
-            return STEP_BUDGET
-        if counts[STEPS] >= counts[PAUSE_AT]:
-            return PAUSED
-        if record.shape[0] > 0 and counts[RECORDED] == record.shape[0]:
-            return RECORD_FULL
-        if lists and spent(scene, work, NOW) > 0.5:
-            if not list_candidates(scene, work):
-                return NO_ROOM
-            locate_contacts(scene, work, NOW)
-        if trials == 0:
-            at_low = event_value(scene, work, memo, NOW)
-            step = choose_step(scene, work, clock, lists, at_low < math.inf)
+        status = pause_reason(clock, counts, record)
+        if status != 0:
+            return status
+        if lists and not keep_lists(scene, work):
+            return NO_ROOM
+        locating = bracket[5] > 0.0
+        before = event_value(scene, work, memo, NOW)
+        if locating:
+            step = between(bracket)
         else:
-            step = between(low, high, at_low, at_high)
+            step = choose_step(scene, work, clock, lists, before < math.inf)
         ratio = attempt(scene, work, clock, step)
         if ratio < 0.0 and clock[TOLERANCE] == math.inf:
             return NOT_FINITE
         too_far = lists and ratio >= 0.0 and spent(scene, work, NEW) > 1.0
         if ratio < 0.0 or ratio > 1.0 or too_far:
-            trials = 0
+            bracket = NO_BRACKET
             status = reject(clock, counts, step, ratio, too_far)
             if status != 0:
                 return status
             continue
-        value = event_value(scene, work, memo, NEW) if at_low > 0.0 else math.inf
-        at_event = at_low > 0.0 and value <= 0.0
-        narrow = trials > 0 and high - low <= 1e-15 * high
-        close = narrow or abs(value) <= event_accuracy(clock)
-        if (at_event or trials > 0) and not close and trials < EVENT_TRIALS:
-            # Illinois: halve the value of the end that stays, so that both ends close in.
-            if trials == 0:
-                low, high, at_high, side = 0.0, step, value, 0
-            elif value > 0.0:
-                low, at_low = step, value
-                at_high *= 0.5 if side == 1 else 1.0
-                side = 1
-            else:
-                high, at_high = step, value
-                at_low *= 0.5 if side == -1 else 1.0
-                side = -1
-            trials += 1
+        after = event_value(scene, work, memo, NEW) if before > 0.0 else math.inf
+        at_event = locating or (before > 0.0 and after <= 0.0)
+        if at_event and not is_located(bracket, after, clock):
+            start = bracket if locating else (0.0, 0.0, before, 0.0, 0.0, 0.0)
+            bracket = narrowed(start, step, after)
             continue
-        at_event = at_event or trials > 0
-        if not at_event:
+        bracket = NO_BRACKET
+        if at_event:
+            counts[LOCATED] += 1
+        else:
             clock[STEP] = next_step(clock, step, ratio)
-        counts[LOCATED] += 1 if at_event else 0
-        trials = 0
         accept(scene, work, clock, counts, step, ratio, lists)
-        if record.shape[0] > 0:
-            record_row(work, clock, counts, record)
-        if lists and too_deep(scene, work):
-            return TOO_DEEP
-        counts[CODE] = observe(scene, work, memo, clock[TIME], at_event)
-        if counts[CODE] != 0:
-            return STOPPED
+        status = look(scene, work, memo, clock, counts, record, lists, at_event)
+        if status != 0:
+            return status
     return FINISHED
