@@ -1,0 +1,18 @@
+"""The names that scripts of users depend on."""
+
+from small_study import write_small
+
+import flocsim
+from flocsim.ensembles import load_config, run
+
+
+def test_a_study_runs_as_a_library(tmp_path):
+    results = run(load_config(write_small(tmp_path), {"replicates": 2}))
+    assert results.replicates["outcome"].shape[-1] == 2
+    assert set(results.probabilities) >= {"pr_inside", "pr_a", "pr_class", "n_total"}
+
+
+def test_top_level_names():
+    assert {"Body", "Fluid", "Sphere", "SpheroPolygon", "System", "Trajectory"} <= set(
+        flocsim.__all__
+    )
