@@ -3,7 +3,7 @@
 import shutil
 
 import pytest
-from small_study import ROOT, run_command
+from small_study import ROOT, run_command, write_star_library
 
 from flocsim.ensembles.loader import load_config
 from flocsim.ensembles.preflight import check_study
@@ -18,13 +18,16 @@ def test_there_are_examples():
 
 @pytest.fixture
 def examples(tmp_path):
-    """A copy of the folder, as a user would make one."""
-    return shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    """A copy of the folder, with a library of stars where the user's real flocs would be."""
+    leave_out = shutil.ignore_patterns("*.h5")
+    folder = shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=leave_out)
+    write_star_library(folder / "real_flocs_shapes.h5", vertices=(4, 16, 64))
+    return folder
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_loads_and_describes_itself(path, examples):
-    check_study(load_config(path))
+    check_study(load_config(examples / path.name))
     done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
     assert (done.returncode, done.stderr) == (0, "")
     assert "nothing was run" in done.stdout
