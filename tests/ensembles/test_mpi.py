@@ -131,8 +131,8 @@ from flocsim.forces import CentreForce
 class Soon(CentreForce):
     @property
     def reach(self):
-        # The runner is loaded once all ranks have agreed to go on.
-        if "flocsim.ensembles.runner" in sys.modules and os.environ["PMI_RANK"] == "1":
+        # The report is loaded once all ranks have agreed to go on.
+        if "flocsim.ensembles.report" in sys.modules and os.environ["PMI_RANK"] == "1":
             raise RuntimeError("the disk of rank one is gone")
         return 1e-6
 
