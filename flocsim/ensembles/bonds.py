@@ -26,7 +26,7 @@ from flocsim.ensembles.memo import (
     REST_X,
     REST_Y,
 )
-from flocsim.integrators.views import centre_view, effective_mass, surface_view
+from flocsim.integrators.views import centre_view, closest_rows, effective_mass, surface_view
 from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, FREE, NOW
 from flocsim.slots import centre_force, has_centre_force, surface_force, surface_reach
 
@@ -65,10 +65,7 @@ def surface_attraction(scene, work, time):
     """Attraction at the closest points [N], 0 without surface forces."""
     if surface_reach(scene.parameters) <= 0.0 or work.tally[CANDIDATES] == 0:
         return 0.0
-    closest = 0
-    for row in range(work.tally[CANDIDATES]):
-        if work.geometry[row, 2] < work.geometry[closest, 2]:
-            closest = row
+    _, closest = closest_rows(work, 0)
     return -surface_force(surface_view(scene, work, time, NOW, NOW, closest), scene.parameters)
 
 

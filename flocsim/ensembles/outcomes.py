@@ -24,10 +24,10 @@ from flocsim.ensembles.memo import (
     T_COLLISION,
     ZONE,
 )
-from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.contacts import least_listed_gap, locate_contacts
 from flocsim.geometry.kernels import edge_count, edge_end, segment_distance2
 from flocsim.integrators.views import centre_line, centre_view
-from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, NOW, RADIUS
+from flocsim.layout import BOUNDING_RADIUS, NOW, RADIUS
 from flocsim.slots import centre_force, has_centre_force
 
 BOUND, DEPARTED, MISSED = 1, 2, 3
@@ -68,14 +68,6 @@ def outline_gap(scene, work):
     """Distance between the two outlines at the current place [m], by all pairs."""
     least = min(one_way_distance2(scene, work, 0, 1), one_way_distance2(scene, work, 1, 0))
     return math.sqrt(least) - scene.bodies[0, RADIUS] - scene.bodies[1, RADIUS]
-
-
-def least_gap(work):
-    """Smallest gap among the listed pairs (inf where none is listed)."""
-    least = math.inf
-    for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[row, 2])
-    return least
 
 
 def note_collision(work, memo, time, distance):
@@ -120,7 +112,7 @@ def follow(scene, work, memo, distance):
 def watch_pair(scene, work, memo, time, at_event):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
     nx, ny, distance = centre_line(work, NOW, 1, 0)
-    gap = least_gap(work)
+    gap = least_listed_gap(work)
     if memo[COLLIDED] == 0.0 and (at_event or gap < 0.0):
         note_collision(work, memo, time, distance)
     follow(scene, work, memo, distance)

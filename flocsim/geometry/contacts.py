@@ -91,3 +91,11 @@ def locate_contacts(scene, work, state):
         locate_polygons(scene, work, state, row)
         least = min(least, work.geometry[row, 2])
     return least
+
+
+def least_listed_gap(work):
+    """The smallest gap among the listed pairs (inf where none is listed)."""
+    least = math.inf
+    for row in range(work.tally[CANDIDATES]):
+        least = min(least, work.geometry[row, 2])
+    return least

@@ -23,8 +23,7 @@ def core_factor(vertices, radius, area):
     """
     disc = np.pi * radius**2
     guess = np.sqrt(area / area_of_scaled(vertices, 1.0, radius))
-    trials = [(1e-3 * guess, None), (guess, area_of_scaled(vertices, guess, radius))]
-    trials[0] = (1e-3 * guess, area_of_scaled(vertices, 1e-3 * guess, radius))
+    trials = [(f, area_of_scaled(vertices, f, radius)) for f in (1e-3 * guess, guess)]
     for _ in range(60):
         (f, at_f), (g, at_g) = trials[-2:]
         if abs(at_g - area) <= ACCURACY * area:

@@ -2,8 +2,9 @@
 
 import math
 
+from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.candidates import list_candidates, spent
-from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.contacts import least_listed_gap, locate_contacts
 from flocsim.geometry.handover import hand_over
 from flocsim.integrators.events import NO_BRACKET, between, is_located, narrowed
 from flocsim.layout import (
@@ -40,15 +41,14 @@ EVENT_GRAIN = 0.02
 """While an event is awaited, a step moves the bodies by no more than 0.9 of the gap, or this share
 of r_i + r_j: what a straight step can then cut off a corner is below 1e-4 of r_i + r_j."""
 
-DEEPEST = 0.5
-"""Largest overlap as a share of r_i + r_j (constants.DEEPEST_OVERLAP)."""
-
 
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
     for row in range(work.tally[CANDIDATES]):
         a, b = work.candidates[row, 0], work.candidates[row, 2]
-        if -work.geometry[row, 2] > DEEPEST * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]):
+        if -work.geometry[row, 2] > DEEPEST_OVERLAP * (
+            scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+        ):
             return True
     return False
 
@@ -59,14 +59,6 @@ def closing_speed(scene, work, a, b):
     turning = abs(v[NOW, a, 5]) * scene.bodies[a, BOUNDING_RADIUS]
     turning += abs(v[NOW, b, 5]) * scene.bodies[b, BOUNDING_RADIUS]
     return math.hypot(v[NOW, a, 3] - v[NOW, b, 3], v[NOW, a, 4] - v[NOW, b, 4]) + turning
-
-
-def least_listed_gap(work):
-    """The smallest gap among the listed pairs (inf where none is listed)."""
-    least = math.inf
-    for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[row, 2])
-    return least
 
 
 def motion_step(scene, work, awaiting):

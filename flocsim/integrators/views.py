@@ -47,13 +47,18 @@ def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
     )  # fmt: skip
 
 
+def centre_rates(work, speed, a, b):
+    """Velocity of body a's centroid less that of body b's."""
+    motion = work.motion
+    return motion[speed, a, 3] - motion[speed, b, 3], motion[speed, a, 4] - motion[speed, b, 4]
+
+
 def normal_rate(work, speed, row):
     """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
     g = work.geometry
     motion = work.motion
-    dvx = motion[speed, a, 3] - motion[speed, b, 3]
-    dvy = motion[speed, a, 4] - motion[speed, b, 4]
+    dvx, dvy = centre_rates(work, speed, a, b)
     turning = motion[speed, a, 5] * g[row, 3] - motion[speed, b, 5] * g[row, 5]
     return g[row, 0] * dvx + g[row, 1] * dvy + turning
 
@@ -63,8 +68,7 @@ def tangential_rate(work, speed, row):
     a, b = work.candidates[row, 0], work.candidates[row, 2]
     g = work.geometry
     motion = work.motion
-    dvx = motion[speed, a, 3] - motion[speed, b, 3]
-    dvy = motion[speed, a, 4] - motion[speed, b, 4]
+    dvx, dvy = centre_rates(work, speed, a, b)
     turning = motion[speed, a, 5] * g[row, 4] - motion[speed, b, 5] * g[row, 6]
     return g[row, 0] * dvy - g[row, 1] * dvx + turning
 
