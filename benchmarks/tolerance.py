@@ -49,7 +49,7 @@ def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("config")
-    parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-9, 1e-10, 1e-11])
+    parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-7, 1e-8, 1e-9, 1e-10])
     parser.add_argument("--replicates", type=int)
     arguments = parser.parse_args()
     print(f"commit {commit()}; {' '.join(sys.argv)}")

@@ -5,11 +5,11 @@ import os
 import sys
 
 from flocsim import __version__
-from flocsim.commands import ensemble, fit, info, init, plot, trajectory
+from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
 from flocsim.ensembles.progress import plain_warnings
 from flocsim.errors import FlocsimError
 
-COMMANDS = (init, fit, ensemble, trajectory, plot, info)
+COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
 
 
 def make_parser():

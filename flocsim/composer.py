@@ -21,6 +21,9 @@ from pathlib import Path
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint, reached, refuse_closure
 
+INLINED_SIZE = 800
+"""Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
+
 _composed = {}
 _warned = []
 
@@ -105,16 +108,19 @@ def write_once(path, text):
         os.replace(temporary, path)
 
 
-def compiled(entry, fillings, name):
+def compiled(entry, fillings, name, allocates):
     """The entry compiled as module ``name``, from the disk where that is possible."""
     import numba
+
+    # Kernels that allocate nothing need no counting of references, which costs more than most work.
+    options = {"nogil": True, "error_model": "numpy", "_nrt": allocates}
 
     def transform(clone):
         clone.__module__ = name
         # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
-        return numba.njit(
-            clone, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy"
-        )
+        small = len(clone.__code__.co_code) < INLINED_SIZE
+        inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": small}
+        return compiled_once(numba.njit(clone, **options, **inner))
 
     folder = cache_folder()
     text = entry_source(entry)
@@ -126,8 +132,22 @@ def compiled(entry, fillings, name):
     sys.modules[name] = module
     module.driver = Linker(fillings, transform).link(entry)
     exec(compile(text, str(path), "exec"), module.__dict__)
-    dispatcher = numba.njit(module.run, nogil=True, cache=folder is not None, error_model="numpy")
+    dispatcher = numba.njit(module.run, cache=folder is not None, **options)
     return guarded(dispatcher, numba.core.errors.NumbaError)
+
+
+def compiled_once(dispatcher):
+    """The function, not compiled anew for every constant that it is called with."""
+    from numba import types
+
+    template = dispatcher.get_call_template
+
+    def without_literals(arguments, keywords):
+        plain = tuple(types.unliteral(each) for each in arguments)
+        return template(plain, {name: types.unliteral(v) for name, v in keywords.items()})
+
+    dispatcher.get_call_template = without_literals
+    return dispatcher
 
 
 def guarded(dispatcher, compiler_error):
@@ -159,18 +179,19 @@ def compiler_complaint(text):
     return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
 
 
-def compose(entry, fillings, *, jit=True):
+def compose(entry, fillings, *, jit=True, allocates=False):
     """The driver ``entry`` with its slots filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {slot function of flocsim.slots: plain
-    function}; ``jit=False`` links the plain Python functions, for debugging and reference.
+    function}; ``jit=False`` links the plain Python functions, for debugging and reference;
+    ``allocates``, whether any of the functions makes an array.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
-    key = (fingerprint(entry, fillings), jit)
+    key = (fingerprint(entry, fillings, f"{INLINED_SIZE} {allocates}"), jit)
     if key not in _composed:
         name = f"flocsim_scene_{key[0]}"
         if jit:
-            _composed[key] = compiled(entry, fillings, name)
+            _composed[key] = compiled(entry, fillings, name, allocates)
         else:
             _composed[key] = Linker(fillings, lambda clone: clone).link(entry)
     return _composed[key]

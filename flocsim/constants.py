@@ -23,3 +23,7 @@ DEEPEST_OVERLAP = 0.5
 
 NEGLIGIBLE_FORCE = 1e-9
 """A force weaker than this share of its greatest strength is out of reach and left out."""
+
+SHALLOWEST_TOUCH = 1e-12
+"""[m], a hundredth of an atom: bodies that graze each other less deeply do not touch. Scenes that
+graze by construction (δ = δ_max) would otherwise hang on the rounding of their numbers."""

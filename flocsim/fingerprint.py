@@ -118,12 +118,12 @@ def is_literal(value):
     return isinstance(value, LITERALS)
 
 
-def fingerprint(entry, fillings):
-    """A hash of everything that the composed function does."""
+def fingerprint(entry, fillings, options=""):
+    """A hash of everything that the composed function does, and of how it is compiled."""
     import numba
     import numpy
 
-    lines = [sys.version, numba.__version__, numpy.__version__]
+    lines = [sys.version, numba.__version__, numpy.__version__, options]
     seen = {}
 
     def visit(function):

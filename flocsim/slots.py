@@ -88,6 +88,11 @@ def reads_position():
     return False
 
 
+def skin_factor():
+    """How far candidates are listed, in multiples of what suits many short steps."""
+    return 1.0
+
+
 def attempt(scene, work, clock, step):
     """One step of the integrator: the local error over the tolerance, or −1 where it failed."""
     return 0.0
@@ -98,11 +103,11 @@ def next_step(clock, step, ratio):
     return step
 
 
-def event_value(scene, work, memo, state):
-    """Changes sign from + to − at the event to be located; inf where none is awaited."""
-    return math.inf
+def awaits_touch(memo):
+    """Whether a method of fixed steps, too, is to end a step where the first pair touches."""
+    return False
 
 
-def observe(scene, work, memo, time, at_event):
+def observe(scene, work, memo, time):
     """Watches every accepted step; a code other than 0 stops the run."""
     return 0

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.layout import NOW, TALLY_SIZE
+from flocsim.geometry.hierarchy import outlines_of
+from flocsim.layout import NOW, SLIP_RATES, STAGES, TALLY_SIZE
 
 
 class BodyView(NamedTuple):
@@ -59,22 +60,21 @@ class ContactView(NamedTuple):
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
-    ``bodies`` (n, 7) has the columns below; core points of body b are rows ``first[b]`` to
-    ``first[b + 1]`` of ``vertices``. Few arrays, because every array that a compiled function is
-    handed costs compile time in all of its callers.
+    ``bodies`` (n, 7): see flocsim.layout; ``first``, ``vertices`` and ``tree``: see
+    flocsim.geometry.hierarchy.Outlines. Few arrays, because every array that a compiled function
+    is handed costs compile time in all of its callers.
     """
 
     bodies: np.ndarray
     first: np.ndarray
     vertices: np.ndarray
+    tree: np.ndarray
     parameters: np.ndarray
 
 
 def scene_of(bodies, fluid, parameters):
     """The bodies as one Scene of fresh arrays; ``parameters`` are the forces' numbers."""
     shapes = [body.shape for body in bodies]
-    sizes = [len(shape.vertices) for shape in shapes]
-
     columns = (
         [body.mass for body in bodies],
         [body.buoyant_mass(fluid) for body in bodies],
@@ -86,8 +86,7 @@ def scene_of(bodies, fluid, parameters):
     )
     return Scene(
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
-        first=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        vertices=np.concatenate([np.array(shape.vertices) for shape in shapes]),
+        **outlines_of(shapes)._asdict(),
         parameters=np.array(parameters, dtype=float),
     )
 
@@ -95,45 +94,50 @@ def scene_of(bodies, fluid, parameters):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (4, n, 6): states NOW, NEW, FULL, HALF of x, y, angle, vx, vy, spin.
-    ``slip`` (4, capacity): tangential displacements of the listed pairs in these states.
-    ``bodies`` (n, 8): force and torque, place at the last listing, cosine and sine of the angle.
-    ``system`` (2, 3n, 3n + 1): linear systems BASE and NEWTON, the load in the last column.
-    ``candidates`` (capacity, 6): body of the vertex, its core point, body of the edge, first and
-    last core point of the edge, 1 where the contact acts in this step.
-    ``geometry`` (capacity, 7): see flocsim.geometry.contacts.
+    ``motion`` (6, n, 6): x, y, angle, vx, vy, spin in the states of flocsim.layout.
+    ``rates`` (7, n, 6): velocity and force (with torque) at the stages of a step.
+    ``slip`` (11, capacity): tangential displacements in the four states, then their rates.
+    ``bodies`` (n, 6): place at the last listing, cosine and sine of the angle, and how long a
+    velocity is remembered.
+    ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 2), complex:
+    factorised systems, then the load and the pivots.
+    ``candidates`` (capacity, 7): body of the vertex, its core point, body of the edge, first and
+    last core point of the edge, 1 where the pair is closed, 1 where its bodies are closest.
+    ``geometry`` (5, capacity, 8): see flocsim.geometry.contacts.
     ``kept`` (capacity, 3): point, edge and displacement of pairs while the list is made anew.
     ``budget`` (n (n − 1)/2,): how far two bodies may move until it must be.
-    ``placed`` (V, 2): core points at the listing.  ``tally``: counts, see flocsim.layout.
+    ``tally``: counts, see flocsim.layout.
     """
 
     motion: np.ndarray
+    rates: np.ndarray
     slip: np.ndarray
     bodies: np.ndarray
+    jacobian: np.ndarray
     system: np.ndarray
     candidates: np.ndarray
     geometry: np.ndarray
     kept: np.ndarray
     budget: np.ndarray
-    placed: np.ndarray
     tally: np.ndarray
 
 
 def work_of(scene, position, velocity, capacity=256):
     """Work arrays for a scene at the given position and velocity (n, 3), no contact yet."""
     n = len(scene.bodies)
-    motion = np.zeros((4, n, 6))
+    motion = np.zeros((6, n, 6))
     motion[NOW] = np.hstack([position, velocity])
     return Work(
         motion=motion,
-        slip=np.zeros((4, capacity)),
-        bodies=np.zeros((n, 8)),
-        system=np.zeros((2, 3 * n, 3 * n + 1)),
-        candidates=np.zeros((capacity, 6), dtype=np.int64),
-        geometry=np.zeros((capacity, 7)),
+        rates=np.zeros((STAGES, n, 6)),
+        slip=np.zeros((SLIP_RATES + STAGES, capacity)),
+        bodies=np.zeros((n, 6)),
+        jacobian=np.zeros((2, 3 * n, 3 * n)),
+        system=np.zeros((2, 3 * n, 3 * n + 2), dtype=complex),
+        candidates=np.zeros((capacity, 7), dtype=np.int64),
+        geometry=np.zeros((5, capacity, 8)),
         kept=np.zeros((capacity, 3)),
         budget=np.full(n * (n - 1) // 2, -1.0),
-        placed=np.zeros_like(scene.vertices),
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
 
@@ -151,6 +155,6 @@ def with_capacity(work, capacity):
     return work._replace(
         slip=grown(work.slip, 1),
         candidates=grown(work.candidates, 0),
-        geometry=grown(work.geometry, 0),
+        geometry=grown(work.geometry, 1),
         kept=grown(work.kept, 0),
     )

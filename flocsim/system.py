@@ -9,6 +9,7 @@ import numpy as np
 from flocsim.body import Body, Fluid
 from flocsim.composer import compose
 from flocsim.errors import UsageError
+from flocsim.explain import explain
 from flocsim.fields import is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.source import scene_functions
@@ -44,7 +45,8 @@ class Trajectory:
     ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
     at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
     how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], the
-    sum of the local errors of the steps (nan where the method estimates none); ``wall_time`` [s].
+    sum of the steps' estimated errors, a cautious bound unless the motion is chaotic (nan where the
+    method estimates none); ``wall_time`` [s].
     """
 
     t: np.ndarray
@@ -179,15 +181,11 @@ class System:
         return run.trajectory(status, time.perf_counter() - began)
 
     def explain(self):
-        """What is compiled into this scene and what is left out, each with its reason."""
-        lines = [
-            f"{len(self.bodies)} bodies, {'spheres only' if self.spheres_only else 'polygons'}"
-        ]
-        lines += [f"in:  {name}: {force}" for name, force in self.pieces.used.items()]
-        lines += [f"out: {name}: {reason}" for name, reason in self.pieces.left_out.items()]
-        if self.spheres_only:
-            lines.append("out: vertex–edge pairs, rotation of vertices: no body has an edge")
-        return "\n".join(lines)
+        """What is compiled into this scene and what is left out, each with its reason, as text.
+
+        Ends with the scene's time scales and the step that an explicit method would need.
+        """
+        return explain(self)
 
 
 class Run:

@@ -7,8 +7,10 @@ import numpy as np
 
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.geometry.candidates import list_candidates
-from flocsim.integrators.explicit import sum_forces
-from flocsim.layout import CANDIDATES, FORCE, NOW
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.integrators.explicit import locate_and_rate, sum_forces
+from flocsim.integrators.modes import set_modes
+from flocsim.layout import CANDIDATES, NOW
 from flocsim.state import work_of
 
 
@@ -16,7 +18,10 @@ def right_hand_side(scene, work):
     """List the candidates and sum the forces of state NOW; False where the list has no room."""
     if not list_candidates(scene, work):
         return False
-    sum_forces(scene, work, 0.0, NOW, NOW, NOW)
+    locate_contacts(scene, work, NOW)
+    set_modes(scene, work, NOW)
+    locate_and_rate(scene, work, NOW, NOW)
+    sum_forces(scene, work, 0.0, NOW, NOW)
     return True
 
 
@@ -73,7 +78,7 @@ class FastScene:
             # A second listing has to hand the displacements back to the same pairs.
             self.put_slips(slips)
             assert self.evaluate(self.scene, self.work)
-        return self.work.bodies[:, FORCE : FORCE + 3].copy()
+        return self.work.rates[NOW, :, 3:].copy()
 
     def put_slips(self, slips):
         """Write displacements {pair: ξ} into the list; every pair must be in it."""
@@ -89,7 +94,7 @@ class FastScene:
 
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
-        rows = self.work.geometry[: self.work.tally[CANDIDATES]]
+        rows = self.work.geometry[NOW, : self.work.tally[CANDIDATES]]
         return {
             key: row
             for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)

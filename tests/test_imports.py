@@ -25,6 +25,7 @@ ROWS = [
     ["flocsim"],
     ["ensembles"],
     ["system", "io"],
+    ["explain"],
     ["forces", "integrators"],
     ["body", "state"],
     ["geometry"],

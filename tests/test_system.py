@@ -9,7 +9,7 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry import contacts, spheres_only
-from flocsim.integrators import Implicit, Status, VelocityVerlet
+from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 
 BALL = Body(Sphere(5e-6), surface_density=2.0)
 NAN, INF = float("nan"), float("inf")
@@ -92,7 +92,9 @@ def falling(integrator, **options):
     return System(bodies, [Gravity(), StokesDrag()], integrator).run(2e-5, jit=False, **options)
 
 
-@pytest.mark.parametrize("integrator", [VelocityVerlet(1e-6), Implicit(1e-11)])
+@pytest.mark.parametrize(
+    "integrator", [VelocityVerlet(1e-6), DormandPrince54(1e-11), Implicit(1e-11)]
+)
 def test_fields_and_shapes_of_a_trajectory(integrator):
     found = falling(integrator)
     k = len(found.t)
@@ -108,12 +110,19 @@ def test_fields_and_shapes_of_a_trajectory(integrator):
     assert found.wall_time > 0.0
 
 
-def test_evaluations_and_error_of_both_methods():
-    fixed, adaptive = falling(VelocityVerlet(1e-6)), falling(Implicit(1e-11))
+def test_evaluations_and_errors():
+    fixed, explicit, implicit = (
+        falling(method)
+        for method in (VelocityVerlet(1e-6), DormandPrince54(1e-11), Implicit(1e-11))
+    )
     assert fixed.evaluations == 2 * fixed.steps
-    assert adaptive.evaluations == 3 * (adaptive.steps + adaptive.rejected)
+    assert explicit.evaluations == 7 * (explicit.steps + explicit.rejected)
+    # One at the start, and three in each of Newton's iterations.
+    tried = implicit.steps + implicit.rejected
+    assert 4 * tried <= implicit.evaluations <= 20 * tried
     assert np.isnan(fixed.error)
-    assert 0.0 < adaptive.error <= adaptive.steps * 1e-11
+    for adaptive in (explicit, implicit):
+        assert 0.0 < adaptive.error <= adaptive.steps * 1e-11
 
 
 def test_positions_are_the_integral_of_velocities():
@@ -203,7 +212,9 @@ CLOSE_FORCES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("integrator", [VelocityVerlet(4e-8), Implicit(1e-10)])
+@pytest.mark.parametrize(
+    "integrator", [VelocityVerlet(4e-8), DormandPrince54(1e-10), Implicit(1e-10)]
+)
 def test_spheres_by_their_own_code_and_by_that_of_polygons(integrator):
     bodies = [attrs.evolve(b, spin=300.0) for b in head_on(1e-2)]
     bodies[1] = attrs.evolve(bodies[1], position=(5e-6, 2e-6))

@@ -10,9 +10,9 @@ import numpy as np
 
 from flocsim import Body, Sphere, SpheroPolygon, System, slots
 from flocsim.forces import BodyForce, CentreForce, Contact, ContactForce, SurfaceForce
-from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.contacts import least_listed_gap
 from flocsim.integrators import Status
-from flocsim.layout import CANDIDATES, ERROR, NOW, REJECTED, STEPS, TIME, UNTIL
+from flocsim.layout import ERROR, NOW, REJECTED, STEPS, TIME, UNTIL
 from flocsim.state import with_capacity, work_of
 
 WATER_VISCOSITY = 8.9e-4
@@ -85,31 +85,27 @@ ELASTIC = Contact(k_n=20.0, k_t=0.0, damping_n=0.0, damping_t=0.0)
 AWAITED, TOUCHING, CONTACTS, DEEPEST, TOUCH_TIME, TOUCH_GAP, MEMO_SIZE = range(7)
 
 
-def touch_event(scene, work, memo, state):
-    """The smallest gap while a touch is awaited."""
-    if memo[AWAITED] == 0.0:
-        return math.inf
-    return locate_contacts(scene, work, state)
+def is_awaited(memo):
+    """Whether a touch is awaited."""
+    return memo[AWAITED] != 0.0
 
 
-def watch(scene, work, memo, time, at_event):
-    """Counts touches of the bodies, keeps the deepest overlap, notes the located touch."""
-    least = math.inf
-    for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[row, 2])
+def watch(scene, work, memo, time):
+    """Counts touches of the bodies, keeps the deepest overlap, notes the awaited touch."""
+    least = least_listed_gap(work)
     touching = 1.0 if least < 0.0 else 0.0
     if touching > memo[TOUCHING]:
         memo[CONTACTS] += 1.0
     memo[TOUCHING] = touching
     memo[DEEPEST] = max(memo[DEEPEST], -least)
-    if at_event:
+    if memo[AWAITED] != 0.0 and least < 0.0:
         memo[AWAITED] = 0.0
         memo[TOUCH_TIME] = time
         memo[TOUCH_GAP] = least
     return 0
 
 
-WATCH = {slots.event_value: touch_event, slots.observe: watch}
+WATCH = {slots.awaits_touch: is_awaited, slots.observe: watch}
 
 
 @attrs.frozen(eq=False)

@@ -65,18 +65,18 @@ def surface_attraction(scene, work, time):
     """Attraction at the closest points [N], 0 without surface forces."""
     if surface_reach(scene.parameters) <= 0.0 or work.tally[CANDIDATES] == 0:
         return 0.0
-    _, closest = closest_rows(work, 0)
-    return -surface_force(surface_view(scene, work, time, NOW, NOW, closest), scene.parameters)
+    _, closest = closest_rows(work, NOW, 0)
+    return -surface_force(surface_view(scene, work, time, NOW, closest), scene.parameters)
 
 
 def arms_hold(work, attraction, load, nx, ny, distance):
     """Whether the attraction along the centres holds against prying about both outer contacts."""
     left_holds, right_holds = False, False
     for row in range(work.tally[CANDIDATES]):
-        if work.geometry[row, 2] >= 0.0:
+        if work.geometry[NOW, row, 2] >= 0.0:
             continue
         # The contact point relative to body 0, from its components along n and t of the pair.
-        g = work.geometry
+        g = work.geometry[NOW]
         shift = 3 if work.candidates[row, 0] == 0 else 5
         x = g[row, shift + 1] * g[row, 0] + g[row, shift] * g[row, 1]
         y = g[row, shift + 1] * g[row, 1] - g[row, shift] * g[row, 0]
@@ -97,7 +97,7 @@ def is_certain(scene, work, memo, time, nx, ny, distance):
     load = SAFETY * (largest_load(memo) + centrifugal)
     centres = 0.0
     if has_centre_force():
-        view = centre_view(scene, work, time, NOW, NOW, 1, 0)
+        view = centre_view(scene, work, time, NOW, 1, 0)
         centres = -centre_force(view, scene.parameters)
     surfaces = surface_attraction(scene, work, time)
     points = scene.first[2]

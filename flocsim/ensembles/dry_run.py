@@ -1,6 +1,11 @@
 """What a study would do, without doing it."""
 
+import attrs
+import numpy as np
+
 from flocsim.ensembles.preflight import sphere_pairs
+from flocsim.explain import force_lines, machinery_lines, scale_lines
+from flocsim.geometry.spheropolygon import SpheroPolygon
 
 
 def condition_lines(config):
@@ -15,15 +20,55 @@ def condition_lines(config):
         )
 
 
-def scene_lines(config):
-    """What is compiled in and what is left out, for spheres and for polygons."""
+def stand_in(shape, radius):
+    """A polygon about as large as a sphere: what matters here is that it has edges."""
+    angles = np.arange(6) * np.pi / 3.0
+    hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
+    return SpheroPolygon((shape.radius - radius) * hexagon, radius)
+
+
+def placed_system(config, system, shapes):
+    """The system with these shapes, the start gap apart."""
+    reach = sum(shape.bounding_radius for shape in shapes) + config.scene.start_gap
+    places = ((0.0, 0.0), (0.0, reach))
+    bodies = [
+        attrs.evolve(body, shape=shape, position=place)
+        for body, shape, place in zip(system.bodies, shapes, places, strict=True)
+    ]
+    return attrs.evolve(system, bodies=bodies)
+
+
+def code_lines(config):
+    """What is compiled in and what is left out, for polygons and for spheres."""
     _, pair = next(sphere_pairs(config))
-    pieces = pair.system.pieces
-    yield from (f"  in:  {force}" for force in pieces.used.values())
-    yield from (f"  out: {force}: {reason}" for force, reason in pieces.left_out.items())
-    if any(n == 1 for n in config.shapes.vertices):
-        yield "  out: vertex-edge pairs and turning of vertices, where both are spheres (N = 1)"
+    systems = [placed_system(config, pair.system, shapes) for shapes in kinds(config, pair.shapes)]
+    lines = [*force_lines(systems[0]), *machinery_lines(systems[0])]
+    for system in systems[1:]:
+        more = [line for line in machinery_lines(system) if line not in lines]
+        lines += [f"{line} (where N = 1)" for line in more]
+    return [f"  {line}" for line in lines]
+
+
+def kinds(config, spheres):
+    """Shapes of i and j for polygons, if the study has any, and for spheres, if it has any."""
+    if max(config.shapes.vertices) > 1:
+        yield [stand_in(shape, config.shapes.radius) for shape in spheres]
+    if min(config.shapes.vertices) == 1:
+        yield spheres
+
+
+def left_out_lines(team):
+    """What an ensemble leaves out besides."""
     yield "  out: trajectories: an ensemble records none (see `flocsim trajectory`)"
+    yield "  out: plots: none is drawn (see `flocsim plot`)"
+    if team.size == 1:
+        yield "  out: MPI: one rank needs none"
+
+
+def stiffness_lines(config):
+    """The time scales of every collision type, by its equivalent spheres."""
+    for name, pair in sphere_pairs(config):
+        yield from (f"  {name}: {line}" for line in scale_lines(pair.system))
 
 
 def dry_run(config, team):
@@ -41,7 +86,10 @@ def dry_run(config, team):
         "collisions:",
         *condition_lines(config),
         "forces and code:",
-        *scene_lines(config),
+        *code_lines(config),
+        *left_out_lines(team),
+        "stiffness:",
+        *stiffness_lines(config),
         "nothing was run (--dry-run)",
     ]
     return "\n".join(lines)

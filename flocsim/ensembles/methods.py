@@ -3,12 +3,22 @@
 import difflib
 
 from flocsim.errors import ConfigError
-from flocsim.integrators import Implicit, VelocityVerlet
+from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 
 
 def make_implicit(options):
     """Implicit at the config's tolerance."""
     return Implicit(tolerance=options.tolerance)
+
+
+def make_dormand_prince(options):
+    """DormandPrince54 at the config's tolerance."""
+    return DormandPrince54(tolerance=options.tolerance)
+
+
+def make_overdamped(options):
+    """Overdamped at the config's tolerance."""
+    return Overdamped(tolerance=options.tolerance)
 
 
 def make_velocity_verlet(options):
@@ -20,7 +30,12 @@ def make_velocity_verlet(options):
     return VelocityVerlet(step=options.step)
 
 
-METHODS = {"implicit": make_implicit, "velocity_verlet": make_velocity_verlet}
+METHODS = {
+    "implicit": make_implicit,
+    "dormand_prince54": make_dormand_prince,
+    "overdamped": make_overdamped,
+    "velocity_verlet": make_velocity_verlet,
+}
 """Makers of integrators by their name in a config."""
 
 

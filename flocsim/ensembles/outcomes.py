@@ -6,8 +6,6 @@ Departed is a pair that touched, whose outlines are further apart than the escap
 parting now and would part at the steady drift that weight and centre forces give it there.
 """
 
-import math
-
 from flocsim.ensembles.bonds import has_rested, is_certain, start_rest
 from flocsim.ensembles.memo import (
     COLLIDED,
@@ -24,50 +22,24 @@ from flocsim.ensembles.memo import (
     T_COLLISION,
     ZONE,
 )
-from flocsim.geometry.contacts import least_listed_gap, locate_contacts
-from flocsim.geometry.kernels import edge_count, edge_end, segment_distance2
+from flocsim.geometry.contacts import least_listed_gap
+from flocsim.geometry.near_pairs import gap_between
 from flocsim.integrators.views import centre_line, centre_view
-from flocsim.layout import BOUNDING_RADIUS, NOW, RADIUS
+from flocsim.layout import BOUNDING_RADIUS, NOW
 from flocsim.slots import centre_force, has_centre_force
 
 BOUND, DEPARTED, MISSED = 1, 2, 3
 """Codes of the observer."""
 
 
-def event_of_touch(scene, work, memo, state):
-    """Smallest gap of the outlines until they have touched, then inf."""
-    if memo[COLLIDED] == 1.0:
-        return math.inf
-    return locate_contacts(scene, work, state)
-
-
-def one_way_distance2(scene, work, a, b):
-    """Smallest squared distance from a's core points to b's edges, both at the current place."""
-    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
-    ca, sa = math.cos(work.motion[NOW, a, 2]), math.sin(work.motion[NOW, a, 2])
-    cb, sb = math.cos(work.motion[NOW, b, 2]), math.sin(work.motion[NOW, b, 2])
-    # The points of a in the frame of b: only they have to be turned.
-    c, s = ca * cb + sa * sb, sa * cb - ca * sb
-    tx, ty = cb * ox + sb * oy, cb * oy - sb * ox
-    v = scene.vertices
-    first = scene.first[b]
-    points = scene.first[b + 1] - first
-    least = math.inf
-    for point in range(scene.first[a], scene.first[a + 1]):
-        px = c * v[point, 0] - s * v[point, 1] + tx
-        py = s * v[point, 0] + c * v[point, 1] + ty
-        for edge in range(max(edge_count(points), 1)):
-            start, end = first + edge, edge_end(scene, b, edge)
-            distance2 = segment_distance2(px, py, v[start, 0], v[start, 1], v[end, 0], v[end, 1])
-            least = min(least, distance2)
-    return least
+def has_not_touched(memo):
+    """Whether the pair has yet to touch."""
+    return memo[COLLIDED] == 0.0
 
 
 def outline_gap(scene, work):
-    """Distance between the two outlines at the current place [m], by all pairs."""
-    least = min(one_way_distance2(scene, work, 0, 1), one_way_distance2(scene, work, 1, 0))
-    return math.sqrt(least) - scene.bodies[0, RADIUS] - scene.bodies[1, RADIUS]
+    """Distance between the two outlines now [m], negative where they overlap."""
+    return gap_between(scene, work, 1, 0)
 
 
 def note_collision(work, memo, time, distance):
@@ -86,7 +58,7 @@ def is_parting(scene, work, memo, time, nx, ny):
     rate += ny * (motion[NOW, 1, 4] - motion[NOW, 0, 4])
     drift = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y]
     if has_centre_force():
-        repulsion = centre_force(centre_view(scene, work, time, NOW, NOW, 1, 0), scene.parameters)
+        repulsion = centre_force(centre_view(scene, work, time, NOW, 1, 0), scene.parameters)
         drift += repulsion * (memo[MOBILITY_I] + memo[MOBILITY_J])
     return rate > 0.0 and drift > 0.0
 
@@ -109,11 +81,11 @@ def follow(scene, work, memo, distance):
             memo[CROSSED] = 1.0
 
 
-def watch_pair(scene, work, memo, time, at_event):
+def watch_pair(scene, work, memo, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
     nx, ny, distance = centre_line(work, NOW, 1, 0)
     gap = least_listed_gap(work)
-    if memo[COLLIDED] == 0.0 and (at_event or gap < 0.0):
+    if memo[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(work, memo, time, distance)
     follow(scene, work, memo, distance)
     if is_parting(scene, work, memo, time, nx, ny) and is_away(scene, work, memo, distance, gap):

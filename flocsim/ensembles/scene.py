@@ -29,13 +29,13 @@ from flocsim.layout import (
 from flocsim.state import with_capacity, work_of
 from flocsim.system import System
 
-OBSERVER = {slots.event_value: outcomes.event_of_touch, slots.observe: outcomes.watch_pair}
+OBSERVER = {slots.awaits_touch: outcomes.has_not_touched, slots.observe: outcomes.watch_pair}
 """What a binary collision puts into the driver's slots."""
 
 REST_TURNS = 3.0
 """Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
 
-LIMIT_TURNS = 300.0
+LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
 
 

@@ -6,125 +6,52 @@ motion of the two bodies stays within a budget.
 
 import math
 
-from flocsim.geometry.contacts import turn_bodies, turned
 from flocsim.geometry.handover import keep_slips, restore_slips
-from flocsim.geometry.kernels import edge_count, edge_end, segment_distance2
-from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, LISTED, NOW, RADIUS, REBUILDS
-from flocsim.slots import surface_reach
+from flocsim.geometry.near_pairs import gap_between, list_polygons
+from flocsim.layout import (
+    BOUNDING_RADIUS,
+    CANDIDATES,
+    EQUIVALENT_RADIUS,
+    LISTED,
+    NOW,
+    RADIUS,
+    REBUILDS,
+)
+from flocsim.slots import skin_factor, surface_reach
 
-SKIN = 0.5
-"""Pairs are listed up to a gap of this share of r_i + r_j …"""
+SKIN = 0.1
+"""Pairs are listed up to a gap of this share of r_i + r_j, or up to the smaller one of …"""
 
-SKIN_OF_SIZE = 0.02
-"""… or of this share of the smaller body, whatever is larger."""
+SKIN_OF_EDGE = 0.3
+"""… this share of the shorter edges' length, so that few are listed but lists last, …"""
 
-
-def place_vertices(scene, work):
-    """Core points of all bodies in the frame of the scene, relative to their centroids."""
-    turn_bodies(work, NOW)
-    for body in range(scene.bodies.shape[0]):
-        for point in range(scene.first[body], scene.first[body + 1]):
-            x, y = turned(scene, work, body, point)
-            work.placed[point, 0] = x
-            work.placed[point, 1] = y
-
-
-def edges_to_test(scene, body):
-    """Number of edges of a body's core; a point counts as one edge only against a point."""
-    return edge_count(scene.first[body + 1] - scene.first[body])
+SKIN_OF_SIZE = 0.1
+"""… and this share of the smaller body, whatever is larger."""
 
 
-def add_pair(scene, work, a, point, b, start, end, ox, oy, cutoff):
-    """List the pair where its gap is below the cut-off; its gap, or −inf where no room is left."""
-    placed = work.placed
-    distance2 = segment_distance2(
-        placed[point, 0] + ox, placed[point, 1] + oy,
-        placed[start, 0], placed[start, 1], placed[end, 0], placed[end, 1],
-    )  # fmt: skip
-    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    if distance2 >= (contact + cutoff) ** 2:
-        return math.sqrt(distance2) - contact
-    row = work.tally[CANDIDATES]
-    if row == work.candidates.shape[0]:
-        return -math.inf
-    work.candidates[row, 0], work.candidates[row, 1] = a, point
-    work.candidates[row, 2], work.candidates[row, 3], work.candidates[row, 4] = b, start, end
-    work.tally[CANDIDATES] = row + 1
-    return math.sqrt(distance2) - contact
-
-
-def list_one_way(scene, work, a, b, cutoff):
-    """List pairs of a's vertices and b's edges; the smallest gap met, −inf for a full list."""
-    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
-    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    vertex_reach2 = (scene.bodies[b, BOUNDING_RADIUS] + scene.bodies[a, RADIUS] + cutoff) ** 2
-    edge_reach2 = (scene.bodies[a, BOUNDING_RADIUS] + scene.bodies[b, RADIUS] + cutoff) ** 2
-    least = math.inf
-    first_b = scene.first[b]
-    for edge in range(edges_to_test(scene, b)):
-        start, end = first_b + edge, edge_end(scene, b, edge)
-        placed = work.placed
-        sx, sy = placed[start, 0], placed[start, 1]
-        ex, ey = placed[end, 0], placed[end, 1]
-        # A long edge can cross the reach of a with both its ends outside.
-        if segment_distance2(ox, oy, sx, sy, ex, ey) > edge_reach2:
-            continue
-        low_x, high_x = min(sx, ex) - contact - cutoff, max(sx, ex) + contact + cutoff
-        low_y, high_y = min(sy, ey) - contact - cutoff, max(sy, ey) + contact + cutoff
-        for point in range(scene.first[a], scene.first[a + 1]):
-            px, py = placed[point, 0] + ox, placed[point, 1] + oy
-            near = low_x < px < high_x and low_y < py < high_y
-            if near and px * px + py * py < vertex_reach2:
-                least = min(least, add_pair(scene, work, a, point, b, start, end, ox, oy, cutoff))
-    return least
-
-
-def list_polygons(scene, work, a, b, cutoff):
-    """List the pairs of two bodies, both ways round; the smallest gap met (inf where none)."""
-    if scene.first[a + 1] - scene.first[a] == 1 and scene.first[b + 1] - scene.first[b] == 1:
-        return list_spheres(scene, work, a, b, cutoff)
-    least = list_one_way(scene, work, a, b, cutoff)
-    return min(least, list_one_way(scene, work, b, a, cutoff))
-
-
-def list_spheres(scene, work, a, b, cutoff):
-    """List the one pair of two spheres; its gap."""
-    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
-    return add_pair(
-        scene, work, a, scene.first[a], b, scene.first[b], scene.first[b], ox, oy, cutoff
-    )
+def edge_length(scene, body):
+    """The mean length of a body's edges [m], as if its outline were a circle's."""
+    points = scene.first[body + 1] - scene.first[body]
+    return 2.0 * math.pi * scene.bodies[body, EQUIVALENT_RADIUS] / points
 
 
 def skin_of(scene, a, b):
     """Cut-off gap of the list of a pair of bodies [m]."""
     size = min(scene.bodies[a, BOUNDING_RADIUS], scene.bodies[b, BOUNDING_RADIUS])
-    return max(SKIN * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]), SKIN_OF_SIZE * size)
+    edge = min(edge_length(scene, a), edge_length(scene, b))
+    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    return skin_factor() * max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
 
 
 def list_for_surface_force(scene, work, a, b, skin, reach):
     """List what can become the closest pair before the budget is spent; the budget [m]."""
-    before = work.tally[CANDIDATES]
-    furthest = reach + 2.0 * skin
-    margin = skin
-    least = list_polygons(scene, work, a, b, margin)
-    # A list up to a margin finds the least gap only where that lies below the margin.
-    while margin < least < math.inf or (least == math.inf and margin < furthest):
-        if margin >= furthest:
-            break
-        margin = min(4.0 * margin, furthest)
-        work.tally[CANDIDATES] = before
-        least = list_polygons(scene, work, a, b, margin)
-    work.tally[CANDIDATES] = before
-    if least == -math.inf:
-        return -math.inf
-    if min(least, margin) > reach + skin:
-        return min(least, margin) - reach
+    least = gap_between(scene, work, a, b)
+    if least > reach + skin:
+        return least - reach
     spend = max(0.5 * skin, 0.25 * least)
-    if list_polygons(scene, work, a, b, max(skin, least + 2.0 * spend)) == -math.inf:
-        return -math.inf
-    return spend
+    if list_polygons(scene, work, a, b, max(skin, least + 2.0 * spend)):
+        return spend
+    return -math.inf
 
 
 def list_pair(scene, work, a, b):
@@ -142,8 +69,11 @@ def list_pair(scene, work, a, b):
         return apart - max(0.0, reach)
     if reach > 0.0:
         return list_for_surface_force(scene, work, a, b, skin, reach)
-    if list_polygons(scene, work, a, b, skin) == -math.inf:
+    before = work.tally[CANDIDATES]
+    if not list_polygons(scene, work, a, b, skin):
         return -math.inf
+    if work.tally[CANDIDATES] == before:
+        return max(skin, gap_between(scene, work, a, b))
     return skin
 
 
@@ -152,13 +82,39 @@ def since_listing(work, state, body, axis):
     return work.motion[state, body, axis] - work.bodies[body, LISTED + axis]
 
 
-def moved(scene, work, state, a, b):
-    """How far the outlines of two bodies may have moved against each other since the listing."""
-    dx = since_listing(work, state, a, 0) - since_listing(work, state, b, 0)
-    dy = since_listing(work, state, a, 1) - since_listing(work, state, b, 1)
-    turning = abs(since_listing(work, state, a, 2)) * scene.bodies[a, BOUNDING_RADIUS]
-    turning += abs(since_listing(work, state, b, 2)) * scene.bodies[b, BOUNDING_RADIUS]
-    return math.sqrt(dx * dx + dy * dy) + turning
+def core_radius(scene, body):
+    """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
+    return scene.bodies[body, BOUNDING_RADIUS] - scene.bodies[body, RADIUS]
+
+
+def shifted_by(dx, dy, ox, oy, turn):
+    """How far (dx, dy) lies from (ox, oy) turned by an angle."""
+    c, s = math.cos(turn), math.sin(turn)
+    x, y = dx - (c * ox - s * oy), dy - (s * ox + c * oy)
+    return math.sqrt(x * x + y * y)
+
+
+def moved(scene, work, state, a, b, enough):
+    """How far the cores of two bodies may have moved against each other since the listing [m].
+
+    Seen from b, all of a's core has moved by no more than its centroid, plus the relative turn
+    times its size; seen from a, the same holds of b: a doublet that turns as one does not count.
+    Where a plainer bound, which needs no turning, stays below ``enough``, that one is given.
+    """
+    ox = work.bodies[a, LISTED] - work.bodies[b, LISTED]
+    oy = work.bodies[a, LISTED + 1] - work.bodies[b, LISTED + 1]
+    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
+    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    turn_a = since_listing(work, state, a, 2)
+    turn_b = since_listing(work, state, b, 2)
+    size_a, size_b = core_radius(scene, a), core_radius(scene, b)
+    plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
+    if plain < enough:
+        return plain
+    turn = abs(turn_a - turn_b)
+    seen_from_b = shifted_by(dx, dy, ox, oy, turn_b) + turn * size_a
+    seen_from_a = shifted_by(dx, dy, ox, oy, turn_a) + turn * size_b
+    return min(plain, seen_from_b, seen_from_a)
 
 
 def spent(scene, work, state):
@@ -167,17 +123,42 @@ def spent(scene, work, state):
     pair = 0
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
-            if work.budget[pair] <= 0.0:
+            budget = work.budget[pair]
+            if budget <= 0.0:
                 return math.inf
-            worst = max(worst, moved(scene, work, state, a, b) / work.budget[pair])
+            worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
             pair += 1
     return worst
+
+
+def relative_speed(scene, work, a, b):
+    """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
+    v = work.motion
+    x, y = v[NOW, a, 0] - v[NOW, b, 0], v[NOW, a, 1] - v[NOW, b, 1]
+    vx, vy = v[NOW, a, 3] - v[NOW, b, 3], v[NOW, a, 4] - v[NOW, b, 4]
+    spin_a, spin_b = v[NOW, a, 5], v[NOW, b, 5]
+    turning = abs(spin_a - spin_b)
+    seen_from_b = math.hypot(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
+    seen_from_a = math.hypot(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
+    return min(seen_from_b, seen_from_a)
+
+
+def time_within(scene, work, share):
+    """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
+    longest = math.inf
+    pair = 0
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            speed = relative_speed(scene, work, a, b)
+            if speed > 0.0:
+                longest = min(longest, share * work.budget[pair] / speed)
+            pair += 1
+    return longest
 
 
 def list_candidates(scene, work):
     """Make the list anew at the current position; False where it has no room."""
     kept = keep_slips(work)
-    place_vertices(scene, work)
     work.tally[CANDIDATES] = 0
     work.tally[REBUILDS] += 1
     for body in range(scene.bodies.shape[0]):

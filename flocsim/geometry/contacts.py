@@ -3,15 +3,20 @@
 A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
 vertex–edge method); two spheres are one pair of points.
 
-A row of ``geometry`` is (n_x, n_y, gap, a_n, a_t, b_n, b_t): n points from the foot on the edge to
-the vertex, t = (−n_y, n_x), and a_n, a_t are the moments of unit forces n and t, applied at the
+A row of ``geometry`` is (n_x, n_y, gap, a_n, a_t, b_n, b_t, c): n points from the foot on the edge
+to the vertex, t = (−n_y, n_x), and a_n, a_t are the moments of unit forces n and t, applied at the
 middle of the overlap, about the centroid of the vertex's body; b_n, b_t about that of the edge's.
+The normal turns by c for every metre by which the vertex is shifted along t: 0 where the foot lies
+inside the edge, which alone turns it then, 1/distance where it is an end.
 """
 
 import math
 
 from flocsim.geometry.kernels import closest_share
-from flocsim.layout import CANDIDATES, COSINE, RADIUS, SINE
+from flocsim.layout import CANDIDATES, CLOSED, CLOSEST, COSINE, NOW, RADIUS, SINE
+
+TINY = 1e-300
+"""Keeps the reciprocal of a distance finite."""
 
 
 def turn_bodies(work, state):
@@ -30,16 +35,17 @@ def turned(scene, work, body, point):
     return c * x - s * y, s * x + c * y
 
 
-def store_row(work, row, nx, ny, gap, ax, ay, bx, by):
+def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning):
     """Write one geometry row from the normal and the two arms of the contact point."""
     geometry = work.geometry
-    geometry[row, 0] = nx
-    geometry[row, 1] = ny
-    geometry[row, 2] = gap
-    geometry[row, 3] = ax * ny - ay * nx
-    geometry[row, 4] = ax * nx + ay * ny
-    geometry[row, 5] = bx * ny - by * nx
-    geometry[row, 6] = bx * nx + by * ny
+    geometry[state, row, 0] = nx
+    geometry[state, row, 1] = ny
+    geometry[state, row, 2] = gap
+    geometry[state, row, 3] = ax * ny - ay * nx
+    geometry[state, row, 4] = ax * nx + ay * ny
+    geometry[state, row, 5] = bx * ny - by * nx
+    geometry[state, row, 6] = bx * nx + by * ny
+    geometry[state, row, 7] = turning
 
 
 def locate_polygons(scene, work, state, row):
@@ -64,7 +70,8 @@ def locate_polygons(scene, work, state, row):
     bx = fx + middle * nx
     by = fy + middle * ny
     gap = distance - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
-    store_row(work, row, nx, ny, gap, bx - ox, by - oy, bx, by)
+    turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
+    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning)
 
 
 def locate_spheres(scene, work, state, row):
@@ -80,7 +87,8 @@ def locate_spheres(scene, work, state, row):
     middle = 0.5 * (distance + scene.bodies[b, RADIUS] - scene.bodies[a, RADIUS])
     gap = distance - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
     bx, by = middle * nx, middle * ny
-    store_row(work, row, nx, ny, gap, bx - ox, by - oy, bx, by)
+    turning = 1.0 / max(distance, TINY)
+    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning)
 
 
 def locate_contacts(scene, work, state):
@@ -89,13 +97,21 @@ def locate_contacts(scene, work, state):
     least = math.inf
     for row in range(work.tally[CANDIDATES]):
         locate_polygons(scene, work, state, row)
-        least = min(least, work.geometry[row, 2])
+        least = min(least, work.geometry[state, row, 2])
     return least
 
 
+def locate_acting(scene, work, state):
+    """Geometry, in a state, of the listed pairs through which forces act in this step."""
+    turn_bodies(work, state)
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] + work.candidates[row, CLOSEST] > 0:
+            locate_polygons(scene, work, state, row)
+
+
 def least_listed_gap(work):
-    """The smallest gap among the listed pairs (inf where none is listed)."""
+    """The smallest gap among the listed pairs now (inf where none is listed)."""
     least = math.inf
     for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[row, 2])
+        least = min(least, work.geometry[NOW, row, 2])
     return least

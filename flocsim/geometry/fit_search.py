@@ -40,7 +40,7 @@ EDGES = 100
 @cache
 def compiled(kernel):
     """The kernel of fit_cover, fit_simple or fit_pattern, compiled."""
-    return compose(kernel, {})
+    return compose(kernel, {}, allocates=True)
 
 
 def count_errors(mask, vertices, radius):

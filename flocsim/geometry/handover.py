@@ -43,7 +43,7 @@ def nearest_active(work, row):
     x, y = contact_point(work, row, low)
     for other in range(work.tally[CANDIDATES]):
         a, b = work.candidates[other, 0], work.candidates[other, 2]
-        if work.geometry[other, 2] < 0.0 and min(a, b) == low and max(a, b) == high:
+        if work.geometry[NOW, other, 2] < 0.0 and min(a, b) == low and max(a, b) == high:
             ox, oy = contact_point(work, other, low)
             distance = (ox - x) ** 2 + (oy - y) ** 2
             if distance < least:
@@ -54,7 +54,7 @@ def nearest_active(work, row):
 
 def contact_point(work, row, body):
     """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
-    geometry = work.geometry
+    geometry = work.geometry[NOW]
     nx, ny = geometry[row, 0], geometry[row, 1]
     shift = 3 if work.candidates[row, 0] == body else 5
     across, along = geometry[row, shift], geometry[row, shift + 1]
@@ -68,7 +68,7 @@ def hand_over(work):
     last pair it vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[CANDIDATES]):
-        if work.slip[NOW, row] != 0.0 and work.geometry[row, 2] >= 0.0:
+        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, 2] >= 0.0:
             heir = nearest_active(work, row)
             if heir >= 0:
                 work.slip[NOW, heir] += work.slip[NOW, row] * tangent_agreement(work, row, heir)
@@ -80,7 +80,7 @@ def tangent_agreement(work, row, other):
 
     A pair listed the other way round has the opposite tangent, and its slip the same sign.
     """
-    geometry = work.geometry
+    geometry = work.geometry[NOW]
     cosine = geometry[row, 0] * geometry[other, 0] + geometry[row, 1] * geometry[other, 1]
     if work.candidates[row, 0] == work.candidates[other, 0]:
         return cosine

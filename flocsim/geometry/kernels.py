@@ -27,11 +27,12 @@ def edge_count(points):
     return points
 
 
-def edge_end(scene, body, edge):
-    """Index of the core point at which edge number ``edge`` of the body ends."""
-    first = scene.first[body]
-    last = scene.first[body + 1]
-    following = first + edge + 1
-    if following == last:
+def edge_end(first, points, start):
+    """The core point at which the edge that begins at ``start`` ends.
+
+    ``first`` is the first of the body's core points, ``points`` their number.
+    """
+    following = start + 1
+    if following == first + points:
         return first
     return following

@@ -2,18 +2,18 @@
 
 from flocsim import slots
 from flocsim.geometry import candidates
-from flocsim.integrators import assembly, explicit
+from flocsim.integrators import explicit, jacobian
 
 
-def no_explicit(scene, work, time, place, speed):
+def no_forces(scene, work, time, state, rate):
     """No such forces."""
 
 
-def no_assembly(scene, work, time, state, step):
-    """No such forces in the implicit system either."""
+def no_derivatives(scene, work, time):
+    """No such forces to differentiate either."""
 
 
-def no_derivative(scene, work, view, body, step):
+def no_derivative(scene, work, view, body):
     """No kernel reads it, so there is nothing to differentiate."""
 
 
@@ -24,16 +24,16 @@ def no_reach(scene, work, a, b, skin, reach):
 
 REPLACEMENTS = {
     slots.surface_force: {
-        explicit.add_surface_forces: no_explicit,
-        assembly.add_surfaces: no_assembly,
+        explicit.add_surface_forces: no_forces,
+        jacobian.add_surfaces: no_derivatives,
         candidates.list_for_surface_force: no_reach,
     },
     slots.centre_force: {
-        explicit.add_centre_forces: no_explicit,
-        assembly.add_centres: no_assembly,
+        explicit.add_centre_forces: no_forces,
+        jacobian.add_centres: no_derivatives,
     },
-    slots.velocity_force: {assembly.add_velocity_derivative: no_derivative},
-    slots.position_force: {assembly.add_position_derivative: no_derivative},
+    slots.velocity_force: {jacobian.add_velocity_derivative: no_derivative},
+    slots.position_force: {jacobian.add_position_derivative: no_derivative},
 }
 """{slot: {function: replacement where the slot is not filled}}."""
 

@@ -8,11 +8,13 @@ import numpy as np
 
 from flocsim.integrators.status import Status
 from flocsim.layout import (
+    BEARABLE_STEP,
     CLOCK_SIZE,
     COUNTS_SIZE,
     LARGEST_STEP,
     MAX_STEPS,
     PAUSE_AT,
+    PREVIOUS_STEP,
     STEP,
     TOLERANCE,
     UNTIL,
@@ -54,6 +56,8 @@ class Integrator(ABC):
         clock[STEP] = self.first_step
         clock[TOLERANCE] = self.tolerance
         clock[LARGEST_STEP] = self.largest_step
+        clock[PREVIOUS_STEP] = math.inf
+        clock[BEARABLE_STEP] = math.inf
         return clock
 
     def fresh_counts(self, max_steps):

@@ -1,22 +1,21 @@
-"""The right-hand side as it stands: all forces and torques at a position and velocity.
+"""The right-hand side as it stands: all forces and torques in a state.
 
-The place is taken from one state of ``Work.motion`` and the velocity from another.
+Forces act through the listed pairs that are flagged as closed, or as the closest of two bodies.
+An integrator that freezes these flags for a step has a smooth right-hand side in it.
 """
 
-from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.contacts import locate_acting
 from flocsim.integrators.views import (
     add_force,
     body_view,
     centre_line,
     centre_view,
-    closest_rows,
     contact_view,
-    normal_rate,
     push_pair,
     surface_view,
     tangential_rate,
 )
-from flocsim.layout import CANDIDATES, EVALUATIONS, FORCE
+from flocsim.layout import CANDIDATES, CLOSED, CLOSEST, EVALUATIONS, SLIP_RATES
 from flocsim.slots import (
     body_force,
     centre_force,
@@ -28,64 +27,72 @@ from flocsim.slots import (
 )
 
 
-def clear_forces(work):
-    """No force yet on any body."""
+def start_rates(work, state, rate):
+    """The velocities of a state, and no force yet."""
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
-            work.bodies[body, FORCE + axis] = 0.0
+            work.rates[rate, body, axis] = work.motion[state, body, 3 + axis]
+            work.rates[rate, body, 3 + axis] = 0.0
 
 
-def add_body_forces(scene, work, time, place, speed):
+def add_body_forces(scene, work, time, state, rate):
     """Weight, drag and their like."""
     for body in range(scene.bodies.shape[0]):
-        view = body_view(scene, work, time, place, speed, body)
+        view = body_view(scene, work, time, state, body)
         fx, fy, torque = body_force(view, scene.parameters)
-        add_force(work, body, fx, fy, torque)
+        add_force(work, rate, body, fx, fy, torque)
 
 
-def add_centre_forces(scene, work, time, place, speed):
+def add_centre_forces(scene, work, time, state, rate):
     """Forces along the lines of centres."""
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
-            view = centre_view(scene, work, time, place, speed, a, b)
-            nx, ny, _ = centre_line(work, place, a, b)
+            view = centre_view(scene, work, time, state, a, b)
+            nx, ny, _ = centre_line(work, state, a, b)
             repulsion = centre_force(view, scene.parameters)
-            add_force(work, a, repulsion * nx, repulsion * ny, 0.0)
-            add_force(work, b, -repulsion * nx, -repulsion * ny, 0.0)
+            add_force(work, rate, a, repulsion * nx, repulsion * ny, 0.0)
+            add_force(work, rate, b, -repulsion * nx, -repulsion * ny, 0.0)
 
 
-def add_surface_forces(scene, work, time, place, speed):
+def add_surface_forces(scene, work, time, state, rate):
     """Forces at the closest points of the outlines."""
-    row = 0
-    while row < work.tally[CANDIDATES]:
-        row, closest = closest_rows(work, row)
-        view = surface_view(scene, work, time, place, speed, closest)
-        push_pair(work, closest, surface_force(view, scene.parameters), 0.0)
-
-
-def add_contact_forces(scene, work, speed, slips):
-    """Visco-elastic forces of all listed pairs that overlap."""
     for row in range(work.tally[CANDIDATES]):
-        overlap = -work.geometry[row, 2]
-        if overlap > 0.0:
-            rate = -normal_rate(work, speed, row)
-            slip_rate = tangential_rate(work, speed, row)
-            slip = work.slip[slips, row]
-            view = contact_view(scene, work, row, overlap, rate, slip, slip_rate)
+        if work.candidates[row, CLOSEST] == 1:
+            view = surface_view(scene, work, time, state, row)
+            push_pair(work, state, rate, row, surface_force(view, scene.parameters), 0.0)
+
+
+def add_contact_forces(scene, work, state, rate):
+    """Visco-elastic forces of all closed pairs."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(view, scene.parameters)
-            push_pair(work, row, normal, tangential)
+            push_pair(work, state, rate, row, normal, tangential)
 
 
-def sum_forces(scene, work, time, place, speed, slips):
-    """All forces and torques into ``work.bodies``; the contact geometry is left in ``work``."""
-    work.tally[EVALUATIONS] += 1
-    clear_forces(work)
-    add_body_forces(scene, work, time, place, speed)
-    if has_centre_force():
-        add_centre_forces(scene, work, time, place, speed)
+def rate_slips(work, state, rate):
+    """Rates of the tangential displacements of all closed pairs."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            work.slip[SLIP_RATES + rate, row] = tangential_rate(work, state, row)
+
+
+def locate_and_rate(scene, work, state, rate):
+    """Contact geometry of a state, and the rates of its tangential displacements."""
     if has_contact() or surface_reach(scene.parameters) > 0.0:
-        locate_contacts(scene, work, place)
+        locate_acting(scene, work, state)
+        rate_slips(work, state, rate)
+
+
+def sum_forces(scene, work, time, state, rate):
+    """All forces and torques of a state into ``work.rates[rate]``; its geometry is located."""
+    work.tally[EVALUATIONS] += 1
+    start_rates(work, state, rate)
+    add_body_forces(scene, work, time, state, rate)
+    if has_centre_force():
+        add_centre_forces(scene, work, time, state, rate)
     if surface_reach(scene.parameters) > 0.0:
-        add_surface_forces(scene, work, time, place, speed)
+        add_surface_forces(scene, work, time, state, rate)
     if has_contact():
-        add_contact_forces(scene, work, speed, slips)
+        add_contact_forces(scene, work, state, rate)

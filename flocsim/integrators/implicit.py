@@ -1,113 +1,116 @@
-"""Implicit: linearly implicit in the velocities, adaptive, second order by extrapolation.
-
-Each step is done once whole and once in halves; their difference is the error, and their
-extrapolation is the result.
-"""
+"""Implicit: Radau IIA of order 5 on smooth stretches, for any stiffness."""
 
 import attrs
 
 from flocsim import slots
 from flocsim.fields import quantity
-from flocsim.geometry.contacts import locate_contacts
-from flocsim.integrators.active_set import end_view, solve_velocities
-from flocsim.integrators.assembly import assemble_base
-from flocsim.integrators.base import Integrator, all_finite
-from flocsim.integrators.slips import limited_slip
-from flocsim.layout import (
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    EVALUATIONS,
-    FULL,
-    HALF,
-    NEW,
-    NOW,
-    TIME,
-    TOLERANCE,
-)
-from flocsim.slots import has_contact, surface_reach
+from flocsim.integrators.accuracy import error_ratio
+from flocsim.integrators.adaptive import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.collocation import collocate
+from flocsim.integrators.jacobian import assemble_jacobian
+from flocsim.integrators.linear import solve
+from flocsim.integrators.radau import evaluate_states, factorise_systems, solve_stages
+from flocsim.integrators.radau_tableau import EIGENVALUES, ESTIMATE
+from flocsim.integrators.slips import limit_slips
+from flocsim.integrators.switches import interpolate
+from flocsim.integrators.views import inertia
+from flocsim.layout import FIRST, FREE, NOW, PACE, SCRATCH, STIFFNESS, TIME, UNTIL
+
+ORDER_OF_ESTIMATE = 4.0
+"""The estimate goes with this power of the step."""
+
+COMFORTABLE_PACE = 0.4
+"""Newton's pace goes about with the square of the step; the next step aims at this."""
 
 
-def end_slips(scene, work, start, end, step):
-    """Tangential displacements at the end of the step."""
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[end, row] = 0.0
-        if work.candidates[row, 5] == 1:
-            view = end_view(scene, work, row, start, end, step)
-            work.slip[end, row] = limited_slip(scene, view)
+def estimated_rate(work, row, part, step):
+    """Weighted mean of the stages' increments of a place (part 0) or velocity (part 3), over h."""
+    body, axis = row // 3, row % 3 + part
+    now = work.motion[NOW, body, axis]
+    total = 0.0
+    for stage in range(3):
+        total += ESTIMATE[stage] * (work.motion[FIRST + stage, body, axis] - now)
+    return total / step
 
 
-def single_step(scene, work, time, tolerance, start, end, step):
-    """One linearly implicit step from state ``start`` to state ``end``; False where it fails."""
-    work.tally[EVALUATIONS] += 1
-    motion = work.motion
-    if has_contact() or surface_reach(scene.parameters) > 0.0:
-        locate_contacts(scene, work, start)
-    assemble_base(scene, work, time, start, step)
-    for body in range(scene.bodies.shape[0]):
-        for axis in range(3, 6):
-            motion[end, body, axis] = motion[start, body, axis]
-    if not solve_velocities(scene, work, start, end, step, tolerance):
-        return False
-    end_slips(scene, work, start, end, step)
-    for body in range(scene.bodies.shape[0]):
-        for axis in range(3):
-            motion[end, body, axis] = motion[start, body, axis] + step * motion[end, body, 3 + axis]
-    return True
+def write_error_load(scene, work, step):
+    """The load whose solution is the error of the velocities."""
+    size = work.jacobian.shape[1]
+    damped = step / EIGENVALUES[0].real
+    for row in range(size):
+        body, axis = row // 3, row % 3
+        load = work.rates[NOW, body, 3 + axis]
+        load += inertia(scene, body, axis) * estimated_rate(work, row, 3, step)
+        for column in range(size):
+            drift = work.motion[NOW, column // 3, 3 + column % 3]
+            drift += estimated_rate(work, column, 0, step)
+            load -= damped * work.jacobian[STIFFNESS, row, column] * drift
+        work.system[0, row, size] = load * scene.bodies[body, FREE]
 
 
-def extrapolate(scene, work):
-    """NEW = twice the halves less the whole; the largest difference of place [m]."""
-    largest = 0.0
-    motion = work.motion
-    for body in range(scene.bodies.shape[0]):
-        for axis in range(6):
-            change = motion[NEW, body, axis] - motion[FULL, body, axis]
-            motion[NEW, body, axis] += change
-            if axis < 3:
-                lever = scene.bodies[body, BOUNDING_RADIUS] if axis == 2 else 1.0
-                largest = max(largest, abs(change) * lever)
-    for row in range(work.tally[CANDIDATES]):
-        if work.slip[NEW, row] != 0.0 and work.slip[FULL, row] != 0.0:
-            work.slip[NEW, row] += work.slip[NEW, row] - work.slip[FULL, row]
-    return largest
+def estimate_error(scene, work, step):
+    """Write the error of the step into SCRATCH."""
+    write_error_load(scene, work, step)
+    solve(work.system, 0)
+    size = work.jacobian.shape[1]
+    damped = step / EIGENVALUES[0].real
+    for row in range(size):
+        body, axis = row // 3, row % 3
+        speed = work.system[0, row, size].real
+        drift = work.motion[NOW, body, 3 + axis] + estimated_rate(work, row, 0, step)
+        free = scene.bodies[body, FREE]
+        work.motion[SCRATCH, body, axis] = free * damped * (speed + drift)
+        work.motion[SCRATCH, body, 3 + axis] = free * speed
 
 
 def implicit_attempt(scene, work, clock, step):
-    """A step and its two halves: error over tolerance, or −1 where a solve failed."""
-    time, tolerance = clock[TIME], clock[TOLERANCE]
-    half = 0.5 * step
-    # One call in a loop: every place that a driver calls from is compiled again.
-    for stage in range(3):
-        start = HALF if stage == 2 else NOW
-        end = FULL if stage == 0 else HALF if stage == 1 else NEW
-        length = step if stage == 0 else half
-        begin = time + half if stage == 2 else time
-        if not single_step(scene, work, begin, tolerance, start, end, length):
-            return -1.0
-    error = extrapolate(scene, work)
-    if not all_finite(work, NEW):
+    """One step: error over tolerance, or −1 where Newton's method fails."""
+    time = clock[TIME]
+    evaluate_states(scene, work, time, 0.0, NOW, FIRST)
+    assemble_jacobian(scene, work, time, max(clock[UNTIL] - time, step))
+    if not factorise_systems(scene, work, step):
         return -1.0
-    return error / tolerance
+    if not solve_stages(scene, work, clock, step):
+        return -1.0
+    estimate_error(scene, work, step)
+    limit_slips(scene, work)
+    return error_ratio(scene, work, clock, step)
 
 
 def implicit_next_step(clock, step, ratio):
-    """The error goes with step²: aim below the tolerance, change by a factor of 1/5 to 4."""
-    factor = 0.9 / max(ratio, 1e-12) ** 0.5
-    return step * min(max(factor, 0.2), 4.0)
+    """The step for which the estimate and Newton's pace stay in bounds."""
+    factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
+    if clock[PACE] > 0.0:
+        factor = min(factor, (COMFORTABLE_PACE / clock[PACE]) ** 0.5)
+    return step * max(factor, SMALLEST_FACTOR)
+
+
+def wide_skin():
+    """Few long steps: longer lists, which last longer."""
+    return 4.0
 
 
 @attrs.frozen
 class Implicit(Integrator):
-    """Adaptive and stable for any stiffness: the default.
+    """Radau IIA of order 5, adaptive and stable for any stiffness: the default.
 
-    Parameters: ``tolerance`` [m], the local error of a step in the place of any outline point;
-    ``first_step`` [s].
+    Steps end where a pair of features touches or parts, so that the forces are smooth inside them.
+    Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
+    velocity error leads to included; ``first_step`` [s].
+
+    Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), section IV.8.
     """
 
-    tolerance: float = quantity("m", above=0.0, default=1e-9)
+    tolerance: float = quantity("m", above=0.0, default=1e-8)
     first_step: float = quantity("s", above=0.0, default=1e-6)
 
     @property
     def fillings(self):
         """The slots that this integrator fills."""
-        return {slots.attempt: implicit_attempt, slots.next_step: implicit_next_step}
+        return {
+            slots.attempt: implicit_attempt,
+            slots.next_step: implicit_next_step,
+            interpolate: collocate,
+            slots.skin_factor: wide_skin,
+        }

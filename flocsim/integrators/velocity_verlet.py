@@ -4,44 +4,72 @@ import attrs
 
 from flocsim import slots
 from flocsim.fields import quantity
+from flocsim.geometry.contacts import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator, all_finite
-from flocsim.integrators.explicit import sum_forces
-from flocsim.integrators.slips import advance_slips
-from flocsim.layout import FORCE, FREE, HALF, INERTIA, LARGEST_STEP, MASS, NEW, NOW, TIME
+from flocsim.integrators.explicit import locate_and_rate, sum_forces
+from flocsim.integrators.modes import set_modes
+from flocsim.integrators.slips import limit_slips
+from flocsim.integrators.views import inertia, tangential_rate
+from flocsim.layout import CANDIDATES, CLOSED, FIRST, FREE, LARGEST_STEP, NEW, NOW, TIME
 
 
-def kick(scene, work, start, end, step):
-    """Velocity of state ``end`` = that of ``start`` + step · acceleration, for free bodies."""
-    known = scene.bodies
-    for body in range(known.shape[0]):
-        for axis in range(3):
-            inertia = known[body, INERTIA] if axis == 2 else known[body, MASS]
-            gain = step * known[body, FREE] * work.bodies[body, FORCE + axis] / inertia
-            work.motion[end, body, 3 + axis] = work.motion[start, body, 3 + axis] + gain
+def locate_and_flag(scene, work, state):
+    """Fixed steps do not end at switches: every evaluation flags the pairs as they are."""
+    locate_contacts(scene, work, state)
+    set_modes(scene, work, state)
 
 
-def drift(work, step):
-    """Place of NEW = place of NOW + step · velocity of HALF."""
+def gain(scene, work, body, axis, step):
+    """Change of a velocity in a step at the force in place NOW of ``work.rates``."""
+    force = work.rates[NOW, body, 3 + axis]
+    return step * scene.bodies[body, FREE] * force / inertia(scene, body, axis)
+
+
+def kick_and_drift(scene, work, step):
+    """Half a kick into FIRST, whose velocity carries to the place of NEW; NEW has a whole kick."""
     motion = work.motion
     for body in range(motion.shape[1]):
         for axis in range(3):
-            motion[NEW, body, axis] = motion[NOW, body, axis] + step * motion[HALF, body, 3 + axis]
+            speed = motion[NOW, body, 3 + axis]
+            kick = gain(scene, work, body, axis, step)
+            motion[FIRST, body, 3 + axis] = speed + 0.5 * kick
+            motion[NEW, body, axis] = motion[NOW, body, axis] + step * (speed + 0.5 * kick)
+            # Drag at the half step's velocity would be half a step late: take a whole kick's.
+            motion[NEW, body, 3 + axis] = speed + kick
+
+
+def finish_kick(scene, work, step):
+    """The velocity of NEW: that of FIRST and half a kick at the force of NEW."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            kick = gain(scene, work, body, axis, 0.5 * step)
+            work.motion[NEW, body, 3 + axis] = work.motion[FIRST, body, 3 + axis] + kick
+
+
+def slip_new(work, step):
+    """Tangential displacements of NEW from the mean of their rates at both ends."""
+    slip = work.slip
+    for row in range(work.tally[CANDIDATES]):
+        slip[NEW, row] = 0.0
+        if work.candidates[row, CLOSED] == 1:
+            rate = tangential_rate(work, NEW, row)
+            if work.geometry[NOW, row, 2] < 0.0:
+                rate = 0.5 * (rate + tangential_rate(work, NOW, row))
+            slip[NEW, row] = slip[NOW, row] + step * rate
 
 
 def verlet_attempt(scene, work, clock, step):
     """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
-    time = clock[TIME]
-    sum_forces(scene, work, time, NOW, NOW, NOW)
-    kick(scene, work, NOW, HALF, 0.5 * step)
-    advance_slips(scene, work, HALF, NOW, NEW, step)
-    drift(work, step)
-    # Drag at the half step's velocity would be half a step late: take a whole kick's instead.
-    kick(scene, work, NOW, NEW, step)
-    sum_forces(scene, work, time + step, NEW, NEW, NEW)
-    kick(scene, work, HALF, NEW, 0.5 * step)
-    if not all_finite(work, NEW):
-        return -1.0
-    return 0.0
+    for state in (NOW, NEW):
+        if state == NEW:
+            kick_and_drift(scene, work, step)
+        locate_and_rate(scene, work, state, NOW)
+        if state == NEW:
+            slip_new(work, step)
+        sum_forces(scene, work, clock[TIME] + step * (state == NEW), state, NOW)
+    finish_kick(scene, work, step)
+    limit_slips(scene, work)
+    return 0.0 if all_finite(work, NEW) else -1.0
 
 
 def same_step(clock, step, ratio):
@@ -71,4 +99,8 @@ class VelocityVerlet(Integrator):
     @property
     def fillings(self):
         """The slots that this integrator fills."""
-        return {slots.attempt: verlet_attempt, slots.next_step: same_step}
+        return {
+            slots.attempt: verlet_attempt,
+            slots.next_step: same_step,
+            locate_acting: locate_and_flag,
+        }

@@ -3,10 +3,10 @@
 import math
 
 from flocsim.layout import (
+    BOUNDING_RADIUS,
     BUOYANT_MASS,
     CANDIDATES,
     EQUIVALENT_RADIUS,
-    FORCE,
     FREE,
     INERTIA,
     MASS,
@@ -15,13 +15,13 @@ from flocsim.layout import (
 from flocsim.state import BodyView, ContactView, PairView
 
 
-def body_view(scene, work, time, place, speed, body):
-    """The BodyView of one body: its place from one state, its velocity from another."""
+def body_view(scene, work, time, state, body):
+    """The BodyView of one body in a state."""
     motion, known = work.motion, scene.bodies
     return BodyView(
         time,
-        motion[place, body, 0], motion[place, body, 1], motion[place, body, 2],
-        motion[speed, body, 3], motion[speed, body, 4], motion[speed, body, 5],
+        motion[state, body, 0], motion[state, body, 1], motion[state, body, 2],
+        motion[state, body, 3], motion[state, body, 4], motion[state, body, 5],
         known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
         known[body, EQUIVALENT_RADIUS],
     )  # fmt: skip
@@ -47,66 +47,64 @@ def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
     )  # fmt: skip
 
 
-def centre_rates(work, speed, a, b):
-    """Velocity of body a's centroid less that of body b's."""
-    motion = work.motion
-    return motion[speed, a, 3] - motion[speed, b, 3], motion[speed, a, 4] - motion[speed, b, 4]
-
-
-def normal_rate(work, speed, row):
+def normal_rate(work, state, row):
     """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
-    g = work.geometry
-    motion = work.motion
-    dvx, dvy = centre_rates(work, speed, a, b)
-    turning = motion[speed, a, 5] * g[row, 3] - motion[speed, b, 5] * g[row, 5]
-    return g[row, 0] * dvx + g[row, 1] * dvy + turning
+    g, motion = work.geometry, work.motion
+    rate = g[state, row, 0] * (motion[state, a, 3] - motion[state, b, 3])
+    rate += g[state, row, 1] * (motion[state, a, 4] - motion[state, b, 4])
+    return rate + motion[state, a, 5] * g[state, row, 3] - motion[state, b, 5] * g[state, row, 5]
 
 
-def tangential_rate(work, speed, row):
+def tangential_rate(work, state, row):
     """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
-    g = work.geometry
-    motion = work.motion
-    dvx, dvy = centre_rates(work, speed, a, b)
-    turning = motion[speed, a, 5] * g[row, 4] - motion[speed, b, 5] * g[row, 6]
-    return g[row, 0] * dvy - g[row, 1] * dvx + turning
+    g, motion = work.geometry, work.motion
+    rate = g[state, row, 0] * (motion[state, a, 4] - motion[state, b, 4])
+    rate -= g[state, row, 1] * (motion[state, a, 3] - motion[state, b, 3])
+    return rate + motion[state, a, 5] * g[state, row, 4] - motion[state, b, 5] * g[state, row, 6]
 
 
-def contact_view(scene, work, row, overlap, overlap_rate, slip, slip_rate):
-    """The ContactView of a listed pair."""
+def contact_view(scene, work, state, row):
+    """The ContactView of a listed pair in a state."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
     return ContactView(
-        overlap, overlap_rate, slip, slip_rate, effective_mass(scene, a, b),
+        -work.geometry[state, row, 2], -normal_rate(work, state, row),
+        work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
         scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
     )  # fmt: skip
 
 
-def both_fixed(scene, a, b):
-    """Whether nothing between these two bodies can matter."""
-    return scene.bodies[a, FREE] == 0.0 and scene.bodies[b, FREE] == 0.0
+def inertia(scene, body, axis):
+    """Mass [kg], or moment of inertia [kg m²] for axis 2."""
+    return scene.bodies[body, INERTIA] if axis == 2 else scene.bodies[body, MASS]
 
 
-def add_force(work, body, fx, fy, torque):
-    """Add to the force and torque on a body."""
-    work.bodies[body, FORCE] += fx
-    work.bodies[body, FORCE + 1] += fy
-    work.bodies[body, FORCE + 2] += torque
+def lever(scene, body, axis):
+    """How far the outline moves for a unit of a coordinate: 1, or the bounding radius [m/rad]."""
+    return scene.bodies[body, BOUNDING_RADIUS] if axis == 2 else 1.0
 
 
-def push_pair(work, row, normal, tangential):
+def add_force(work, rate, body, fx, fy, torque):
+    """Add to the force and torque on a body at a stage."""
+    work.rates[rate, body, 3] += fx
+    work.rates[rate, body, 4] += fy
+    work.rates[rate, body, 5] += torque
+
+
+def push_pair(work, state, rate, row, normal, tangential):
     """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
     g = work.geometry
-    fx = normal * g[row, 0] - tangential * g[row, 1]
-    fy = normal * g[row, 1] + tangential * g[row, 0]
-    torque_a = normal * g[row, 3] + tangential * g[row, 4]
-    torque_b = normal * g[row, 5] + tangential * g[row, 6]
-    add_force(work, a, fx, fy, torque_a)
-    add_force(work, b, -fx, -fy, -torque_b)
+    fx = normal * g[state, row, 0] - tangential * g[state, row, 1]
+    fy = normal * g[state, row, 1] + tangential * g[state, row, 0]
+    torque_a = normal * g[state, row, 3] + tangential * g[state, row, 4]
+    torque_b = normal * g[state, row, 5] + tangential * g[state, row, 6]
+    add_force(work, rate, a, fx, fy, torque_a)
+    add_force(work, rate, b, -fx, -fy, -torque_b)
 
 
-def closest_rows(work, row):
+def closest_rows(work, state, row):
     """(end of the run of rows that belong to the same two bodies, row with the smallest gap)."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
     closest = row
@@ -115,35 +113,35 @@ def closest_rows(work, row):
         c, d = work.candidates[end, 0], work.candidates[end, 2]
         if not ((c == a and d == b) or (c == b and d == a)):
             break
-        if work.geometry[end, 2] < work.geometry[closest, 2]:
+        if work.geometry[state, end, 2] < work.geometry[state, closest, 2]:
             closest = end
         end += 1
     return end, closest
 
 
-def centre_line(work, place, a, b):
+def centre_line(work, state, a, b):
     """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
-    dx = work.motion[place, a, 0] - work.motion[place, b, 0]
-    dy = work.motion[place, a, 1] - work.motion[place, b, 1]
+    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
+    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0
     return dx / distance, dy / distance, distance
 
 
-def centre_view(scene, work, time, place, speed, a, b):
+def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
-    nx, ny, distance = centre_line(work, place, a, b)
+    nx, ny, distance = centre_line(work, state, a, b)
     motion = work.motion
-    rate = nx * (motion[speed, a, 3] - motion[speed, b, 3])
-    rate += ny * (motion[speed, a, 4] - motion[speed, b, 4])
+    rate = nx * (motion[state, a, 3] - motion[state, b, 3])
+    rate += ny * (motion[state, a, 4] - motion[state, b, 4])
     gap = distance - scene.bodies[a, EQUIVALENT_RADIUS] - scene.bodies[b, EQUIVALENT_RADIUS]
     return pair_view(scene, time, a, b, gap, rate, distance)
 
 
-def surface_view(scene, work, time, place, speed, row):
+def surface_view(scene, work, time, state, row):
     """The PairView of the two bodies of a listed pair, their gap being the pair's."""
     a, b = work.candidates[row, 0], work.candidates[row, 2]
-    _, _, distance = centre_line(work, place, a, b)
-    rate = normal_rate(work, speed, row)
-    return pair_view(scene, time, a, b, work.geometry[row, 2], rate, distance)
+    _, _, distance = centre_line(work, state, a, b)
+    rate = normal_rate(work, state, row)
+    return pair_view(scene, time, a, b, work.geometry[state, row, 2], rate, distance)

@@ -6,6 +6,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles.start import half_extents, largest_displacement, place_pair
+from flocsim.geometry.cores import distance_to_edges, edges_of
 
 GAP = 2e-6
 
@@ -137,3 +138,37 @@ def test_the_mirror_image_starts_as_the_mirror_image():
         straight = place_pair(shapes, angles, displacement, GAP)
         image = place_pair([mirrored(s) for s in shapes], -angles, -displacement, GAP)
         np.testing.assert_allclose(image, straight * [-1.0, 1.0, -1.0], atol=1e-11)
+
+
+def ends_of(core):
+    """(starts, ends) of a core's edges; for a point, an edge too short to matter."""
+    return edges_of(core) if len(core) > 1 else (core, core + 1e-20)
+
+
+def core_distance(shapes, places):
+    """Smallest distance of a core point of one to the core of the other, by all pairs."""
+    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
+    tables = [distance_to_edges(points, *ends_of(core)) for points, core in (cores, cores[::-1])]
+    return min(table.min() for table in tables)
+
+
+def height_by_all_pairs(shapes, angles, displacement):
+    """The same way down, every distance taken from all pairs."""
+    contact = sum(shape.radius for shape in shapes)
+    clear = sum(shape.bounding_radius for shape in shapes) + GAP
+    height = np.sqrt(clear**2 - displacement**2)
+    left = np.inf
+    while left > 1e-6 * GAP:
+        places = np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
+        left = core_distance(shapes, places) - contact - GAP
+        if left > 1e-6 * GAP:
+            height -= left
+    return height
+
+
+def test_the_height_is_that_of_all_pairs():
+    for shapes, angles in pairs(40):
+        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        found = place_pair(shapes, angles, 0.6 * largest, GAP)[1, 1]
+        expected = height_by_all_pairs(shapes, angles, 0.6 * largest)
+        assert found == pytest.approx(expected, rel=1e-12)

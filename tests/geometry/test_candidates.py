@@ -15,7 +15,7 @@ from reference.shapes import Scene, make_body
 from flocsim import slots
 from flocsim.body import Fluid
 from flocsim.composer import compose
-from flocsim.geometry.candidates import list_candidates, list_pair, moved
+from flocsim.geometry.candidates import list_candidates, list_pair, moved, spent, time_within
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.layout import CANDIDATES, NOW
 from flocsim.state import scene_of, with_capacity, work_of
@@ -39,11 +39,13 @@ def spend_budget(scene, work, wanted):
     """Move the bodies as wanted (n, 3), scaled so that one pair spends just all of its budget."""
     steps = np.array(wanted)[: 3 * len(scene.bodies)].reshape(-1, 3) * (1e-5, 1e-5, 1.0)
     start = work.motion[NOW, :, :3].copy()
-    work.motion[NOW, :, :3] += steps
-    pairs = [(a, b) for a in range(len(steps)) for b in range(a)]
-    used = [moved(scene, work, NOW, *pair) for pair in pairs]
-    share = max(use / work.budget[k] for k, use in enumerate(used))
-    work.motion[NOW, :, :3] = start + steps * ((1.0 - 1e-9) / share if share > 0.0 else 0.0)
+    within, beyond = 0.0, 2.0
+    # What a motion spends is not in proportion to it where bodies turn far: bisect.
+    for _ in range(40):
+        share = 0.5 * (within + beyond)
+        work.motion[NOW, :, :3] = start + share * steps
+        within, beyond = (share, beyond) if spent(scene, work, NOW) <= 1.0 else (within, share)
+    work.motion[NOW, :, :3] = start + within * steps
 
 
 def pairs_now(plain, work):
@@ -111,7 +113,7 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     assert list_candidates(scene, work)
     locate_contacts(scene, work, NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
-    assert work.geometry[: work.tally[CANDIDATES], 2].min() < 0.0
+    assert work.geometry[NOW, : work.tally[CANDIDATES], 2].min() < 0.0
 
 
 REACHES = [1e-8, 1e-7, 4e-7, 1e-6, 3e-6, 2e-5]
@@ -136,7 +138,9 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
             for pair, overlap in zip(every.pair, every.overlap, strict=True)
             if {pair[0], pair[2]} == two
         )
-        known = [work.geometry[row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two]
+        known = [
+            work.geometry[NOW, row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two
+        ]
         if least < reach:
             assert min(known, default=np.inf) == pytest.approx(least, rel=1e-9, abs=1e-17)
 
@@ -144,7 +148,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
 def test_spheres_are_one_pair_and_a_sphere_has_no_edge():
     ball = make_body([[0.0, 0.0]], 2e-6, surface_density=2.0)
     square = make_body([[0, 0], [4e-6, 0], [4e-6, 4e-6], [0, 4e-6]], 1e-6, surface_density=2.0)
-    places = np.array([[0.0, 0.0, 0.0], [3.9e-6, 0.0, 0.0], [0.0, 4.9e-6, 0.0]])
+    places = np.array([[0.0, 0.0, 0.0], [3.2e-6, 0.0, 0.0], [0.0, 4.9e-6, 0.0]])
     scene, work = arrays(Scene((ball, ball, square), places, np.zeros((3, 3))))
     assert list_candidates(scene, work)
     keys = keys_of(scene, work)
@@ -191,7 +195,7 @@ def cut_to(work, capacity):
     tight = work._replace(
         slip=work.slip[:, :capacity],
         candidates=work.candidates[:capacity],
-        geometry=work.geometry[:capacity],
+        geometry=work.geometry[:, :capacity],
         kept=work.kept[:capacity],
     )
     return type(work)(*(array.copy() for array in tight))
@@ -200,7 +204,7 @@ def cut_to(work, capacity):
 def move_together(plain, work):
     """Bring the bodies a little nearer to their middle, so that more pairs come near."""
     away = plain.positions[:, :2] - plain.positions[:, :2].mean(axis=0)
-    work.motion[NOW, :, :2] -= 3e-7 * away / np.hypot(*away.T)[:, None]
+    work.motion[NOW, :, :2] -= 8e-7 * away / np.hypot(*away.T)[:, None]
 
 
 def slips_of(scene, work):
@@ -215,3 +219,28 @@ def test_bodies_far_apart_list_nothing_and_may_move_until_they_are_near():
     scene, work = arrays(Scene(plain.bodies, far, plain.velocities))
     assert list_candidates(scene, work) and work.tally[CANDIDATES] == 0
     assert list_pair(scene, work, 1, 0) > 8e-4
+
+
+@given(seeds)
+@settings(max_examples=40)
+def test_a_short_motion_spends_no_more_than_the_speeds_tell(seed):
+    scene, work = arrays(random_scene(seed))
+    assert list_candidates(scene, work)
+    time = time_within(scene, work, 1e-4)
+    work.motion[NOW, :, :3] += time * work.motion[NOW, :, 3:]
+    pairs = [(a, b) for a in range(len(scene.bodies)) for b in range(a)]
+    for pair, budget in zip(pairs, work.budget, strict=True):
+        assert moved(scene, work, NOW, *pair, enough=0.0) <= 1.01e-4 * budget
+
+
+def test_a_scene_that_turns_as_one_spends_nothing():
+    plain = random_scene(3)
+    scene, work = arrays(plain)
+    assert list_candidates(scene, work)
+    c, s = np.cos(2.0), np.sin(2.0)
+    work.motion[NOW, :, :2] = work.motion[NOW, :, :2] @ np.array([[c, s], [-s, c]])
+    work.motion[NOW, :, 2] += 2.0
+    assert spent(scene, work, NOW) < 1e-6
+    now = work.motion[NOW]
+    now[:, 3:] = np.column_stack([-7.0 * now[:, 1], 7.0 * now[:, 0], np.full(len(now), 7.0)])
+    assert time_within(scene, work, 1.0) > 1e6

@@ -8,8 +8,9 @@ from flocsim.body import Fluid
 from flocsim.geometry.candidates import list_candidates, spent
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.geometry.handover import hand_over
-from flocsim.integrators.slips import advance_slips
-from flocsim.layout import CANDIDATES, NEW, NOW
+from flocsim.integrators.explicit import rate_slips
+from flocsim.integrators.modes import set_modes
+from flocsim.layout import CANDIDATES, CLOSED, NOW, SLIP_RATES
 from flocsim.state import scene_of, work_of
 
 OVERLAP, RADIUS, BALL = 5e-8, 1e-6, 2e-6
@@ -39,7 +40,7 @@ def pull(work):
     total = 0.0
     for row in range(work.tally[CANDIDATES]):
         side = 1.0 if work.candidates[row, 0] == 1 else -1.0
-        total -= side * work.slip[NOW, row] * -work.geometry[row, 1]
+        total -= side * work.slip[NOW, row] * -work.geometry[NOW, row, 1]
     return total
 
 
@@ -48,9 +49,11 @@ def slide(scene, work, length, passing_on=hand_over, steps=400):
     step = length / steps / work.motion[NOW, 1, 3]
     pulls = []
     for _ in range(steps):
-        advance_slips(scene, work, NOW, NOW, NEW, step)
+        set_modes(scene, work)
+        rate_slips(work, NOW, 0)
+        closed = work.candidates[:, CLOSED] == 1
+        work.slip[NOW, closed] += step * work.slip[SLIP_RATES, closed]
         work.motion[NOW, 1, 0] += length / steps
-        work.slip[NOW] = work.slip[NEW]
         locate_contacts(scene, work, NOW)
         passing_on(work)
         if spent(scene, work, NOW) > 0.5:
@@ -80,7 +83,7 @@ def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
 
 def forget(work):
     """What no hand-over would do: an opening pair loses its displacement."""
-    opened = work.geometry[: work.tally[CANDIDATES], 2] >= 0.0
+    opened = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
     work.slip[NOW, : work.tally[CANDIDATES]][opened] = 0.0
 
 
@@ -114,11 +117,11 @@ def test_what_one_corner_loses_another_carries_on_and_only_along_its_own_tangent
     scene, work = square_on_slab(0.0)
     slide(scene, work, 1e-7, steps=10)
     before = pull(work)
-    closed = np.count_nonzero(work.geometry[: work.tally[CANDIDATES], 2] < 0.0)
+    closed = np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0)
     # Turned a little about its centre, the square stands on one corner less.
     work.motion[NOW, 1, 2] = 0.03
     locate_contacts(scene, work, NOW)
-    assert 0 < np.count_nonzero(work.geometry[: work.tally[CANDIDATES], 2] < 0.0) < closed
+    assert 0 < np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0) < closed
     hand_over(work)
     assert pull(work) == pytest.approx(before, rel=1e-9)
 
@@ -134,7 +137,7 @@ def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
     work = work_of(scene, position, np.zeros((3, 3)))
     assert list_candidates(scene, work)
     locate_contacts(scene, work, NOW)
-    gap = work.geometry[: work.tally[CANDIDATES], 2]
+    gap = work.geometry[NOW, : work.tally[CANDIDATES], 2]
     opened = int(np.flatnonzero(gap >= 0.0)[0])
     work.slip[NOW, opened] = 1e-9
     hand_over(work)

@@ -41,5 +41,6 @@ def test_the_last_edge_of_each_body_ends_where_the_first_begins():
     scene = scene_of(bodies_of(random_scene(1), surface_density=2.0), Fluid(), [])
     for body, first in enumerate(scene.first[:-1]):
         count = scene.first[body + 1] - first
-        ends = [edge_end(scene, body, edge) - first for edge in range(edge_count(count))]
+        starts = range(first, first + edge_count(count))
+        ends = [edge_end(first, count, start) - first for start in starts]
         assert ends == [*range(1, len(ends)), 0] if count > 2 else ends in ([], [1])

@@ -1,85 +1,102 @@
-"""How fast errors fall with the step or the tolerance: with drag, and in a collision.
+"""The order of the methods: how their errors fall with equal steps where the forces are smooth.
 
-The smooth two-body problem is in tests/verification/test_two_bodies.py.
+One scene is without contact, the other in contact throughout, with slip and damping.
 """
 
-import math
+from functools import cache
 
+import attrs
 import numpy as np
 import pytest
-from reference.closed_forms import impact
-from trial_scenes import ELASTIC, PolygonSystem, Spring, head_on, watched
+from methods import name_of
+from trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
 
-from flocsim import Body, Sphere, System
-from flocsim.forces import Contact, Gravity, StokesDrag
-from flocsim.integrators import Implicit, VelocityVerlet
+from flocsim import Body, Sphere
+from flocsim.forces import Contact, StokesDrag
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
+from flocsim.integrators.driver import keep_lists, take_new_state
+from flocsim.layout import LARGEST_STEP, NEW, NOW, TIME, TOLERANCE, UNTIL
+from flocsim.slots import attempt
+from flocsim.state import work_of
 
-SPEED, GAP, K_N = 1e-3, 1e-7, 20.0
-
-
-def bounce_error(integrator, z=0.0):
-    """Error [m] of the place of two spheres after their bounce, by the closed form."""
-    bodies = head_on(SPEED, GAP)
-    omega = math.sqrt(2.0 * K_N / bodies[0].mass)
-    until = GAP / SPEED + 6.0 / omega
-    law = ELASTIC if z == 0.0 else Contact(K_N, 0.0, damping_n=2.0 * z * omega)
-    end = watched(PolygonSystem(bodies, [law, Spring()], integrator), until)
-    restitution, lasted, _ = impact(z, True)
-    expected = restitution * SPEED * (until - GAP / SPEED - lasted / omega)
-    return abs(end.position[1, 0] - end.position[0, 0] - 1e-5 - expected)
+EXACT = 1e-18
+"""A tolerance [m] at which Newton's method goes on to the last bit."""
 
 
-def test_velocity_verlet_is_of_second_order_through_an_elastic_bounce():
-    """The kink at the touch shakes single errors, so a decade of steps is compared."""
-    coarse, fine = (
-        np.mean([bounce_error(VelocityVerlet(base / k)) for k in (1.0, 1.13, 1.27)])
-        for base in (4e-7, 4e-8)
-    )
-    assert math.log10(coarse / fine) == pytest.approx(2.0, abs=0.4)
+def even_steps(scene, work, clock, step, count):
+    """Take equal steps whatever their error; False where one fails."""
+    keep_lists(scene, work)
+    for _ in range(count):
+        if attempt(scene, work, clock, step) < 0.0:
+            return False
+        locate_contacts(scene, work, NEW)
+        take_new_state(work)
+        clock[TIME] += step
+    return True
 
 
-def test_velocity_verlet_is_of_first_order_through_a_damped_bounce():
-    """The dashpot's force jumps at the touch: no fixed step that does not end there does better."""
-    coarse, fine = (bounce_error(VelocityVerlet(step), z=0.3) for step in (4e-7, 4e-9))
-    assert fine < 0.05 * coarse
+def trapped():
+    """A hook and a sphere on springs in a fluid: (bodies, forces, time)."""
+    left = Body(hook(), (3e-6, 1e-6), 0.5, (0.0, 2e-3), 40.0, surface_density=2.0)
+    right = Body(Sphere(5e-6), (40e-6, -2e-6), 1.0, (0.1, -0.4), -90.0, surface_density=2.0)
+    return [left, right], [Trap(0.02, 1e-12), Spring(5e-3, -2e-6), StokesDrag()], 3e-4
 
 
-@pytest.mark.parametrize("z", [0.0, 0.3])
-def test_error_of_implicit_falls_with_its_tolerance_through_a_bounce(z):
-    """Over five decades of tolerance the error falls by at least two."""
-    errors = [bounce_error(Implicit(tolerance=10.0**-k), z) for k in (10, 12, 15)]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 0.01 * errors[0]
-    assert errors[2] < 1e-11
+def pressed():
+    """Two spheres that are pressed together and turn against each other: the same."""
+    left, right = head_on(0.0, -1e-7)
+    bodies = [attrs.evolve(left, velocity=(0.0, 1e-3), spin=300.0), attrs.evolve(right, spin=100.0)]
+    forces = [Contact(k_n=20.0, k_t=2.0, damping_n=3e4), Spring(0.5, -2e-6), StokesDrag()]
+    return bodies, forces, 6e-5
 
 
-def fall_error(integrator):
-    """Error of the speed of a sphere after one τ of falling, as a share of v_t."""
-    body = Body(Sphere(5e-6), density=2650.0)
-    drag = 6.0 * math.pi * 8.9e-4 * 5e-6
-    tau, terminal = body.mass / drag, body.mass * 9.81 / drag
-    found = System([body], [Gravity(), StokesDrag()], integrator).run(tau, jit=False)
-    return abs(found.velocity[-1, 0, 1] / terminal + 1.0 - math.exp(-1.0))
+SCENES = {"trapped": trapped, "pressed": pressed}
 
 
-def test_velocity_verlet_is_of_second_order_with_drag():
-    tau = 1.6541822721598005e-05
-    errors = [fall_error(VelocityVerlet(tau / n)) for n in (20, 40, 80)]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert orders == pytest.approx([2.0, 2.0], abs=0.2)
+@cache
+def end_of(scene, integrator, count):
+    """Places and velocities times 0.1 ms (n, 6) [m] after so many equal steps, turns at 10 µm."""
+    bodies, forces, until = SCENES[scene]()
+    system = PolygonSystem(bodies, forces, integrator)
+    driver = system.compose(entry=even_steps, jit=False)
+    work, clock = work_of(system.scene(), *system.motion()), integrator.fresh_clock()
+    clock[TOLERANCE] = min(clock[TOLERANCE], EXACT)
+    clock[UNTIL], clock[LARGEST_STEP] = until, until / count
+    assert driver(system.scene(), work, clock, until / count, count)
+    return work.motion[NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
-def test_error_of_implicit_falls_with_its_tolerance_with_drag():
-    errors = [fall_error(Implicit(10.0**-k, first_step=1e-8)) for k in (11, 13, 15)]
-    assert errors[1] < 0.05 * errors[0]
-    assert errors[2] < 0.05 * errors[1]
+def orders(scene, integrator, counts, exact):
+    """Orders between counts, each twice the one before."""
+    errors = [np.linalg.norm(end_of(scene, integrator, count) - exact) for count in counts]
+    return np.log2(np.divide(errors[:-1], errors[1:]))
 
 
-def test_steps_go_with_the_root_of_the_tolerance():
-    """Second order: a hundredth of the tolerance costs ten times the steps, not a hundred."""
-    bodies = head_on(SPEED, GAP)
-    counts = [
-        watched(PolygonSystem(bodies, [ELASTIC, Spring(1e-2)], Implicit(t)), 1e-3).steps
-        for t in (1e-12, 1e-14)
-    ]
-    assert 6.0 < counts[1] / counts[0] < 14.0
+OWN = Overdamped()
+"""Compared with itself: without inertia the motion is another one."""
+
+CASES = [
+    (VelocityVerlet(), "trapped", (128, 256, 512), 2.0),
+    (VelocityVerlet(), "pressed", (128, 256, 512), 2.0),
+    (DormandPrince54(), "trapped", (128, 256, 512), 5.0),
+    (DormandPrince54(), "pressed", (32, 64, 128), 5.0),
+    (Implicit(), "trapped", (128, 256, 512), 5.0),
+    (Implicit(), "pressed", (16, 32, 64), 5.0),
+    (OWN, "trapped", (256, 512), 5.0),
+]
+
+
+@pytest.mark.parametrize(
+    ("integrator", "scene", "counts", "order"),
+    CASES, ids=[f"{name_of(case[0])}-{case[1]}" for case in CASES],
+)  # fmt: skip
+def test_order(integrator, scene, counts, order):
+    exact = end_of(scene, OWN if integrator is OWN else DormandPrince54(), 2048)
+    assert orders(scene, integrator, counts, exact)[-1] == pytest.approx(order, abs=0.4)
+
+
+def test_all_methods_go_to_the_same_end():
+    for scene in SCENES:
+        ends = [end_of(scene, method, 1024) for method in (Implicit(), DormandPrince54())]
+        assert np.abs(ends[1] - ends[0]).max() < 1e-14

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from methods import by_method, by_setting
 from scipy.integrate import solve_ivp
 from trial_scenes import (
     WATER_VISCOSITY,
@@ -19,10 +20,7 @@ from trial_scenes import (
 )
 
 from flocsim import Body, Sphere, SpheroPolygon, system
-from flocsim.integrators import Implicit, VelocityVerlet
-
-METHODS = [VelocityVerlet(5e-8), Implicit(tolerance=1e-10)]
-by_method = pytest.mark.parametrize("integrator", METHODS, ids=lambda m: type(m).__name__)
+from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 
 
 def own(trap=0.02, upright=1e-13, spring=5e-3, film=2e-6, modulus=1e4, loss=20.0, k_t=2.0):
@@ -48,17 +46,21 @@ def crowd(n):
 def test_compiled_and_uncompiled_runs_agree(n, integrator):
     scene = PolygonSystem(crowd(n), own(), integrator)
     compiled, plain = scene.run(4e-5), scene.run(4e-5, jit=False)
-    assert len(compiled.t) == len(plain.t)
-    grain = [1e-16, 1e-16, 1e-11]
-    assert np.all(np.abs(compiled.position - plain.position) <= grain)
-    assert compiled.evaluations == plain.evaluations
+    # The last bits differ, and the size of an adaptive step follows them.
+    fixed = np.isinf(integrator.tolerance)
+    grain = 1e-16 if fixed else integrator.tolerance
+    apart = compiled.position[-1] - plain.position[-1]
+    assert np.abs(apart * [1.0, 1.0, 1e-5]).max() <= grain
+    assert compiled.steps == pytest.approx(plain.steps, abs=0 if fixed else 20)
+    assert compiled.evaluations == pytest.approx(plain.evaluations, rel=0.0 if fixed else 0.3)
 
 
 @by_method
 @pytest.mark.parametrize("n", [1, 3, 5])
 def test_crowds_reach_the_end_with_few_steps(n, integrator):
     """Bodies that come within the reach of a surface force do not creep up to it."""
-    found = PolygonSystem(crowd(n), own(), integrator).run(4e-4, max_steps=20_000)
+    few = 50_000 if np.isinf(integrator.tolerance) else 5_000
+    found = PolygonSystem(crowd(n), own(), integrator).run(4e-4, max_steps=few)
     assert found.status.name == "FINISHED"
     assert found.position.shape == (len(found.t), n, 3)
     assert np.isfinite(found.position).all()
@@ -98,9 +100,7 @@ def film_and_contact(t, state, mass, reduced, film):
     return [rate, force / mass]
 
 
-@pytest.mark.parametrize(
-    ("integrator", "allowed"), [(VelocityVerlet(2e-9), 1e-9), (Implicit(1e-12), 1e-9)]
-)
+@by_setting((VelocityVerlet(2e-9), 1e-9), (DormandPrince54(1e-12), 1e-11), (Implicit(1e-12), 1e-11))
 def test_film_and_hertzian_contact_against_an_independent_solver(integrator, allowed):
     speed, gap, until = 0.5, 1e-6, 6e-5
     bodies = head_on(speed, gap)

@@ -1,13 +1,15 @@
 """Settling alone: MODEL section 7's terminal velocities, relaxation and table of speeds."""
 
+import attrs
 import numpy as np
 import pytest
+from methods import by_adaptive
 from reference.closed_forms import relaxation_time, terminal_velocity
 from trial_scenes import WATER_VISCOSITY, hook
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Gravity, StokesDrag
-from flocsim.integrators import Implicit, VelocityVerlet
+from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 
 RADIUS = 5e-6
 BUOYANT = Fluid(viscosity=WATER_VISCOSITY, density=997.0, buoyancy=True)
@@ -62,18 +64,23 @@ def test_terminal_velocity_follows_the_equivalent_radius(shape):
 
 @pytest.mark.parametrize(
     ("integrator", "allowed"),
-    [(Implicit(tolerance=1e-11), 3e-3), (Implicit(tolerance=1e-14), 1e-5)]
-    + [(VelocityVerlet(1e-7), 2e-3), (VelocityVerlet(1e-8), 2e-4)],
+    [(Implicit(1e-11), 1e-4), (Implicit(1e-14), 1e-7), (VelocityVerlet(1e-7), 2e-3)]
+    + [
+        (VelocityVerlet(1e-8), 2e-4),
+        (DormandPrince54(1e-11), 1e-3),
+        (DormandPrince54(1e-14), 1e-6),
+    ],
 )
 def test_relaxation_follows_the_exponential(integrator, allowed):
     assert relaxation_error(Body(Sphere(RADIUS), density=2650.0), integrator) < allowed
 
 
-def test_distance_fallen_keeps_to_the_tolerance():
+@by_adaptive
+def test_distance_fallen_keeps_to_the_tolerance(integrator):
     body = Body(Sphere(RADIUS), density=2650.0)
     tau, terminal = relaxation_of(body)
     for tolerance in (1e-9, 1e-11, 1e-13):
-        end = settle(body, Implicit(tolerance=tolerance), 3.0 * tau)
+        end = settle(body, attrs.evolve(integrator, tolerance=tolerance), 3.0 * tau)
         fallen = terminal * (end.t - tau * (1.0 - np.exp(-end.t / tau)))
         assert np.abs(end.position[:, 0, 1] + fallen).max() < tolerance
         assert end.error < end.steps * tolerance

@@ -1,0 +1,1 @@
+"""Other codes and solvers on the same pair of bodies."""

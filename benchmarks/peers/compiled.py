@@ -1,0 +1,88 @@
+"""flocsim's right-hand side as a function of one state vector, compiled, for SciPy's solvers.
+
+The vector is x, y, angle, vx, vy, spin of each body, then the tangential displacement of every
+listed pair.
+"""
+
+import math
+
+from flocsim.geometry.candidates import list_candidates, spent
+from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.handover import hand_over
+from flocsim.integrators.driver import too_deep
+from flocsim.integrators.explicit import locate_and_rate, sum_forces
+from flocsim.integrators.modes import set_modes
+from flocsim.integrators.views import inertia
+from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, CLOSED, FREE, NOW, SLIP_RATES
+from flocsim.slots import observe
+
+
+def read_state(work, vector):
+    """Write a state vector into NOW."""
+    bodies = work.motion.shape[1]
+    for body in range(bodies):
+        for axis in range(6):
+            work.motion[NOW, body, axis] = vector[6 * body + axis]
+    for row in range(work.tally[CANDIDATES]):
+        work.slip[NOW, row] = vector[6 * bodies + row]
+
+
+def rate_state(scene, work, time, vector, rates):
+    """Derivative of a state vector by time, every listed pair flagged as it is there."""
+    read_state(work, vector)
+    locate_and_rate(scene, work, NOW, NOW)
+    sum_forces(scene, work, time, NOW, NOW)
+    bodies = work.motion.shape[1]
+    for body in range(bodies):
+        for axis in range(3):
+            gain = scene.bodies[body, FREE] / inertia(scene, body, axis)
+            rates[6 * body + axis] = vector[6 * body + 3 + axis]
+            rates[6 * body + 3 + axis] = gain * work.rates[NOW, body, 3 + axis]
+    for row in range(work.tally[CANDIDATES]):
+        closed = work.candidates[row, CLOSED] == 1
+        rates[6 * bodies + row] = work.slip[SLIP_RATES + NOW, row] if closed else 0.0
+
+
+def locate_now(scene, work):
+    """Geometry and flags of NOW; the smallest gap [m] (inf without pairs)."""
+    least = locate_contacts(scene, work, NOW)
+    set_modes(scene, work, NOW)
+    return least
+
+
+def outline_speed(scene, work, body):
+    """Upper bound of the speed of any point of a body's outline [m/s]."""
+    vx, vy, spin = work.motion[NOW, body, 3], work.motion[NOW, body, 4], work.motion[NOW, body, 5]
+    return math.hypot(vx, vy) + abs(spin) * scene.bodies[body, BOUNDING_RADIUS]
+
+
+def longest_step(scene, work):
+    """The step [s] in which the two bodies of a pair use up half of their list's budget."""
+    if scene.bodies.shape[0] < 2:
+        return math.inf
+    speed = outline_speed(scene, work, 0) + outline_speed(scene, work, 1)
+    return 0.5 * work.budget[0] / max(speed, 1e-12)
+
+
+def list_anew(scene, work):
+    """Hand displacements on, list the pairs; the longest step for this list, −1 without room."""
+    locate_now(scene, work)
+    hand_over(work)
+    if not list_candidates(scene, work):
+        return -1.0
+    locate_now(scene, work)
+    return longest_step(scene, work)
+
+
+def inspect(scene, work, memo, time, vector, watch):
+    """(share of the list's budget spent, a pair with slip has opened, least gap, too deep, code).
+
+    The code is the observer's if it is to ``watch``, else 0.
+    """
+    read_state(work, vector)
+    least = locate_now(scene, work) if work.tally[CANDIDATES] > 0 else math.inf
+    opened = False
+    for row in range(work.tally[CANDIDATES]):
+        opened = opened or (work.candidates[row, CLOSED] == 0 and work.slip[NOW, row] != 0.0)
+    code = observe(scene, work, memo, time) if watch else 0
+    return spent(scene, work, NOW), opened, least, too_deep(scene, work), code

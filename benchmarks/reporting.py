@@ -1,0 +1,95 @@
+"""What every benchmark prints: commit, command, machine, versions, and tables."""
+
+import argparse
+import os
+import platform
+import shlex
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import attrs
+
+PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
+
+
+def commit():
+    """The commit that is measured, "-dirty" where files differ from it."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
+
+
+def processor():
+    """The processor's name, as the system gives it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or "unknown")
+
+
+def installed(packages):
+    """Versions of packages, "not installed" where there are none."""
+    for name in packages:
+        try:
+            yield f"{name} {metadata.version(name)}"
+        except metadata.PackageNotFoundError:
+            yield f"{name} not installed"
+
+
+def print_heading(packages=()):
+    """Print commit, command, machine and versions; ``packages`` are named beside the usual."""
+    script = Path(sys.argv[0]).resolve()
+    shown = script.relative_to(Path(__file__).resolve().parents[1])
+    print(f"commit {commit()}: python {shown} {shlex.join(sys.argv[1:])}".rstrip())
+    versions = ", ".join(installed([*PACKAGES, *packages]))
+    print(f"{processor()}, {os.cpu_count()} cores, one used; Python {platform.python_version()}")
+    print(f"{versions}\n", flush=True)
+
+
+def parse_arguments(description, **more):
+    """Arguments of a benchmark: ``--quick``, ``--markdown`` and its own (name → add_argument)."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="less of it, within a minute or so")
+    parser.add_argument("--markdown", action="store_true", help="print the tables for docs/")
+    for name, options in more.items():
+        parser.add_argument(f"--{name.replace('_', '-')}", **options)
+    return parser.parse_args()
+
+
+def text_of(value):
+    """A cell as text: numbers with three digits."""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+@attrs.define
+class Table:
+    """Rows under column names, printed as aligned text or as markdown."""
+
+    title: str
+    columns: tuple
+    rows: list = attrs.Factory(list)
+
+    def add(self, *cells):
+        """Append a row and show it at once on stderr, as a sign of life."""
+        self.rows.append([text_of(cell) for cell in cells])
+        print("  ".join(self.rows[-1]), file=sys.stderr, flush=True)
+
+    def lines(self, markdown):
+        """The table as lines of text."""
+        rows = [list(self.columns), *self.rows]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        if markdown:
+            rows.insert(1, ["-" * width for width in widths])
+        edge = "|" if markdown else ""
+        between = " | " if markdown else "  "
+        for row in rows:
+            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            yield f"{edge} {between.join(cells)} {edge}".strip()
+
+    def print(self, markdown=False):
+        """Print title and table."""
+        print(f"**{self.title}**\n" if markdown else self.title)
+        print("\n".join(self.lines(markdown)), end="\n\n", flush=True)

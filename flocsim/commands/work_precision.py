@@ -1,0 +1,114 @@
+"""`flocsim work-precision cfg.toml --replicate 17`: error against run time of one collision."""
+
+import attrs
+
+from flocsim.commands.trajectory import select, with_one_count
+from flocsim.errors import FlocsimError
+
+TIGHTEST = 1e-13
+"""Tolerance [m] of the reference."""
+
+TOLERANCES = (1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
+
+STEP_COUNTS = (1_000, 10_000, 100_000)
+"""Numbers of equal steps that VelocityVerlet makes of the collision."""
+
+MOST_STEPS = 1_000_000
+"""Steps after which a method counts as having failed."""
+
+HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'steps':>9}  end"
+
+
+def add_parser(subparsers):
+    """Add the subcommand to argparse's ``subparsers``."""
+    parser = subparsers.add_parser(
+        "work-precision",
+        help="error against run time of the integrators on one replicate of a config",
+        description="Run one replicate by every integrator over six decades of tolerance, to the "
+        "time at which it is decided, and print how far its end is from the reference.",
+    )
+    parser.add_argument("config", help="config file (TOML)")
+    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
+    parser.add_argument("--vertices", type=int, metavar="N", help="default: the last")
+    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
+    parser.set_defaults(run=run, frames=2)
+    return parser
+
+
+def methods(duration):
+    """(name, setting as text, integrator) of all runs."""
+    from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+
+    for method in (Implicit, DormandPrince54):
+        for tolerance in TOLERANCES:
+            yield method.__name__, f"{tolerance:.0e} m", method(tolerance)
+    for count in STEP_COUNTS:
+        step = duration / count
+        yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
+
+
+def timed(system, duration):
+    """The faster of two runs: the first may have compiled."""
+    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
+    return min(runs, key=lambda found: found.wall_time)
+
+
+def reference(system, duration):
+    """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
+    from flocsim.integrators import Implicit
+
+    found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
+        duration, max_steps=MOST_STEPS, record=False
+    )
+    if found.status.name != "FINISHED":
+        raise FlocsimError(f"no reference: {found.status.reason}")
+    return found.position[-1]
+
+
+def row(system, duration, exact, name, setting, integrator):
+    """One line of the table; no error is shown for a run that failed."""
+    from flocsim.ensembles.precision import end_distance
+
+    found = timed(attrs.evolve(system, integrator=integrator), duration)
+    error = "-"
+    if found.status.name == "FINISHED":
+        error = f"{end_distance(system.bodies, found.position[-1], exact):.1e}"
+    time, end = f"{1e3 * found.wall_time:.2f}", found.status.name.lower().replace("_", " ")
+    return f"{name:<16}{setting:>11}{error:>12}{time:>12}{found.steps:>9}  {end}"
+
+
+def replicate(config, place, number):
+    """(System where the replicate starts, how long [s] until it is decided, its row)."""
+    from flocsim.ensembles.precision import replicate_system
+    from flocsim.ensembles.sampling import draws, orientations
+    from flocsim.ensembles.study import Study
+
+    study = Study(with_one_count(config, place[1]))
+    numbers = draws(config.seed, number)
+    found = study.run(*place, number)
+    encounter = study.encounter(*place[:2], numbers)
+    system = replicate_system(encounter, orientations(numbers), place[2])
+    return system, float(found["t_end"]), found
+
+
+def run(args):
+    """Run the methods, print the table; the exit code."""
+    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.preflight import check_study
+    from flocsim.io.results_schema import OUTCOMES
+
+    config = load_config(args.config)
+    place = select(config, args)
+    check_study(config)
+    system, duration, found = replicate(config, place, args.replicate)
+    exact = reference(system, duration)
+    name = config.scene.conditions[place[0]][0]
+    print(
+        f"type {name}, N = {place[1]}, delta = {place[2]:g}, replicate {args.replicate}: "
+        f"{OUTCOMES[found['outcome']]} after {1e3 * duration:.4g} ms"
+    )
+    print(f"error: of any point of an outline, against Implicit at {TIGHTEST:.0e} m\n\n{HEADER}")
+    for method in methods(duration):
+        print(row(system, duration, exact, *method), flush=True)
+    return 0

@@ -1,0 +1,132 @@
+"""DormandPrince54: explicit, order 5 with an embedded error estimate of order 4."""
+
+import attrs
+
+from flocsim import slots
+from flocsim.fields import quantity
+from flocsim.integrators.accuracy import error_ratio
+from flocsim.integrators.adaptive import adaptive_factor
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.explicit import locate_and_rate, sum_forces
+from flocsim.integrators.jacobian import weigh_velocities
+from flocsim.integrators.slips import limit_slips
+from flocsim.integrators.views import inertia
+from flocsim.layout import (
+    CANDIDATES,
+    CLOSED,
+    FIRST,
+    FREE,
+    NEW,
+    NOW,
+    SCRATCH,
+    SLIP_RATES,
+    TIME,
+    UNTIL,
+)
+
+NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+"""Where the stages lie in the step."""
+
+MATRIX = (
+    (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0, 0.0),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0, 0.0),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0, 0.0),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0),
+)
+"""Weights of the earlier stages' rates in each stage; the last one is the result."""
+
+ESTIMATE = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+"""Weights of the rates in the error estimate (Hairer, Nørsett & Wanner 1993, table II.5.2)."""
+
+ORDER_OF_ESTIMATE = 5.0
+"""The estimate goes with this power of the step."""
+
+
+def rate_of(scene, work, stage, body, axis):
+    """Rate of a place (axis 0–2) or of a velocity (axis 3–5) at a stage."""
+    rate = work.rates[stage, body, axis]
+    if axis < 3:
+        return rate
+    return rate * scene.bodies[body, FREE] / inertia(scene, body, axis - 3)
+
+
+def combine(scene, work, weights, stages, base, end):
+    """State ``end`` = ``base`` times state NOW + the weighted rates of the first stages."""
+    for body in range(scene.bodies.shape[0]):
+        for axis in range(6):
+            total = 0.0
+            for stage in range(stages):
+                if weights[stage] != 0.0:
+                    total += weights[stage] * rate_of(scene, work, stage, body, axis)
+            work.motion[end, body, axis] = base * work.motion[NOW, body, axis] + total
+
+
+def combine_slips(work, weights, stages, step, end):
+    """Tangential displacements of the closed pairs in state ``end``."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            total = 0.0
+            for stage in range(stages):
+                total += weights[stage] * work.slip[SLIP_RATES + stage, row]
+            work.slip[end, row] = work.slip[NOW, row] + step * total
+
+
+def times(weights, step):
+    """Seven weights times a number."""
+    return (
+        weights[0] * step, weights[1] * step, weights[2] * step, weights[3] * step,
+        weights[4] * step, weights[5] * step, weights[6] * step,
+    )  # fmt: skip
+
+
+def evaluate_stages(scene, work, time, step):
+    """Rates of all seven stages; the last one's state is NEW."""
+    for stage in range(7):
+        state = NOW if stage == 0 else NEW if stage == 6 else FIRST
+        if stage > 0:
+            combine(scene, work, times(MATRIX[stage], step), stage, 1.0, state)
+        locate_and_rate(scene, work, state, stage)
+        if stage > 0:
+            combine_slips(work, MATRIX[stage], stage, step, state)
+        sum_forces(scene, work, time + NODES[stage] * step, state, stage)
+
+
+def dormand_prince_attempt(scene, work, clock, step):
+    """One step: error over tolerance, or −1 where the motion is no longer finite."""
+    time = clock[TIME]
+    evaluate_stages(scene, work, time, step)
+    weigh_velocities(scene, work, time, max(clock[UNTIL] - time, step))
+    combine(scene, work, times(ESTIMATE, step), 7, 0.0, SCRATCH)
+    limit_slips(scene, work)
+    return error_ratio(scene, work, clock, step)
+
+
+def dormand_prince_next_step(clock, step, ratio):
+    """The step for which the estimate meets the tolerance."""
+    return step * adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
+
+
+@attrs.frozen
+class DormandPrince54(Integrator):
+    """Explicit Runge–Kutta of order 5, adaptive: for scenes that are not stiff, and to compare.
+
+    Steps end where a pair of features touches or parts, so that the forces are smooth inside them.
+    Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
+    velocity error leads to included; ``first_step`` [s].
+
+    Source: Dormand & Prince (1980), as in Hairer, Nørsett & Wanner (1993), table II.5.2.
+    """
+
+    tolerance: float = quantity("m", above=0.0, default=1e-8)
+    first_step: float = quantity("s", above=0.0, default=1e-6)
+
+    @property
+    def fillings(self):
+        """The slots that this integrator fills."""
+        return {
+            slots.attempt: dormand_prince_attempt,
+            slots.next_step: dormand_prince_next_step,
+        }

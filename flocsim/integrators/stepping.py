@@ -1,0 +1,82 @@
+"""The size of the next step: from the last one's error, the lists, and what is about to switch."""
+
+import math
+
+from flocsim.geometry.candidates import time_within
+from flocsim.integrators.grain import grain_of
+from flocsim.integrators.views import normal_rate
+from flocsim.layout import (
+    BEARABLE_STEP,
+    CANDIDATES,
+    LARGEST_STEP,
+    NOW,
+    PREVIOUS_RATIO,
+    PREVIOUS_STEP,
+    REJECTED,
+    STAGED_STEP,
+    STEP,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+)
+from flocsim.slots import next_step
+
+SMALLEST_STEP = 1e-14
+"""A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
+
+IMMINENT = 0.05
+"""A switch within this share of the step is run up to by a step of its own."""
+
+SHARE_OF_FAILED, RECOVERY = 0.6, 1.1
+"""Behind a step that failed, steps grow to this share of it, and that by so much a step."""
+
+
+def imminent_switch(work, clock, step):
+    """The step, or the much shorter one behind which a pair is just about to switch."""
+    target = 0.5 * grain_of(work, clock)
+    for row in range(work.tally[CANDIDATES]):
+        gap = work.geometry[NOW, row, 2]
+        if abs(gap) < clock[TOLERANCE]:
+            rate = normal_rate(work, NOW, row)
+            if gap * rate < 0.0:
+                ahead = (abs(gap) + target) / abs(rate)
+                if ahead < IMMINENT * step:
+                    step = ahead
+    return step
+
+
+def choose_step(scene, work, clock, lists):
+    """The size of the next step [s]."""
+    step = min(clock[STEP], clock[LARGEST_STEP])
+    if lists:
+        step = min(step, time_within(scene, work, 0.5))
+        if clock[TOLERANCE] < math.inf:
+            step = imminent_switch(work, clock, step)
+    left = clock[UNTIL] - clock[TIME]
+    # Two even steps at the end instead of a long one and a sliver.
+    if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
+        return 0.5 * left
+    return min(step, left)
+
+
+def reject(clock, counts, step, ratio, too_far):
+    """Choose a smaller step; False where there is none."""
+    counts[REJECTED] += 1
+    clock[PREVIOUS_STEP] = 0.0
+    clock[STAGED_STEP] = 0.0
+    clock[STEP] = 0.25 * step if ratio < 0.0 or too_far else next_step(clock, step, ratio)
+    if ratio < 0.0:
+        clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
+    return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
+
+
+def plan_next_step(clock, step, ratio, at_switch):
+    """The size of the step after an accepted one; behind a switch the forces are new."""
+    if at_switch:
+        clock[PREVIOUS_STEP] = math.inf
+        clock[STAGED_STEP] = 0.0
+        return
+    clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
+    clock[BEARABLE_STEP] *= RECOVERY
+    clock[PREVIOUS_STEP] = step
+    clock[PREVIOUS_RATIO] = ratio

@@ -1,0 +1,162 @@
+"""System.explain(): what is said to be compiled in, left out, and stiff, held against the facts."""
+
+import math
+import re
+
+import attrs
+import pytest
+from trial_scenes import Lubrication, Spring, Trap, head_on, hook
+
+from flocsim import Body, Fluid, Sphere, System, slots
+from flocsim.explain import explain
+from flocsim.explain.time_scales import all_scales
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.integrators import DormandPrince54, Overdamped, VelocityVerlet
+
+BALL = Body(Sphere(5e-6), density=2650.0)
+WATER = Fluid(buoyancy=True)
+FAR = [BALL, attrs.evolve(BALL, position=(0.0, 40e-6))]
+
+
+def lines_of(tag, *system, **options):
+    """The lines of a System's report that start with a tag, the tag left out."""
+    text = System(*system, **options).explain()
+    return [line[len(tag) :].strip() for line in text.splitlines() if line.startswith(tag)]
+
+
+def has(lines, start):
+    return any(line.startswith(start) for line in lines)
+
+
+def test_every_force_object_gets_its_line():
+    forces = [
+        VanDerWaals(1e-18), VanDerWaals(1e-19, gap="surface"), VanDerWaals(0.0), Gravity(),
+        DoubleLayer(0.0), Gravity(g=0.0),
+    ]  # fmt: skip
+    inside, outside = lines_of("in:", FAR, forces), lines_of("out:", FAR, forces)
+    assert sum(line.startswith("VanDerWaals(") for line in inside) == 2
+    assert sum(line.startswith("Gravity(") for line in inside) == 1
+    for name, why in (
+        ("VanDerWaals", "hamaker"),
+        ("DoubleLayer", "potential"),
+        ("Gravity", "g is"),
+    ):
+        assert has(outside, f"{name}: {why}")
+
+
+def test_where_forces_act_and_whence_their_derivatives():
+    forces = [Gravity(), StokesDrag(), VanDerWaals(), Lubrication(), Trap(1e-3)]
+    gravity, drag, attraction, film, trap = lines_of("in:", FAR, forces)[:5]
+    assert gravity.endswith("constant, nothing to differentiate")
+    assert drag.endswith("derivative by velocity from differences of its kernel")
+    assert "line of centres" in attraction and attraction.endswith("by the gap analytic")
+    assert "closest points" in film and film.endswith("by the gap's rate from differences")
+    assert trap.endswith("derivative by place from differences of its kernel")
+
+
+@pytest.mark.parametrize(("distance", "out"), [(12e-6, False), (40e-6, True)])
+def test_a_force_out_of_range_is_named(distance, out):
+    force = DoubleLayer(debye_length=2e-7)
+    bodies = [BALL, attrs.evolve(BALL, position=(distance, 0.0))]
+    (line,) = lines_of("in:  DoubleLayer", bodies, [force])
+    assert (distance - 1e-5 >= force.reach) == out == ("out of range at the start" in line)
+
+
+def test_slots_left_empty_are_said_to_be_out():
+    names = {
+        slots.centre_force: "forces along lines of centres",
+        slots.surface_force: "forces at closest points",
+        slots.position_force: "derivative by the place",
+        slots.velocity_force: "derivative by the velocity",
+    }
+    for forces in ([], [VanDerWaals()], [VanDerWaals(gap="surface"), Trap()], [StokesDrag()]):
+        filled, out = System(FAR, forces).fillings(), lines_of("out:", FAR, forces)
+        for slot, name in names.items():
+            assert has(out, name) == (slot not in filled)
+
+
+EXPLICIT = "out: Jacobian of the forces: the method is explicit"
+
+
+@pytest.mark.parametrize("method", [VelocityVerlet(1e-8), DormandPrince54()])
+def test_an_explicit_method_takes_no_derivatives(method):
+    forces = [StokesDrag(), VanDerWaals(), Contact()]
+    text = System(FAR, forces, method).explain()
+    assert EXPLICIT in text
+    assert "derivative" not in text
+    assert EXPLICIT not in System(FAR, forces).explain()
+
+
+def test_overdamped_leaves_inertia_out():
+    assert has(lines_of("out:", FAR, [StokesDrag()], Overdamped()), "inertia")
+    assert not has(lines_of("out:", FAR, [StokesDrag()]), "inertia")
+
+
+def test_contact_search_is_out_without_contacts_and_while_far_apart():
+    assert has(lines_of("out:", FAR, [VanDerWaals()]), "contact search")
+    assert has(lines_of("out:", [BALL], [Contact()]), "contact search: a single body")
+    near = [BALL, attrs.evolve(BALL, position=(9.9e-6, 0.0))]
+    for bodies, count in ((FAR, "1 of 1 pairs"), (near, "0 of 1 pairs")):
+        (line,) = [x for x in lines_of("in:", bodies, [Contact()]) if x.startswith("contact sea")]
+        assert count in line
+
+
+def test_rotation_and_tangential_history():
+    frictionless = Contact(k_t=0.0, damping_t=0.0)
+    assert has(lines_of("idle:", FAR, [frictionless]), "rotation of spheres: no force")
+    assert has(lines_of("idle:", FAR, [frictionless]), "tangential history: no tangential")
+    assert has(lines_of("in:", FAR, [Contact()]), "rotation of bodies: torques come from Contact")
+    assert has(lines_of("in:", FAR, [Contact()]), "tangential history")
+    assert has(lines_of("idle:", FAR, [StokesDrag(rotational=False)]), "rotation of spheres")
+    hooks = [attrs.evolve(body, shape=hook()) for body in FAR]
+    assert has(lines_of("in:", hooks, [frictionless]), "rotation of bodies: torques come from")
+    assert "no body has an edge" not in explain(System(hooks, [frictionless]))
+
+
+def test_sliding():
+    for friction, words in ((0.3, "slides at its limit"), ("none", "no sliding")):
+        (line,) = lines_of("in:  Contact", FAR, [Contact(friction=friction)])
+        assert words in line
+
+
+def scales_of(*system, **options):
+    """{name: time} of a System."""
+    return {scale.name: scale.time for scale in all_scales(System(*system, **options))}
+
+
+def test_time_scales_are_those_of_closed_forms():
+    law, repulsion = Contact(k_n=20.0), DoubleLayer(15e-3, 1e-8)
+    forces = [Gravity(), StokesDrag(), repulsion, law]
+    found = scales_of(FAR, forces, fluid=WATER)
+    pair, r = 0.5 * BALL.mass, BALL.shape.radius
+    drag = 6.0 * math.pi * WATER.viscosity * r
+    fall = BALL.buoyant_mass(WATER) * 9.81 / drag
+    omega = math.sqrt(20.0 / pair)
+    steepest = repulsion.strength * 0.5 * r * repulsion.kappa
+    assert found["contact 1/omega0"] == pytest.approx(1.0 / omega, rel=1e-6)
+    assert found["contact damping 1/lambda"] == pytest.approx(0.5 / omega, rel=1e-6)
+    assert found["Stokes relaxation"] == pytest.approx(BALL.mass / drag, rel=1e-6)
+    assert found["settling by a radius"] == pytest.approx(r / fall, rel=1e-6)
+    wanted = math.sqrt(pair / steepest)
+    assert found["centre forces at their steepest"] == pytest.approx(wanted, rel=0.02)
+
+
+def test_a_fixed_body_counts_as_infinitely_heavy():
+    held = [attrs.evolve(FAR[0], fixed=True), FAR[1]]
+    ratio = scales_of(held, [Contact()])["contact 1/omega0"]
+    ratio /= scales_of(FAR, [Contact()])["contact 1/omega0"]
+    assert ratio == pytest.approx(math.sqrt(2.0))
+
+
+def test_nothing_to_scale():
+    assert System([BALL]).explain().splitlines()[-1].startswith("time scales: none")
+
+
+@pytest.mark.parametrize(("share", "grows"), [(0.5, False), (2.0, True)])
+def test_the_step_that_an_explicit_method_needs(share, grows):
+    """Below the named step a vibrating pair stays as it is, above it it explodes."""
+    bodies, force = head_on(1e-6, 1e-9), Spring(stiffness=20.0)
+    text = System(bodies, [force]).explain()
+    step = share * float(re.search(r"steps of about (\S+) s", text)[1])
+    end = System(bodies, [force], VelocityVerlet(step)).run(30.0 * step, jit=False)
+    assert (not abs(end.velocity[:, :, 0]).max() < 1e-2) == grows
