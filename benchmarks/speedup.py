@@ -22,15 +22,20 @@ from scenes import collisions
 
 from flocsim.ensembles.failures import outcome_of
 from flocsim.ensembles.sampling import draws, orientations
-from flocsim.ensembles.scene import OBSERVER, Encounter, run_encounter
+from flocsim.ensembles.scene import OBSERVER, Encounter
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.status import Status
+from flocsim.layout import CODE, PAUSE_AT, STEPS, TIME, UNTIL
+from flocsim.state import with_capacity
 
 VERTICES = 64
 DELTAS = (0.0, 0.25, 0.5, 0.75)
 TIGHT = 1e-12
-MOST_STEPS = 10_000_000
+CHUNK = 100_000
+"""Steps between two looks at the clock."""
+
+NO_LIMITS = math.inf, math.inf
 TOLERANCES = (1e-8, 1e-9, 1e-10, 1e-11)
 GIVE_UP = 300.0
 """A SciPy solver is given up when it has taken so many times the CPU time of Implicit."""
@@ -77,19 +82,41 @@ def make_cases(study, condition, count):
     return cases
 
 
-def run_cases(cases, integrator, max_steps=None, allowed=None, exact=None):
+def run_case(case, encounter, driver, limits):
+    """(outcome, end [s]) of a replicate, as run_encounter does it, but within a CPU time.
+
+    ``limits``: most simulated time [s] and most CPU time [s]; beyond them it is undecided.
+    """
+    work, memo = encounter.start(case.angles, case.share), encounter.memo()
+    integrator = encounter.system.integrator
+    clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**12)
+    clock[UNTIL] = min(encounter.time_limit(), limits[0])
+    rows, began = np.zeros((0, 13)), time.process_time()
+    while True:
+        counts[PAUSE_AT] = counts[STEPS] + CHUNK
+        status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
+        if status == Status.NO_ROOM:
+            work = with_capacity(work, 2 * len(work.candidates))
+        elif status != Status.PAUSED or time.process_time() - began > limits[1]:
+            break
+    if status == Status.PAUSED:
+        status = Status.STEP_BUDGET
+    return outcome_of(status, counts[CODE], memo)[0], clock[TIME]
+
+
+def run_cases(cases, integrator, limits=None, allowed=None, exact=None):
     """The Result of an integrator; None once more than ``allowed`` differ from ``exact``."""
     encounters = [case.with_integrator(integrator) for case in cases]
     driver = encounters[0].system.compose(observer=OBSERVER)
-    run_encounter(encounters[0], driver, cases[0].angles, cases[0].share, 2)
-    rows, began = [], time.process_time()
+    run_case(cases[0], encounters[0], driver, (1e-12, math.inf))
+    found, began = [], time.process_time()
     for k, (case, encounter) in enumerate(zip(cases, encounters, strict=True)):
-        most = MOST_STEPS if max_steps is None else max_steps[k]
-        rows.append(run_encounter(encounter, driver, case.angles, case.share, most))
-        if allowed is not None and differing([r["outcome"] for r in rows], exact) > allowed:
+        most = NO_LIMITS if limits is None else limits[k]
+        found.append(run_case(case, encounter, driver, most))
+        if allowed is not None and differing([outcome for outcome, _ in found], exact) > allowed:
             return None
     cpu = (time.process_time() - began) / len(cases)
-    outcomes, ends = (np.array([row[name] for row in rows]) for name in ("outcome", "t_end"))
+    outcomes, ends = (np.array(column) for column in zip(*found, strict=True))
     return Result(outcomes, ends, cpu)
 
 
@@ -98,19 +125,19 @@ def differing(outcomes, exact):
     return int(np.count_nonzero(np.asarray(outcomes) != exact[: len(outcomes)]))
 
 
-def verlet(cases, exact, allowed):
+def verlet(cases, exact, allowed, budget):
     """(largest step, Result) of VelocityVerlet with no more than ``allowed`` outcomes wrong."""
     results = {}
+    limits = [(PATIENCE * end, budget) for end in exact.ends]
 
     def good(step):
-        steps = (PATIENCE * exact.ends / step).astype(int) + 1000
-        results[step] = run_cases(cases, VelocityVerlet(step), steps, allowed, exact.outcomes)
+        results[step] = run_cases(cases, VelocityVerlet(step), limits, allowed, exact.outcomes)
         return results[step] is not None
 
     bodies = cases[0].encounter.system.bodies
     mass = 1.0 / sum(1.0 / body.mass for body in bodies)
     k_n = next(f.k_n for f in cases[0].encounter.system.forces if hasattr(f, "k_n"))
-    step = largest_step(good, 2.0 * math.sqrt(mass / k_n), halvings=6, refinements=1)
+    step = largest_step(good, math.sqrt(mass / k_n), halvings=6, refinements=1)
     return step, results.get(step)
 
 
@@ -166,14 +193,14 @@ def on_some(cases, exact, tolerance, count):
     return some, part, own, differing(own.outcomes, part.outcomes)
 
 
-def compare(study, preset, condition, counts, table):
+def compare(study, preset, condition, counts, budget, table):
     """Add one type's row; the two ratios. ``counts``: replicates for Implicit, Verlet, SciPy."""
     tolerance = study.config.integrator.tolerance
     cases = make_cases(study, condition, counts[0])
     exact = run_cases(cases, Implicit(TIGHT))
     _, _, all_own, wrong = on_some(cases, exact, tolerance, counts[0])
     some, part, own, allowed = on_some(cases, exact, tolerance, counts[1])
-    step, by_verlet = verlet(some, part, allowed)
+    step, by_verlet = verlet(some, part, allowed, budget)
     few, part, own_few, allowed_few = on_some(cases, exact, tolerance, counts[2])
     solver, by_scipy = best_scipy(few, part, allowed_few, own_few)
     ratios = ratio(by_verlet, own), ratio(by_scipy, own_few)
@@ -214,6 +241,7 @@ def main():
         __doc__,
         presets={"nargs": "+", "default": ["tang2014", "si"]},
         types={"nargs": "+", "default": ["I", "II", "III"]},
+        budget={"type": float, "default": 100.0, "help": "CPU seconds a replicate of Verlet"},
         tolerance={"type": float, "help": "Implicit's [m], default: its own"},
     )
     print_heading()
@@ -226,7 +254,7 @@ def main():
         study = Study(collisions(preset, integrator=overrides, scene=scene))
         for condition, name in enumerate(arguments.types):
             counts = counts_for(preset, name, arguments.quick)
-            ratios.append(compare(study, preset, condition, counts, table))
+            ratios.append(compare(study, preset, condition, counts, arguments.budget, table))
     verlet_mean, scipy_mean = (geometric_mean(column) for column in zip(*ratios, strict=True))
     table.add("geometric mean", *[""] * 6, verlet_mean, "", "", "", scipy_mean)
     table.print(arguments.markdown)
