@@ -18,6 +18,8 @@ TOLERANCES = np.logspace(-6, -12, 7)
 STEP_COUNTS = np.logspace(1.5, 6.5, 11)
 """Fixed steps that a run is divided into."""
 
+MARKERS = {"Implicit": "o", "DormandPrince54": "^", "VelocityVerlet": "s", "Overdamped": "D"}
+
 COLUMNS = ("scene", "method", "setting", "error [m]", "CPU [ms]", "steps", "evaluations", "end")
 
 
@@ -35,34 +37,40 @@ def settings(scene, quick):
         yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
 
 
+def judged(scene, run, exact):
+    """(error [m], how it ended): a run that ends further off than a body's size is no solution."""
+    if not run.finished:
+        return float("nan"), run.status
+    error = distance(scene, run.motion, exact)
+    size = min(body.shape.bounding_radius for body in scene.bodies)
+    return (error, "FINISHED") if error < size else (float("nan"), "WRONG")
+
+
 def measure_scene(scene, table, quick):
-    """Add the runs of a scene to the table; {method: [(error, CPU, finished)]} for the figure."""
+    """Add the runs of a scene to the table; {method: [(error, CPU)]} for the figure."""
     exact, disagreement, other = reference(scene)
-    table.add(scene.name, "reference", f"against {other}", disagreement, "", "", "", "agree")
+    agreement = f"{disagreement:.1e}"
+    table.add(scene.name, "reference", f"against {other}", agreement, "", "", "", "agree")
     points = {}
     for method, text, integrator in settings(scene, quick):
         run = measure(scene, integrator, budget=3.0 if quick else 10.0)
-        error = distance(scene, run.motion, exact) if run.finished else float("nan")
-        shown = f"{error:.1e}" if run.finished else "-"
-        table.add(
-            scene.name, method, text, shown, 1e3 * run.cpu, run.steps, run.evaluations, run.status
-        )
-        points.setdefault(method, []).append((error, run.cpu, run.finished))
+        error, end = judged(scene, run, exact)
+        shown = f"{error:.1e}" if error == error else "-"
+        table.add(scene.name, method, text, shown, 1e3 * run.cpu, run.steps, run.evaluations, end)
+        points.setdefault(method, []).append((error, run.cpu))
     return points, disagreement
 
 
 def draw_panel(axes, name, points, disagreement):
-    """One scene: lines of runs that finished, crosses at the top for those that did not."""
-    markers = dict(
-        zip(("Implicit", "DormandPrince54", "VelocityVerlet", "Overdamped"), "o^sD", strict=True)
-    )
-    for method, marker in markers.items():
-        runs = np.array(points.get(method, np.zeros((0, 3))), dtype=float)
-        done = runs[:, 2] == 1.0
-        (line,) = axes.loglog(1e3 * runs[done, 1], runs[done, 0], marker=marker, label=method)
-        height = np.full(np.count_nonzero(~done), 0.97)
-        transform = axes.get_xaxis_transform()
-        axes.plot(1e3 * runs[~done, 1], height, "x", color=line.get_color(), transform=transform)
+    """One scene: lines of runs with an error, crosses at the top for those that failed."""
+    for method, marker in MARKERS.items():
+        errors, cpu = np.array(points.get(method, [(np.nan, np.nan)])).T
+        (line,) = axes.loglog(1e3 * cpu, errors, marker=marker, markersize=5, label=method)
+        failed = 1e3 * cpu[np.isnan(errors)]
+        axes.plot(
+            failed, np.full(len(failed), 0.97), "x", color=line.get_color(),
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
     axes.axhline(max(disagreement, 1e-17), color="0.7", linestyle=":")
     axes.set(title=name, xlabel="CPU [ms]", ylabel="error [m]")
 
@@ -78,7 +86,7 @@ def draw(scenes, path):
     for axes in panels[len(scenes) :]:
         axes.set_axis_off()
     handles, labels = panels[0].get_legend_handles_labels()
-    note = "× did not finish; dotted: how far the two references differ"
+    note = "× failed; dotted: how far the two references differ"
     panels[-1].legend(handles, labels, title=note, loc="center", title_fontsize="small")
     figure.savefig(path, dpi=110)
 
