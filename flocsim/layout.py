@@ -18,8 +18,8 @@ SLIP_RATES = 4
 STAGES = 7
 """Most stages of an integrator: places in ``Work.rates`` and behind ``SLIP_RATES``."""
 
-LISTED, COSINE, SINE, MEMORY = 0, 3, 4, 5
-"""First columns in ``Work.bodies``."""
+LISTED, COSINE, SINE, MEMORY, CLUSTER, FRAMES, BODY_COLUMNS = 0, 3, 4, 5, 6, 7, 19
+"""First columns in ``Work.bodies``, and how many there are."""
 
 CLOSED, CLOSEST = 5, 6
 """Columns of ``Work.candidates`` that say how a listed pair acts in this step."""
@@ -45,13 +45,19 @@ more than the displacements set aside for a list that found no room (0: none are
     STAGED_AT,
     BEARABLE_STEP,
     STEP_ERROR,
+    REJECTED_STEP,
+    REJECTED_RATIO,
+    SETTLING,
+    SETTLED_STEP,
     CLOCK_SIZE,
-) = range(14)
+) = range(18)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), summed
 local error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
 the step whose stages are still there (0: none are) and the time at which it began; the largest
-step that is expected to work at all; the error of the step just taken [m]."""
+step that is expected to work at all; the error of the step just taken [m]; size and error over
+tolerance of the trial that was just rejected (0: none was); 1 from a switch until a step has been
+taken behind it; the size of the last such step."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, COUNTS_SIZE = range(8)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flocsim.geometry.hierarchy import outlines_of
-from flocsim.layout import NOW, SLIP_RATES, STAGES, TALLY_SIZE
+from flocsim.layout import BODY_COLUMNS, NOW, SLIP_RATES, STAGES, TALLY_SIZE
 
 
 class BodyView(NamedTuple):
@@ -97,8 +97,9 @@ class Work(NamedTuple):
     ``motion`` (6, n, 6): x, y, angle, vx, vy, spin in the states of flocsim.layout.
     ``rates`` (7, n, 6): velocity and force (with torque) at the stages of a step.
     ``slip`` (11, capacity): tangential displacements in the four states, then their rates.
-    ``bodies`` (n, 6): place at the last listing, cosine and sine of the angle, and how long a
-    velocity is remembered.
+    ``bodies`` (n, 19): place at the last listing, cosine and sine of the angle, how long a velocity
+    is remembered, first body of those it touches, then for each of three stages how its contacts
+    have turned and wandered.
     ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 2), complex:
     factorised systems, then the load and the pivots.
     ``candidates`` (capacity, 7): body of the vertex, its core point, body of the edge, first and
@@ -131,7 +132,7 @@ def work_of(scene, position, velocity, capacity=256):
         motion=motion,
         rates=np.zeros((STAGES, n, 6)),
         slip=np.zeros((SLIP_RATES + STAGES, capacity)),
-        bodies=np.zeros((n, 6)),
+        bodies=np.zeros((n, BODY_COLUMNS)),
         jacobian=np.zeros((2, 3 * n, 3 * n)),
         system=np.zeros((2, 3 * n, 3 * n + 2), dtype=complex),
         candidates=np.zeros((capacity, 7), dtype=np.int64),

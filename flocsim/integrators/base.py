@@ -15,6 +15,7 @@ from flocsim.layout import (
     MAX_STEPS,
     PAUSE_AT,
     PREVIOUS_STEP,
+    SETTLED_STEP,
     STEP,
     TOLERANCE,
     UNTIL,
@@ -58,6 +59,7 @@ class Integrator(ABC):
         clock[LARGEST_STEP] = self.largest_step
         clock[PREVIOUS_STEP] = math.inf
         clock[BEARABLE_STEP] = math.inf
+        clock[SETTLED_STEP] = math.inf
         return clock
 
     def fresh_counts(self, max_steps):

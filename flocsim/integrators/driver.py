@@ -7,8 +7,8 @@ from flocsim.geometry.candidates import list_candidates, spent
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.geometry.handover import hand_over
 from flocsim.integrators.grain import switch_share
-from flocsim.integrators.modes import set_modes
-from flocsim.integrators.stepping import choose_step, plan_next_step, reject
+from flocsim.integrators.modes import SAME, set_modes
+from flocsim.integrators.stepping import choose_step, plan, reject
 from flocsim.layout import (
     CANDIDATES,
     CLOSED,
@@ -63,14 +63,16 @@ def take_new_state(work):
 
 
 def accept(scene, work, clock, counts, step, lists):
-    """Go on from the new state, its pairs flagged anew."""
+    """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
     clock[TIME] += step
     counts[STEPS] += 1
     clock[ERROR] += clock[STEP_ERROR]
-    if lists:
-        set_modes(scene, work, NOW)
-        hand_over(work)
+    if not lists:
+        return SAME
+    switched = set_modes(scene, work, NOW)
+    hand_over(work)
+    return switched
 
 
 def record_row(work, clock, counts, record):
@@ -142,9 +144,9 @@ def advance(scene, work, memo, clock, counts, record):
             limit, trials = share * step, trials + 1
             counts[LOCATED] += 1
             continue
-        plan_next_step(clock, step, ratio, trials > 0)
+        switched = accept(scene, work, clock, counts, step, lists)
+        plan(clock, step, ratio, trials > 0, switched)
         limit, trials = math.inf, 0
-        accept(scene, work, clock, counts, step, lists)
         status = look(scene, work, memo, clock, counts, record, lists)
         if status != 0:
             return status

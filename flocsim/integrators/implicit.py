@@ -8,11 +8,13 @@ from flocsim.integrators.accuracy import error_ratio
 from flocsim.integrators.adaptive import SMALLEST_FACTOR, adaptive_factor
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.collocation import collocate
+from flocsim.integrators.frames import gather_clusters
 from flocsim.integrators.jacobian import assemble_jacobian
 from flocsim.integrators.linear import solve
-from flocsim.integrators.radau import evaluate_states, factorise_systems, solve_stages
+from flocsim.integrators.radau import evaluate_states, solve_stages
 from flocsim.integrators.radau_tableau import EIGENVALUES, ESTIMATE
 from flocsim.integrators.slips import limit_slips
+from flocsim.integrators.stage_systems import factorise_systems, sum_over_clusters
 from flocsim.integrators.switches import interpolate
 from flocsim.integrators.views import inertia
 from flocsim.layout import FIRST, FREE, NOW, PACE, SCRATCH, STIFFNESS, TIME, UNTIL
@@ -52,8 +54,9 @@ def write_error_load(scene, work, step):
 def estimate_error(scene, work, step):
     """Write the error of the step into SCRATCH."""
     write_error_load(scene, work, step)
-    solve(work.system, 0)
     size = work.jacobian.shape[1]
+    sum_over_clusters(work, 0, size, size + 1)
+    solve(work.system, 0)
     damped = step / EIGENVALUES[0].real
     for row in range(size):
         body, axis = row // 3, row % 3
@@ -68,6 +71,7 @@ def implicit_attempt(scene, work, clock, step):
     """One step: error over tolerance, or −1 where Newton's method fails."""
     time = clock[TIME]
     evaluate_states(scene, work, time, 0.0, NOW, FIRST)
+    gather_clusters(scene, work)
     assemble_jacobian(scene, work, time, max(clock[UNTIL] - time, step))
     if not factorise_systems(scene, work, step):
         return -1.0

@@ -9,15 +9,26 @@ from flocsim.integrators.views import closest_rows
 from flocsim.layout import CANDIDATES, CLOSED, CLOSEST, NOW
 from flocsim.slots import surface_reach
 
+SAME, OTHER_CLOSEST, OTHER_CONTACTS = range(3)
+"""What changed when pairs were flagged: nothing; only which pair is the closest, and that perhaps
+by rounding, where two share a corner; which pairs touch."""
+
 
 def set_modes(scene, work, state=NOW):
-    """Flag every listed pair by its geometry in a state."""
+    """Flag every listed pair by its geometry in a state; what changed (see SAME)."""
     wanted = 1 if surface_reach(scene.parameters) > 0.0 else 0
+    changed = SAME
     row = 0
     while row < work.tally[CANDIDATES]:
         end, closest = closest_rows(work, state, row)
+        if work.candidates[closest, CLOSEST] != wanted:
+            changed = max(changed, OTHER_CLOSEST)
         for each in range(row, end):
-            work.candidates[each, CLOSED] = 1 if work.geometry[state, each, 2] < 0.0 else 0
+            closed = 1 if work.geometry[state, each, 2] < 0.0 else 0
+            if work.candidates[each, CLOSED] != closed:
+                changed = OTHER_CONTACTS
+            work.candidates[each, CLOSED] = closed
             work.candidates[each, CLOSEST] = 0
         work.candidates[closest, CLOSEST] = wanted
         row = end
+    return changed

@@ -1,7 +1,8 @@
 """The stages of a Radau IIA step: collocation of place, velocity and tangential displacement.
 
 Unknown are the stages' velocities; places and displacements follow from them. Newton's method with
-the derivatives of the step's start solves one real and one complex system of 3n equations.
+the derivatives of the step's start, carried along with the contacts (frames.py), solves one real
+and one complex system of 3n equations.
 """
 
 import math
@@ -9,28 +10,21 @@ import math
 from flocsim.integrators.accuracy import rounding_size, step_tolerance
 from flocsim.integrators.collocation import guess_stages
 from flocsim.integrators.explicit import locate_and_rate, rate_slips, sum_forces
-from flocsim.integrators.linear import factorise, solve
-from flocsim.integrators.radau_tableau import (
-    EIGENVALUES,
-    FROM_VECTORS,
-    INVERSE,
-    MATRIX,
-    NODES,
-    TO_VECTORS,
-)
-from flocsim.integrators.views import inertia, lever
+from flocsim.integrators.frames import follow_contacts
+from flocsim.integrators.linear import solve
+from flocsim.integrators.radau_tableau import MATRIX, NODES
+from flocsim.integrators.stage_systems import write_changes, write_loads
+from flocsim.integrators.views import lever
 from flocsim.layout import (
     CANDIDATES,
     CLOSED,
-    DAMPING,
     FIRST,
-    FREE,
     MEMORY,
     NOW,
     PACE,
+    SCRATCH,
     SLIP_RATES,
     SOLVES,
-    STIFFNESS,
     TIME,
 )
 
@@ -81,66 +75,19 @@ def evaluate_states(scene, work, time, step, first, last):
         sum_forces(scene, work, time + node * step, state, state)
 
 
-def write_matrix(scene, work, which, step):
-    """(µ/h) M + DAMPING + (h/µ) STIFFNESS for one eigenvalue µ; fixed bodies stay."""
-    value = EIGENVALUES[which]
-    for row in range(work.jacobian.shape[1]):
-        moves = scene.bodies[row // 3, FREE]
-        for column in range(work.jacobian.shape[1]):
-            entry = work.jacobian[DAMPING, row, column]
-            entry = entry + step / value * work.jacobian[STIFFNESS, row, column]
-            work.system[which, row, column] = moves * entry
-        mass = inertia(scene, row // 3, row % 3)
-        work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
-
-
-def factorise_systems(scene, work, step):
-    """Write and factorise both systems; False where one is singular."""
-    for which in range(2):
-        write_matrix(scene, work, which, step)
-        if not factorise(work.system, which):
-            return False
-    return True
-
-
-def imbalance(scene, work, body, axis, stage, step):
-    """Force less mass times acceleration at a stage, the latter from the stages' velocities."""
-    v, weights = work.motion, INVERSE[stage]
-    now = v[NOW, body, 3 + axis]
-    change = weights[0] * (v[FIRST, body, 3 + axis] - now)
-    change += weights[1] * (v[FIRST + 1, body, 3 + axis] - now)
-    change += weights[2] * (v[FIRST + 2, body, 3 + axis] - now)
-    return work.rates[FIRST + stage, body, 3 + axis] - inertia(scene, body, axis) * change / step
-
-
-def write_loads(scene, work, step):
-    """What the stages' velocities fail to balance, along both eigenvectors."""
-    size = work.jacobian.shape[1]
-    for row in range(size):
-        for which in range(2):
-            work.system[which, row, size] = 0.0
-        if scene.bodies[row // 3, FREE] == 1.0:
-            for stage in range(3):
-                missing = imbalance(scene, work, row // 3, row % 3, stage, step)
-                for which in range(2):
-                    work.system[which, row, size] += TO_VECTORS[which][stage] * missing
-
-
 def correct_stages(scene, work, step):
     """Add the solutions to the stages' velocities; the largest change it makes in place [m]."""
     largest = 0.0
-    size = work.jacobian.shape[1]
-    for row in range(size):
-        body, axis = row // 3, row % 3
-        weight = lever(scene, body, axis) * (step + work.bodies[body, MEMORY])
-        real, pair = work.system[0, row, size], work.system[1, row, size]
-        for stage in range(3):
-            columns = FROM_VECTORS[stage]
-            change = (columns[0] * real).real + 2.0 * (columns[1] * pair).real
-            work.motion[FIRST + stage, body, 3 + axis] += change
-            largest = max(largest, weight * abs(change))
-        if not abs(real) < math.inf:
-            return math.inf
+    for stage in range(3):
+        write_changes(scene, work, stage)
+        for body in range(work.motion.shape[1]):
+            memory = step + work.bodies[body, MEMORY]
+            for axis in range(3):
+                change = work.motion[SCRATCH, body, 3 + axis]
+                if not abs(change) < math.inf:
+                    return math.inf
+                work.motion[FIRST + stage, body, 3 + axis] += change
+                largest = max(largest, lever(scene, body, axis) * memory * abs(change))
     return largest
 
 
@@ -148,6 +95,7 @@ def newton_step(scene, work, time, step):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
     evaluate_states(scene, work, time, step, FIRST, FIRST + 3)
+    follow_contacts(work)
     write_loads(scene, work, step)
     for which in range(2):
         solve(work.system, which)

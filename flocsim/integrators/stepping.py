@@ -3,7 +3,9 @@
 import math
 
 from flocsim.geometry.candidates import time_within
+from flocsim.integrators.adaptive import LARGEST_FACTOR
 from flocsim.integrators.grain import grain_of
+from flocsim.integrators.modes import OTHER_CLOSEST, OTHER_CONTACTS
 from flocsim.integrators.views import normal_rate
 from flocsim.layout import (
     BEARABLE_STEP,
@@ -13,6 +15,10 @@ from flocsim.layout import (
     PREVIOUS_RATIO,
     PREVIOUS_STEP,
     REJECTED,
+    REJECTED_RATIO,
+    REJECTED_STEP,
+    SETTLED_STEP,
+    SETTLING,
     STAGED_STEP,
     STEP,
     TIME,
@@ -27,8 +33,11 @@ SMALLEST_STEP = 1e-14
 IMMINENT = 0.05
 """A switch within this share of the step is run up to by a step of its own."""
 
-SHARE_OF_FAILED, RECOVERY = 0.6, 1.1
+SHARE_OF_FAILED, RECOVERY = 0.6, 2.0
 """Behind a step that failed, steps grow to this share of it, and that by so much a step."""
+
+SETTLED_GROWTH = 3.0
+"""The first step behind a switch is at most so many times the one behind the switch before."""
 
 
 def imminent_switch(work, clock, step):
@@ -36,7 +45,7 @@ def imminent_switch(work, clock, step):
     target = 0.5 * grain_of(work, clock)
     for row in range(work.tally[CANDIDATES]):
         gap = work.geometry[NOW, row, 2]
-        if abs(gap) < clock[TOLERANCE]:
+        if 0.0 <= gap < clock[TOLERANCE]:
             rate = normal_rate(work, NOW, row)
             if gap * rate < 0.0:
                 ahead = (abs(gap) + target) / abs(rate)
@@ -64,19 +73,48 @@ def reject(clock, counts, step, ratio, too_far):
     counts[REJECTED] += 1
     clock[PREVIOUS_STEP] = 0.0
     clock[STAGED_STEP] = 0.0
-    clock[STEP] = 0.25 * step if ratio < 0.0 or too_far else next_step(clock, step, ratio)
+    failed = ratio < 0.0 or too_far
+    clock[STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
+    clock[REJECTED_STEP] = 0.0 if failed else step
+    clock[REJECTED_RATIO] = ratio
     if ratio < 0.0:
         clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
     return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
 
 
-def plan_next_step(clock, step, ratio, at_switch):
-    """The size of the step after an accepted one; behind a switch the forces are new."""
-    if at_switch:
-        clock[PREVIOUS_STEP] = math.inf
-        clock[STAGED_STEP] = 0.0
-        return
+def plan_behind_switch(clock):
+    """Behind a switch the forces are new, and settle about as fast as behind the last one."""
+    clock[PREVIOUS_STEP] = math.inf
+    clock[STAGED_STEP] = 0.0
+    clock[SETTLING] = 1.0
+    clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
+
+
+def plan_behind_alarm(clock, step):
+    """Behind a step that was cut for a switch which then did not come: too long to tell."""
+    clock[PREVIOUS_STEP] = math.inf
+    clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
+    clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
+
+
+def plan_next_step(clock, step, ratio):
+    """The size of the step after an accepted one that ran its length."""
+    if clock[SETTLING] == 1.0:
+        clock[SETTLED_STEP] = step
+        clock[SETTLING] = 0.0
+    cut = step < 0.5 * clock[STEP]
     clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
     clock[BEARABLE_STEP] *= RECOVERY
-    clock[PREVIOUS_STEP] = step
+    clock[PREVIOUS_STEP] = math.inf if cut else step
     clock[PREVIOUS_RATIO] = ratio
+
+
+def plan(clock, step, ratio, was_cut, switched):
+    """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
+    clock[REJECTED_STEP] = 0.0
+    if switched == OTHER_CONTACTS or (was_cut and switched == OTHER_CLOSEST):
+        plan_behind_switch(clock)
+    elif was_cut:
+        plan_behind_alarm(clock, step)
+    else:
+        plan_next_step(clock, step, ratio)

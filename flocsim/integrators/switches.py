@@ -131,6 +131,8 @@ def switch_of(scene, work, step, row, rival, earliest, grain, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
     high = min(earliest, 1.0)
     if margin(work, NEW, row, rival) >= -depth:
+        if rival < 0 and work.geometry[NOW, row, 2] < 0.0:
+            return earliest
         lowest = lowest_share(scene, work, step, row, rival)
         if lowest > high:
             return earliest
