@@ -73,6 +73,11 @@ def slip_limit(contact, parameters):
     return math.inf
 
 
+def kink(contact, parameters):
+    """A number that changes its sign where the contact forces have a kink."""
+    return 1.0
+
+
 def has_centre_force():
     """Whether the scene has a centre force at all."""
     return False

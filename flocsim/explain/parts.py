@@ -145,6 +145,7 @@ UNFILLED = (
     (slots.centre_force, "forces along lines of centres", "none is given"),
     (slots.surface_force, "forces at closest points", "none is given, no closest pair is sought"),
     (slots.slip_limit, "sliding", "no contact force limits its slip"),
+    (slots.kink, "search for kinks of the contact law", "it has none with these parameters"),
 )
 """(slot, what is left out where a scene does not fill it, why)."""
 

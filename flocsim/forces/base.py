@@ -82,7 +82,15 @@ class ContactForce(Force):
 
     The normal force is positive in repulsion; the tangential force acts along the direction in
     which ``slip`` grows, so that a spring returns −k·slip. A class may supply
-    ``slip_limit(contact, …)`` [m]: the largest elastic displacement that the contact can hold.
+    ``slip_limit(contact, …)`` [m]: the largest elastic displacement that the contact can hold; and
+    ``kink(contact, …)``: a number of any unit that changes its sign where the law has a kink (a
+    clip, a threshold), so that steps of controlled error end there.
     """
 
     slip_limit = None
+    kink = None
+
+    @property
+    def has_kink(self):
+        """Whether the law has a kink with these parameters."""
+        return self.kink is not None

@@ -214,6 +214,8 @@ def check_contact_force(force, fluid):
     check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
     if force.slip_limit is not None:
         check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
+    if force.has_kink:
+        check_results(force, fluid, force.kink, SAMPLE_CONTACTS, "kink")
 
 
 def check_kernel(force, fluid):

@@ -8,6 +8,15 @@ from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import ContactForce
 
 
+def unclipped(contact, k_n, k_t, critical, lambda_n, proportional, lambda_t):
+    """(normal, tangential) force of springs and dashpots alone [N]."""
+    damping = lambda_n + critical * 2.0 * math.sqrt(k_n / contact.effective_mass)
+    shear_damping = lambda_t + proportional * damping
+    normal = k_n * contact.overlap + contact.effective_mass * damping * contact.overlap_rate
+    drag = contact.effective_mass * shear_damping * contact.slip_rate
+    return normal, -k_t * contact.slip - drag
+
+
 @attrs.frozen
 class Contact(ContactForce):
     """Spring and dashpot at each contact point, normal and tangential.
@@ -56,23 +65,35 @@ class Contact(ContactForce):
         """µ as a number: inf where nothing slides."""
         return math.inf if self.friction == "none" else float(self.friction)
 
+    @property
+    def has_kink(self):
+        """Whether anything is clipped."""
+        return not self.tension or self.friction_limit < math.inf
+
     @staticmethod
     def kernel(
         contact, k_n, k_t, critical, lambda_n, proportional, lambda_t, friction_limit, tension
     ):
         """(normal, tangential) force [N]."""
-        damping = lambda_n + critical * 2.0 * math.sqrt(k_n / contact.effective_mass)
-        normal = k_n * contact.overlap + contact.effective_mass * damping * contact.overlap_rate
+        normal, tangential = unclipped(
+            contact, k_n, k_t, critical, lambda_n, proportional, lambda_t
+        )
         if tension == 0.0:
             normal = max(normal, 0.0)
-        shear_damping = lambda_t + proportional * damping
-        tangential = (
-            -k_t * contact.slip - contact.effective_mass * shear_damping * contact.slip_rate
-        )
         if friction_limit < math.inf:
             hold = friction_limit * max(normal, 0.0)
             tangential = min(max(tangential, -hold), hold)
         return normal, tangential
+
+    @staticmethod
+    def kink(contact, k_n, k_t, critical, lambda_n, proportional, lambda_t, friction_limit):
+        """Changes its sign where the normal force begins to pull, and where sliding begins."""
+        normal, tangential = unclipped(
+            contact, k_n, k_t, critical, lambda_n, proportional, lambda_t
+        )
+        if friction_limit == math.inf:
+            return normal
+        return normal * (friction_limit * max(normal, 0.0) - abs(tangential))
 
     @staticmethod
     def slip_limit(contact, k_n, k_t, friction_limit):

@@ -138,18 +138,23 @@ def pair_text(pieces, namespace, forces, fluid, kind):
 
 
 def contact_text(pieces, namespace, forces, fluid):
-    """Source of the contact forces and of the limit of their tangential displacement."""
-    terms, limits = [], []
+    """Source of the contact forces, the limit of their tangential displacement, and their kinks."""
+    terms, limits, kinks = [], [], []
     for force in forces:
         _, call = call_text(pieces, namespace, force, fluid, force.kernel, "contact")
         terms.append(("", call))
         if force.slip_limit is not None:
             _, limit = call_text(pieces, namespace, force, fluid, force.slip_limit, "contact")
             limits.append(limit)
+        if force.has_kink:
+            _, kink = call_text(pieces, namespace, force, fluid, force.kink, "contact")
+            kinks.append(kink)
     text = [sum_function("contact_force", "contact", terms, 2)]
     if limits:
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
         text.append(constant_function("slip_limit", "contact, parameters", least))
+    if kinks:
+        text.append(constant_function("kink", "contact, parameters", " * ".join(kinks)))
     text.append(constant_function("has_contact", "", True))
     return text
 

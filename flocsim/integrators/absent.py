@@ -2,7 +2,7 @@
 
 from flocsim import slots
 from flocsim.geometry import candidates
-from flocsim.integrators import explicit, jacobian
+from flocsim.integrators import explicit, grain, jacobian
 
 
 def no_forces(scene, work, time, state, rate):
@@ -22,7 +22,13 @@ def no_reach(scene, work, a, b, skin, reach):
     return skin
 
 
+def no_kink(scene, work, share):
+    """The contact law is smooth: steps end where pairs switch, and nowhere else."""
+    return share
+
+
 REPLACEMENTS = {
+    slots.kink: {grain.kink_share: no_kink},
     slots.surface_force: {
         explicit.add_surface_forces: no_forces,
         jacobian.add_surfaces: no_derivatives,

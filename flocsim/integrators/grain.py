@@ -5,6 +5,7 @@ import math
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contacts import locate_contacts
 from flocsim.integrators.accuracy import step_tolerance
+from flocsim.integrators.kinks import kink_share
 from flocsim.integrators.switches import first_switch
 from flocsim.layout import CANDIDATES, NEW, NOW, TOLERANCE
 from flocsim.slots import awaits_touch
@@ -46,5 +47,6 @@ def switch_share(scene, work, memo, clock, step):
     if clock[TOLERANCE] < math.inf or awaits_touch(memo):
         grain = grain_of(work, clock)
         depth = grain if deepest_overlap(work) > 0.0 else max(grain, SHALLOWEST_TOUCH)
-        return first_switch(scene, work, step, grain, depth)
+        share = first_switch(scene, work, step, grain, depth)
+        return kink_share(scene, work, share) if share > 1.0 else share
     return math.inf

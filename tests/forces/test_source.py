@@ -174,6 +174,20 @@ def test_contact_forces_and_their_slip_limit():
     assert free.fillings[slots.has_contact]() and not slots.has_contact()
 
 
+def test_kinks_of_a_contact_force():
+    assert slots.kink not in scene_functions([Contact()], Fluid()).fillings
+    pulling = SAMPLE_CONTACTS[0]._replace(overlap_rate=-1.0)
+    pushing = pulling._replace(overlap_rate=0.0)
+    clipped = scene_functions([Contact(tension=False)], Fluid())
+    assert call(clipped, slots.kink, pulling) < 0.0 < call(clipped, slots.kink, pushing)
+    # Which slides, and which holds, at the same slip.
+    slippery, rough = (
+        scene_functions([Contact(k_n=20.0, k_t=2.0, friction=mu)], Fluid()) for mu in (1e-3, 10.0)
+    )
+    slipping = pushing._replace(slip_rate=0.0)
+    assert call(slippery, slots.kink, slipping) < 0.0 < call(rough, slots.kink, slipping)
+
+
 @pytest.mark.parametrize(
     "force, reason",
     [

@@ -1,0 +1,32 @@
+"""Where inside a step a contact force passes a kink of its law: a clip, a threshold.
+
+The force is continuous there, so that a step that ends a little behind the kink errs by the square
+of that little alone.
+"""
+
+from flocsim.integrators.views import contact_view
+from flocsim.layout import CANDIDATES, CLOSED, NEW, NOW
+from flocsim.slots import kink
+
+FINENESS = 1e-4
+"""A kink is located to this share of how far the step began from it."""
+
+
+def row_share(scene, work, row):
+    """The share of the step at which one contact passes its kink, by linear interpolation; 2.0
+    where it does not, or is as good as there at either end."""
+    before = kink(contact_view(scene, work, NOW, row), scene.parameters)
+    after = kink(contact_view(scene, work, NEW, row), scene.parameters)
+    nearer = min(abs(before), abs(after))
+    if before * after >= 0.0 or nearer <= FINENESS * max(abs(before), abs(after)):
+        return 2.0
+    # A little further than the kink, so that the next step begins behind it.
+    return (1.0 + 0.5 * FINENESS) * before / (before - after)
+
+
+def kink_share(scene, work, share):
+    """The share of the step at which the first contact passes a kink, or the given one before."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            share = min(share, row_share(scene, work, row))
+    return share
