@@ -20,6 +20,7 @@ from pathlib import Path
 
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint, reached, refuse_closure
+from flocsim.linking import pipeline
 
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
@@ -120,6 +121,8 @@ def compiled(entry, fillings, name, allocates):
         # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
         small = len(clone.__code__.co_code) < INLINED_SIZE
         inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": small}
+        if pipeline() is not None:
+            inner["pipeline_class"] = pipeline()
         return compiled_once(numba.njit(clone, **options, **inner))
 
     folder = cache_folder()

@@ -29,12 +29,13 @@ ROWS = [
     ["forces", "integrators"],
     ["body", "state"],
     ["geometry"],
-    ["composer", "fingerprint", "slots", "layout", "fields", "constants", "errors"],
+    ["composer", "linking", "fingerprint", "slots", "layout", "fields", "constants", "errors"],
 ]
 SIBLING_IMPORTS = {
     ("composer", "constants"),
     ("composer", "errors"),
     ("composer", "fingerprint"),
+    ("composer", "linking"),
     ("fingerprint", "errors"),
     ("fields", "errors"),
 }
