@@ -9,9 +9,10 @@ import pytest
 from methods import by_adaptive
 from reference import shapes as plain
 from reference.contacts import contacts
-from trial_scenes import ELASTIC, Spring, hook, kinetic_energy, momenta, star, watched
+from trial_scenes import ELASTIC, Spring, comb, hook, kinetic_energy, momenta, star, watched
 
 from flocsim import Body, System
+from flocsim.forces import Contact
 from flocsim.integrators import Implicit, VelocityVerlet
 
 SPRING = Spring(stiffness=0.1, rest=-6e-6)
@@ -70,6 +71,38 @@ def test_adaptive_methods_lose_less_energy_at_a_finer_tolerance(integrator):
     assert abs(fine[1]) < 1e-5
     assert abs(fine[1]) < 0.1 * abs(coarse[1])
     assert max(coarse[2], fine[2]) < 1e-5
+
+
+def pressed_combs(teeth):
+    """Two combs that are pushed against each other, and along, all teeth tip to tip."""
+    shape = comb(teeth)
+    height = 2.0 * (shape.vertices[:, 1].max() + shape.radius) - 1e-9
+    lower = Body(shape, velocity=(0.0, SPEED), surface_density=2.0)
+    upper = Body(shape, (0.0, height), np.pi, (1e-3, -SPEED), surface_density=2.0)
+    return [lower, upper]
+
+
+@pytest.mark.parametrize("teeth", [3, 15, 31])
+def test_momentum_stays_with_hundreds_of_contacts_at_once(teeth):
+    """N = 14, 62, 126; explicit codes that keep few contacts lose momentum from N = 16 on."""
+    bodies = pressed_combs(teeth)
+    system = System(bodies, [Contact(k_n=20.0, k_t=2.0), SPRING], Implicit(tolerance=1e-10))
+    end = watched(system, 1e-6, capacity=1024)
+    assert end.status.name == "FINISHED"
+    touching = contacts(plain_scene(bodies, end.position, end.velocity)).overlap
+    assert len(touching) >= 4 * teeth
+    change = momenta(bodies, end.position, end.velocity) - momenta(bodies, *system.motion())
+    scaled = np.abs(change) / (bodies[0].mass * SPEED * np.array([1.0, 1.0, teeth * 5e-6]))
+    assert scaled[:2].max() < 1e-14
+    assert scaled[2] < 1e-8
+
+
+@pytest.mark.slow
+def test_implicit_over_a_hundred_thousand_contacts():
+    count, energy_change, momenta_change = drift(Implicit(tolerance=1e-12), 4.2)
+    assert count >= 100_000
+    assert abs(energy_change) < 1e-3
+    assert momenta_change < 1e-5
 
 
 @pytest.mark.slow
