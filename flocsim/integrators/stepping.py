@@ -6,6 +6,7 @@ from flocsim.geometry.candidates import time_within
 from flocsim.integrators.adaptive import LARGEST_FACTOR
 from flocsim.integrators.grain import grain_of
 from flocsim.integrators.modes import OTHER_CLOSEST, OTHER_CONTACTS
+from flocsim.integrators.touches import touch_grain
 from flocsim.integrators.views import normal_rate
 from flocsim.layout import (
     BEARABLE_STEP,
@@ -40,15 +41,16 @@ SETTLED_GROWTH = 3.0
 """The first step behind a switch is at most so many times the one behind the switch before."""
 
 
-def imminent_switch(work, clock, step):
+def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
-    target = 0.5 * grain_of(work, clock)
+    grain = grain_of(work, clock)
     for row in range(work.tally[CANDIDATES]):
         gap = work.geometry[NOW, row, 2]
         if 0.0 <= gap < clock[TOLERANCE]:
             rate = normal_rate(work, NOW, row)
             if gap * rate < 0.0:
-                ahead = (abs(gap) + target) / abs(rate)
+                behind = 0.5 * touch_grain(scene, work, NOW, row, grain)
+                ahead = (abs(gap) + behind) / abs(rate)
                 if ahead < IMMINENT * step:
                     step = ahead
     return step
@@ -60,7 +62,7 @@ def choose_step(scene, work, clock, lists):
     if lists:
         step = min(step, time_within(scene, work, 0.5))
         if clock[TOLERANCE] < math.inf:
-            step = imminent_switch(work, clock, step)
+            step = imminent_switch(scene, work, clock, step)
     left = clock[UNTIL] - clock[TIME]
     # Two even steps at the end instead of a long one and a sliver.
     if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:

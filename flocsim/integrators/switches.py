@@ -4,6 +4,7 @@ The motion in the step is interpolated; the integrator then takes a shorter step
 """
 
 from flocsim.geometry.contacts import locate_polygons, turn_bodies
+from flocsim.integrators.touches import touch_grain
 from flocsim.integrators.views import normal_rate
 from flocsim.layout import CANDIDATES, CLOSEST, NEW, NOW, SCRATCH
 from flocsim.slots import surface_reach
@@ -127,17 +128,29 @@ def crossing(scene, work, step, row, rival, high, grain):
     return share
 
 
+def least_depth(scene, work, step, row, grain, depth):
+    """The overlap at the end of a step below which an open pair has not touched yet [m].
+
+    One that goes on approaching has, however little it overlaps by now.
+    """
+    approach = -step * normal_rate(work, NEW, row)
+    return touch_grain(scene, work, NEW, row, grain) if approach > depth else depth
+
+
 def switch_of(scene, work, step, row, rival, earliest, grain, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
-    high = min(earliest, 1.0)
-    if margin(work, NEW, row, rival) >= -depth:
+    high, limit = min(earliest, 1.0), depth
+    if rival < 0 and work.geometry[NOW, row, 2] >= 0.0 > work.geometry[NEW, row, 2]:
+        limit = least_depth(scene, work, step, row, grain, depth)
+        grain = min(grain, limit)
+    if margin(work, NEW, row, rival) >= -limit:
         if rival < 0 and work.geometry[NOW, row, 2] < 0.0:
             return earliest
         lowest = lowest_share(scene, work, step, row, rival)
         if lowest > high:
             return earliest
         high = lowest
-    if look_at(scene, work, step, high, row, rival) >= -depth:
+    if look_at(scene, work, step, high, row, rival) >= -limit:
         return earliest
     return crossing(scene, work, step, row, rival, high, grain)
 

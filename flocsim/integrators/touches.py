@@ -1,0 +1,57 @@
+"""How finely the instant of a touch must be known: what follows from a contact hangs on it.
+
+A contact that is noticed g too deep gives back a velocity that is off by about ω0 g.
+"""
+
+import math
+
+from flocsim.integrators.views import contact_view, normal_rate
+from flocsim.layout import MEMORY
+from flocsim.slots import contact_force
+from flocsim.state import ContactView
+
+SHARE_OF_DEPTH = 0.02
+"""Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
+
+GRAINS_LATER = 100.0
+"""… and so finely that the error of velocity leads to so many grains at most."""
+
+NEARLY = 0.99
+"""Critical damping is told from less in spite of rounding."""
+
+
+def pressed(view, overlap, overlap_rate, parameters):
+    """The normal force of a contact with such an overlap [N]."""
+    changed = ContactView(
+        overlap, overlap_rate, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
+    )
+    force, _ = contact_force(changed, parameters)
+    return force
+
+
+TINY = 1e-300
+"""Keeps a quotient finite."""
+
+
+def bounces(view, speed, frequency, parameters):
+    """Whether bodies fly apart again: damping below critical, or none that pulls."""
+    drag = 2.0 * NEARLY * frequency * speed * view.effective_mass
+    return pressed(view, 0.0, speed, parameters) < drag or (
+        pressed(view, 0.0, -speed, parameters) >= 0.0
+    )
+
+
+def touch_grain(scene, work, state, row, grain):
+    """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
+    speed = -normal_rate(work, state, row)
+    view = contact_view(scene, work, state, row)
+    stiffness = pressed(view, grain, 0.0, scene.parameters) / grain
+    if not (stiffness > 0.0 and speed > 0.0):
+        return grain
+    frequency = math.sqrt(stiffness / view.effective_mass)
+    if not bounces(view, speed, frequency, scene.parameters):
+        return grain
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    memory = max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
+    later = GRAINS_LATER * grain / max(frequency * memory, TINY)
+    return min(grain, SHARE_OF_DEPTH * speed / frequency, later)
