@@ -44,7 +44,7 @@ def plain_error(mask, fit):
     return 100 * np.count_nonzero(cover != padded) / mask.sum()
 
 
-@pytest.mark.parametrize("method", ["pattern", "even"])
+@pytest.mark.parametrize("method", ["pattern", "paper", "even"])
 @pytest.mark.parametrize("vertices", [2, 3, 4, 9, 32])
 @pytest.mark.parametrize("radius", [0.7, 2.3])
 def test_relative_error_is_that_of_the_definition(method, vertices, radius):
@@ -145,7 +145,7 @@ def awkward_masks():
 
 
 @pytest.mark.parametrize("vertices", [2, 3, 5, 16, 64, 150])
-@pytest.mark.parametrize("method", ["pattern", "even"])
+@pytest.mark.parametrize("method", ["pattern", "paper", "even"])
 def test_awkward_masks_give_simple_polygons(vertices, method):
     for mask in awkward_masks():
         with warnings.catch_warnings():
