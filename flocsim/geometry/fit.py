@@ -68,9 +68,9 @@ def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=Fals
     _check_options(vertices, radius, method)
     if vertices == 1:
         return _equal_area_circle(mask)
-    _warn_if_coarse(mask, radius)
     if preserve_area:
         _require_room(mask, radius)
+    _warn_if_coarse(mask, radius)
     return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area)
 
 

@@ -8,6 +8,9 @@ SURFACE_ROUNDS = 15
 SURFACE_SAMPLES = 120
 """Points along the longer side that the surface is fitted to: plenty for a degree of 6."""
 
+FEWEST_FRAMES = 3
+"""The median of fewer frames still shows their flocs."""
+
 NOISE_SAMPLES = 500
 """Points along the longer side that tell the noise."""
 
@@ -29,6 +32,11 @@ def low_pass(grey, scale):
         gain = np.exp(-0.5 * (wavenumber * scale) ** 2)
         spectrum *= np.expand_dims(gain, 1 - axis)
     return fft.idctn(spectrum, norm="ortho")
+
+
+def median_frame(frames):
+    """The light of a fixed camera: per pixel the median of frames (h, w) of one shape."""
+    return np.median(np.stack(frames), axis=0)
 
 
 def robust_deviation(values):
