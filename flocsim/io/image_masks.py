@@ -78,10 +78,27 @@ def segment_mask(mask, *, min_radius=4.0, max_radius=np.inf):
     """
     from scipy.ndimage import find_objects, label
 
-    binary = mask.max() <= 1
-    labels = label(filled(mask > 0), EIGHT)[0] if binary else mask
+    labels = label(filled(mask > 0), EIGHT)[0] if mask.max() <= 1 else mask
     boxes = enumerate(find_objects(labels), start=1)
-    found = [(filled(labels[box] == number), box) for number, box in boxes if box is not None]
+    found = [
+        piece
+        for number, box in boxes
+        if box is not None
+        for piece in _pieces(filled(labels[box] == number), box)
+    ]
     filters = Filters(min_radius, max_radius, clear_of_border=False)
     regions, rejected = sorted_out(found, None, filters)
     return Segmentation(labels > 0, regions, rejected, "masked", float("nan"))
+
+
+def _pieces(mask, box):
+    """The connected parts of one label, each with its box: a label may be in several places."""
+    from scipy.ndimage import find_objects, label
+
+    parts = label(mask, EIGHT)[0]
+    for number, inner in enumerate(find_objects(parts), start=1):
+        place = tuple(
+            slice(outer.start + part.start, outer.start + part.stop)
+            for outer, part in zip(box, inner, strict=True)
+        )
+        yield parts[inner] == number, place

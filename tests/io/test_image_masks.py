@@ -45,6 +45,21 @@ def test_labels_keep_touching_flocs_apart(tmp_path):
     assert sorted(areas(tmp_path / "labels.npy")["labels.npy"]) == [100, 130]
 
 
+def test_a_label_in_two_places_is_two_flocs():
+    labels = np.zeros((20, 40), int)
+    labels[2:12, 2:12] = labels[2:12, 15:28] = 4
+    labels[2:12, 28:38] = 9
+    found = segment_mask(labels).regions
+    assert [(r.area, r.bbox) for r in found] == [
+        (100, (2, 2, 12, 12)), (130, (2, 15, 12, 28)), (100, (2, 28, 12, 38))
+    ]  # fmt: skip
+    assert found[1].centroid == (21.0, 6.5)
+
+
+def test_an_empty_mask_has_no_flocs():
+    assert segment_mask(np.zeros((5, 5), int)).regions == ()
+
+
 def test_archives_plain_and_packed(tmp_path):
     np.savez(tmp_path / "plain.npz", a=MASK, b=MASK.astype(bool))
     assert areas(tmp_path / "plain.npz") == {"plain.npz:a": [120, 208], "plain.npz:b": [120, 208]}
