@@ -55,7 +55,7 @@ def test_claim_2_spheropolygons_beat_spheres():
     assert np.all(large(8) < large(1)) and np.mean(large(4) < large(1)) > 0.9
 
 
-def test_claim_3_errors_rise_with_the_radius_over_all_n():
+def test_claim_3_errors_rise_with_the_radius_from_eight_vertices_on():
     means = [np.mean([large(n, r) for n in COUNTS[1:]], axis=0) for r in RADII]
     assert interval(means[1] - means[0])[0] > 0
     assert interval(means[2] - means[1])[0] > 0
