@@ -44,7 +44,7 @@ SIBLING_IMPORTS = {
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/mpi.py"],
     "h5py": ["io/results.py", "io/shape_library.py", "io/trajectory.py"],
-    "skimage": ["io/images.py"],
+    "skimage": ["io/image_*.py"],
     "matplotlib": ["io/plots.py", "io/plot_*.py"],
     "shapely": ["geometry/outline.py"],
     "pint": ["*"],

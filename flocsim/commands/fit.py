@@ -3,13 +3,17 @@
 import sys
 from pathlib import Path
 
-from flocsim.errors import FileError, ImageError, UsageError
+from flocsim.commands import fit_work
+from flocsim.commands.fit_options import add_options, add_output, add_segmentation, read_options
+from flocsim.errors import FileError, FlocsimError, UsageError
 
 DESCRIPTION = """\
 Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
-write them to a shape library.  The circle of equal area (N = 1) is always stored too.
+write them to a shape library.  The circle of equal area (N = 1) is always stored too.  Every
+region, also those left out and why, goes to a table beside the library.
 
-  flocsim fit frames/ --pixel-size 0.95e-6 --vertices 4,8,16,64 --radius 1 -o shapes.h5"""
+  flocsim fit frames/ --pixel-size 0.95e-6 --vertices 4,8,16,64 --radius 1 -o shapes.h5
+  flocsim plot shapes.h5          # sizes, and errors against N: the paper's Figs 2 and 3"""
 
 
 def add_parser(subparsers):
@@ -22,51 +26,9 @@ def add_parser(subparsers):
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add = parser.add_argument
-    add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
-    add(
-        "--pixel-size",
-        required=True,
-        metavar="METRES",
-        help="length of a pixel's side in metres, e.g. 0.95e-6",
-    )
-    add(
-        "--vertices",
-        default="4,8,16,64",
-        metavar="LIST",
-        help="numbers of vertices with commas between them (default: %(default)s)",
-    )
-    add("--radius", default="1", metavar="PX", help="spheroradius in pixels (default: %(default)s)")
-    add(
-        "-o",
-        "--output",
-        default="shapes.h5",
-        metavar="FILE",
-        help="shape library to write (default: %(default)s)",
-    )
-    add(
-        "--flocs",
-        default="auto",
-        choices=("auto", "bright", "dark"),
-        help="how flocs stand out from the background (default: %(default)s)",
-    )
-    add(
-        "--min-radius",
-        default="4",
-        metavar="PX",
-        help="equivalent radius below which a region is no floc (default: %(default)s)",
-    )
-    add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
-    add(
-        "--method",
-        default="pattern",
-        choices=("pattern", "even"),
-        help="pattern: search for the least error; even: points evenly on the outline, the plain "
-        "baseline (default: %(default)s)",
-    )
-    add("--overlay", metavar="FILE",
-        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
-        "pictures, one file each: FILE-picture.png")  # fmt: skip
+    add_options(parser.add_argument)
+    add_output(parser.add_argument)
+    add_segmentation(parser.add_argument_group("finding the flocs").add_argument)
     parser.set_defaults(run=run)
     return parser
 
@@ -74,63 +36,26 @@ def add_parser(subparsers):
 def run(args):
     """Fit, print what was found and write the library; returns the exit code."""
     options = read_options(args)
-    check_output(args.output)
+    summary = args.summary or Path(args.output).with_suffix(".csv")
+    for output in (args.output, summary):
+        check_output(output)
     check_overlay(args.overlay)
     try:
-        entries = fit_pictures(list_pictures(args.images), args, options)
+        pictures, fits = work(args.images, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
+    entries = make_entries(pictures, fits, options)
     if not entries:
+        write_summary(summary, pictures, fits, options)
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return 2
-
-    from flocsim.io.fit_report import format_errors, plural
-    from flocsim.io.shape_library import write_library
-
-    write_library(args.output, entries)
-    print(format_errors(entries))
-    counts = ", ".join(map(str, options["vertices"]))
-    print(f"{args.output}: {plural(len(entries), 'floc')} at N = {counts}")
+    write(args, summary, pictures, fits, entries, options)
     return 0
 
 
-def read_options(args):
-    """The numbers among the options, checked: UsageError for any that does not make sense."""
-    return {
-        "pixel_size": positive("--pixel-size", args.pixel_size, "a length in metres"),
-        "radius": positive("--radius", args.radius, "pixels"),
-        "min_radius": positive("--min-radius", args.min_radius, "pixels"),
-        "vertices": vertex_counts(args.vertices),
-        "max_flocs": None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
-    }
-
-
-def positive(option, text, meaning):
-    """A finite number above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value < float("inf"):
-        raise UsageError(f"{option} takes {meaning}, a number above 0, found {text!r}")
-    return value
-
-
-def whole(option, text):
-    """A whole number from 1."""
-    if not text.strip().isdecimal() or int(text) < 1:
-        raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
-    return int(text)
-
-
-def vertex_counts(text):
-    """Sorted numbers of vertices without repeats, 1 among them."""
-    return sorted({1, *(whole("--vertices", part) for part in text.split(","))})
-
-
 def check_output(path):
-    """Raise FileError before the long work if the library could not be written at its end."""
+    """Raise FileError before the long work if a file could not be written at its end."""
     import os
 
     from flocsim.io.files import ordinary_target
@@ -148,99 +73,98 @@ def check_overlay(path):
         raise UsageError(f"--overlay {path} must end in .{', .'.join(FORMATS)}")
 
 
-def list_pictures(names):
-    """The pictures' paths, folders replaced by the pictures in them; each path once."""
-    from flocsim.io.image_reading import SUFFIXES
-
-    paths = []
-    for path in map(Path, names):
-        inside = sorted(path.iterdir()) if path.is_dir() else [path]
-        found = [p for p in inside if not path.is_dir() or p.suffix.lower() in SUFFIXES]
-        if not found:
-            report(ImageError(f"{path}: the folder holds no pictures ({', '.join(SUFFIXES)})"))
-        paths += found
-    return list(dict.fromkeys(paths))
-
-
 def report(error):
     """One line on stderr, for a picture that is skipped."""
     print(f"flocsim: {error}", file=sys.stderr, flush=True)
 
 
-def fit_pictures(paths, args, options):
-    """ShapeEntries of all pictures; those that cannot be used are reported and skipped."""
-    names = [path.name for path in paths]
-    entries = []
-    for path in paths:
-        # Pictures of one name in several folders are told apart by their paths.
-        name = path.name if names.count(path.name) == 1 else path.as_posix()
-        overlay = overlay_path(args.overlay, path, several=len(paths) > 1)
-        try:
-            entries += fit_picture(path, name, overlay, args, options)
-        except ImageError as error:
-            report(error)
-    return entries
+def work(names, options):
+    """Pictures, and for each of their regions {radius: {N: Fit}}."""
+    from flocsim.io.fit_report import Bar
+
+    paths = fit_work.list_pictures(names, options.masks, report)
+    background = fit_work.find_background(paths, options)
+    repeated = [path.name for path in paths]
+    # Pictures of one name in several folders are told apart by their paths.
+    titles = [p.name if repeated.count(p.name) == 1 else p.as_posix() for p in paths]
+    tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
+    with fit_work.workers(options.jobs) as mapped:
+        pictures = list(found_pictures(mapped(fit_work.find_flocs, tasks), options))
+        masks = [(region.mask, options) for each in pictures for region in each.regions]
+        bar = Bar(len(masks))
+        fits = [bar.count(fit) for fit in mapped(fit_work.fit_region, masks)]
+    return pictures, fits
 
 
-def overlay_path(overlay, picture, several):
-    """Where a picture's overlay goes, None for nowhere."""
-    if overlay is None or not several:
-        return overlay
-    overlay = Path(overlay)
-    return overlay.with_name(f"{overlay.stem}-{picture.stem}{overlay.suffix}")
+def found_pictures(results, options):
+    """The pictures among the results, each with its line printed; errors are reported."""
+    from flocsim.io.fit_report import describe, warn_of_coarse
+
+    for result in results:
+        if isinstance(result, FlocsimError):
+            report(result)
+            continue
+        for picture in result:
+            print(describe(picture.name, picture.found, len(picture.regions)), flush=True)
+            warn_of_coarse(picture.name, picture.regions, options.radii)
+            yield picture
 
 
-def fit_picture(path, name, overlay, args, options):
-    """ShapeEntries of one picture, its line printed, its overlay drawn."""
-    from flocsim.io.fit_report import describe, show_progress, warn_of_coarse
-    from flocsim.io.images import read_grey, segment
+def make_entries(pictures, fits, options):
+    """ShapeEntries of all flocs, for every spheroradius."""
     from flocsim.io.shape_library import make_entry
 
-    grey = read_grey(path)
-    found = segment(grey, flocs=args.flocs, min_radius=options["min_radius"])
-    regions = largest(found.regions, options["max_flocs"])
-    fits = []
-    for region in regions:
-        show_progress(name, len(fits), len(regions))
-        fits.append(fit_region(region, args.method, options))
-    print(describe(name, found, len(regions)), flush=True)
-    warn_of_coarse(name, regions, options["radius"])
-    if overlay is not None:
-        draw(overlay, grey, name, regions, fits, options)
-    pixel_size, radius = options["pixel_size"], options["radius"]
+    flocs = [(picture, region) for picture in pictures for region in picture.regions]
+    several = len(options.radii) > 1
     return [
-        make_entry(name, region, fit, pixel_size, radius)
-        for region, fit in zip(regions, fits, strict=True)
+        make_entry(picture.name, region, fit[radius], options.pixel_size, radius, several)
+        for radius in options.radii
+        for (picture, region), fit in zip(flocs, fits, strict=True)
     ]
 
 
-def largest(regions, count):
-    """The `count` largest regions, in their old order; all for None."""
-    by_size = sorted(regions, key=lambda region: (-region.area, region.label))[:count]
-    return sorted(by_size, key=lambda region: region.label)
+def write(args, summary, pictures, fits, entries, options):
+    """Write library, table and overlays; print the table of errors."""
+    from flocsim.io.fit_report import format_errors, plural
+    from flocsim.io.shape_library import write_library
+
+    settings = {"method": options.method, "preserve_area": options.preserve_area}
+    write_library(args.output, entries, settings)
+    write_summary(summary, pictures, fits, options)
+    if args.overlay is not None:
+        draw(args.overlay, pictures, fits, options)
+    print(format_errors(entries))
+    counts = ", ".join(map(str, options.vertices))
+    print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
 
 
-def fit_region(region, method, options):
-    """{N: Fit} of one floc."""
-    import warnings
+def write_summary(path, pictures, fits, options):
+    """Write the table of all regions."""
+    from flocsim.io.files import replace_file
+    from flocsim.io.fit_summary import summary_text
 
-    from flocsim.geometry.fit import fit_mask
-
-    with warnings.catch_warnings():
-        # Said once a picture, by warn_of_coarse, not once a floc and N.
-        warnings.simplefilter("ignore", UserWarning)
-        return {
-            count: fit_mask(region.mask, vertices=count, radius=options["radius"], method=method)
-            for count in options["vertices"]
-        }
+    replace_file(path, summary_text(pictures, fits, options.pixel_size).encode())
 
 
-def draw(overlay, grey, name, regions, fits, options):
-    """Write the picture with the outlines at the largest N."""
+def draw(overlay, pictures, fits, options):
+    """Write each picture with the outlines at the largest N and the smallest spheroradius."""
+    from flocsim.io.fit_report import plural
+    from flocsim.io.images import read_grey
     from flocsim.io.plot_fit import draw_overlay
     from flocsim.io.plots import save
 
-    most = options["vertices"][-1]
-    flocs = [(region, fit[most]) for region, fit in zip(regions, fits, strict=True)]
-    title = f"{name}: {len(flocs)} flocs, N = {most}, r = {options['radius']:g} px"
-    save(draw_overlay(grey, flocs, title), overlay)
+    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
+    for picture in pictures:
+        flocs = [(region, next(results)[radius][most]) for region in picture.regions]
+        title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
+        grey = picture.found.foreground if options.masks else read_grey(picture.path)
+        figure = draw_overlay(grey, flocs, title, picture.found.rejected)
+        save(figure, overlay_path(overlay, picture, several=len(pictures) > 1))
+
+
+def overlay_path(overlay, picture, several):
+    """Where a picture's overlay goes."""
+    overlay = Path(overlay)
+    stem = Path(picture.name.replace(":", "-").replace("/", "-"))
+    stem = stem.stem if stem.suffix.lower() == picture.path.suffix.lower() else stem.name
+    return overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}") if several else overlay

@@ -26,13 +26,34 @@ def add_parser(subparsers):
 def run(args):
     """Print the description, or the config; returns the exit code."""
     from flocsim.io.results import read_results
+    from flocsim.io.shape_library import is_library
 
+    if not args.config and is_library(args.results):
+        print(describe_library(args.results))
+        return 0
     results = read_results(args.results)
     if args.config:
         sys.stdout.write(config_text(args.results, results))
     else:
         print(describe(args.results, results))
     return 0
+
+
+def describe_library(path):
+    """A shape library as text: its flocs, how they were fitted, their errors."""
+    from flocsim.io.fit_report import format_errors
+    from flocsim.io.shape_library import read_library, read_settings
+
+    entries = read_library(path)
+    images = sorted({entry.image for entry in entries})
+    sizes = [1e6 * entry.equivalent_radius * entry.pixel_size for entry in entries]
+    facts = [
+        ("shapes", f"{len(entries)} of {len(images)} pictures"),
+        ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+        *((name.replace("_", " "), str(value)) for name, value in read_settings(path).items()),
+    ]
+    lines = [f"{name:<14} {value}" for name, value in facts]
+    return "\n".join([f"{path}: a shape library", "", *lines, "", format_errors(entries)])
 
 
 def config_text(path, results):

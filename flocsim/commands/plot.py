@@ -1,10 +1,11 @@
-"""`flocsim plot`: the paper's figures from a results file."""
+"""`flocsim plot`: the paper's figures from a results file or a shape library."""
 
 from pathlib import Path
 
 from flocsim.errors import FileError, UsageError
 
 FIGURE_NAMES = ("4", "5", "6", "8", "overview")
+POPULATION_NAMES = ("2", "3")
 DESCRIPTION = """\
 Draw the figures of a results file, each into a file of its own:
   4         Pr[C inside]: probability that a collision happens inside the attraction zone
@@ -12,7 +13,11 @@ Draw the figures of a results file, each into a file of its own:
   6         Pr[A | outside]: probability of aggregation after a collision outside the zone
   8         probability of the classes A, B, C, D, all displacements pooled
   overview  Pr[C inside], Pr[A] and the classes in one picture
-Bars are Wilson 95 % intervals. Figures are numbered as in Tang et al. (2014)."""
+Bars are Wilson 95 % intervals.
+Of a shape library that flocsim fit wrote:
+  2         histogram of the equivalent radii
+  3         relative error of the fits against N by size class, for every spheroradius
+Figures are numbered as in Tang et al. (2014)."""
 
 
 def add_parser(subparsers):
@@ -21,11 +26,11 @@ def add_parser(subparsers):
 
     parser = subparsers.add_parser(
         "plot",
-        help="draw the figures of a results file",
+        help="draw the figures of a results file or a shape library",
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("results", help="results file that flocsim ensemble wrote")
+    parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
     parser.add_argument(
         "--output-dir",
         default=".",
@@ -37,9 +42,8 @@ def add_parser(subparsers):
     )
     parser.add_argument(
         "--figures",
-        default=",".join(FIGURE_NAMES),
         metavar="LIST",
-        help="figures with commas between them (default: %(default)s)",
+        help="figures with commas between them (default: all that the file has)",
     )
     parser.set_defaults(run=run)
     return parser
@@ -47,28 +51,42 @@ def add_parser(subparsers):
 
 def run(args):
     """Draw the figures asked for, print the path of each; returns the exit code."""
-    names = figure_names(args.figures)
+    names = None if args.figures is None else figure_names(args.figures)
 
-    from flocsim.io.plots import FIGURES, save
-    from flocsim.io.results import read_results
+    from flocsim.io.plots import save
 
-    results = read_results(args.results)
+    content, figures = read_content(args.results)
+    foreign = [name for name in names or () if name not in figures]
+    if foreign:
+        raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
     folder = made_folder(args.output_dir)
-    for name in names:
+    for name in names or figures:
         label = f"figure-{name}" if name.isdigit() else name
         path = folder / f"{Path(args.results).stem}-{label}.{args.format}"
-        save(FIGURES[name](results), path)
+        save(figures[name](content), path)
         print(path)
     return 0
+
+
+def read_content(path):
+    """What a file holds, Results or ShapeEntries, and {name: function} of its figures."""
+    from flocsim.io.plots import FIGURES, POPULATION_FIGURES
+    from flocsim.io.results import read_results
+    from flocsim.io.shape_library import is_library, read_library
+
+    if is_library(path):
+        return read_library(path), POPULATION_FIGURES
+    return read_results(path), FIGURES
 
 
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    unknown = [name for name in names if name not in FIGURE_NAMES]
+    known = (*POPULATION_NAMES, *FIGURE_NAMES)
+    unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"
-        raise UsageError(f"--figures: found {found}; choose from {', '.join(FIGURE_NAMES)}")
+        raise UsageError(f"--figures: found {found}; choose from {', '.join(known)}")
     return names
 
 

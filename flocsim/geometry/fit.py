@@ -8,11 +8,15 @@ import numpy as np
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.geometry.fit_outline import require_one_region
+from flocsim.geometry.resize import core_factor
 from flocsim.geometry.shape import Shape
 from flocsim.geometry.sphere import Sphere
 from flocsim.geometry.spheropolygon import SpheroPolygon
 
-METHODS = ("pattern", "even")
+METHODS = ("pattern", "paper", "even")
+
+SLACK = 0.01
+"""Share of the mask's area by which the swept area may be off before the outline is settled."""
 
 
 @attrs.frozen(eq=False)
@@ -39,29 +43,35 @@ class Fit:
         return self.shape.scaled(pixel_size)
 
 
-def fit_mask(mask, *, vertices, radius=1.0, method="pattern"):
+def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=False):
     """Fit a spheropolygon to a floc's mask: minimise the pixels where the two differ.
 
     A pixel belongs to the spheropolygon if its centre lies in the core polygon or within the
     spheroradius of its boundary.
 
     mask: (h, w) bool or 0/1, one 8-connected region; vertices: N ≥ 1; radius: spheroradius [px].
-    method: "pattern" starts from several choices of N points on the outline, moves each in eight
-    directions by shrinking steps (8 … 0.25 px) while V falls, then takes vertices from where they
-    count least to where they lower V; "even" spaces N points evenly on the outline and leaves
-    them there (the plain baseline).  N = 1 is the circle of the mask's area about its centroid;
-    radius and method are then ignored.
+    method: "pattern" starts from the best splits of the outline into N segments, moves each vertex
+    in eight directions by shrinking steps (8 … 0.25 px) while V falls, then takes vertices from
+    where they count least to where they lower V; "paper" lets the vertices move as damped
+    particles down the gradient of V (paper, section 2.3), from even spacing; "even" spaces N points
+    evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
+    preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the
+    difference of the pixel counts.  N = 1 is the circle of the mask's area about its centroid;
+    radius, method and preserve_area are then ignored.
 
-    Returns a Fit, the same for the same input; its polygon is simple.  Warns if radius ≥ r_eq
-    (paper, section 3.2: "condition r < r_eq should be satisfied").  Raises ShapeError for a mask
-    that is not one region, UsageError for a wrong option.
+    Returns a Fit, the same for the same input; its polygon is simple.  Without preserve_area,
+    "pattern" and "paper" never end above "even".  Warns if radius ≥ r_eq (paper, section 3.2:
+    "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region,
+    UsageError for a wrong option.
     """
     mask = require_one_region(mask)
     _check_options(vertices, radius, method)
     if vertices == 1:
         return _equal_area_circle(mask)
+    if preserve_area:
+        _require_room(mask, radius)
     _warn_if_coarse(mask, radius)
-    return _fit_polygon(mask, int(vertices), float(radius), method)
+    return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area)
 
 
 def _check_options(vertices, radius, method):
@@ -71,6 +81,15 @@ def _check_options(vertices, radius, method):
         raise UsageError(f"the spheroradius must be a number of pixels above 0, found {radius!r}")
     if method not in METHODS:
         raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
+
+
+def _require_room(mask, radius):
+    equivalent = np.sqrt(mask.sum() / np.pi)
+    if radius >= equivalent:
+        raise UsageError(
+            f"the area cannot be preserved: a spheroradius of {radius:g} px alone covers more than "
+            f"the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
+        )
 
 
 def _warn_if_coarse(mask, radius):
@@ -96,14 +115,57 @@ def _equal_area_circle(mask):
     return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, _percent(wrong, mask))
 
 
-def _fit_polygon(mask, count, radius, method):
-    from flocsim.geometry.fit_search import even_fit, pattern_fit
-
-    find = pattern_fit if method == "pattern" else even_fit
-    points, wrong = find(mask, count, radius)
+def _fit_polygon(mask, count, radius, method, preserve_area):
+    points = _find(mask, count, radius, method, preserve_area)
+    shape = SpheroPolygon(points * (1.0, -1.0), radius)
+    if preserve_area:
+        factor = core_factor(shape.vertices, radius, float(mask.sum()))
+        points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
+    elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
+        points = _settled(mask, points, radius, shape.area)
     vertices = points * (1.0, -1.0)
-    shape = SpheroPolygon(vertices, radius)
-    return Fit(shape, vertices, radius, wrong, _percent(wrong, mask))
+    wrong = _wrong_pixels(mask, points, radius)
+    return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, _percent(wrong, mask))
+
+
+def _settled(mask, points, radius, area):
+    """The outline moved towards the mask's area as far as V does not rise.
+
+    Pixel centres leave an outline about half a pixel of play; V does not say where in it to be.
+    """
+    from flocsim.geometry.fit_kernels import compiled
+    from flocsim.geometry.fit_simple import simple_inset
+
+    wrong = _wrong_pixels(mask, points, radius)
+    perimeter = np.hypot(*(np.roll(points, -1, axis=0) - points).T).sum() + 2.0 * np.pi * radius
+    for share in (1.0, 0.5, 0.25):
+        moved = np.array(points)
+        simple = compiled(simple_inset)(moved, float(share * (area - mask.sum()) / perimeter))
+        if simple and _wrong_pixels(mask, moved, radius) <= wrong:
+            return moved
+    return points
+
+
+def _find(mask, count, radius, method, preserve_area):
+    """The vertices (N, 2) as x, y-down [px] that a method leads to."""
+    from flocsim.geometry.fit_kernels import padded
+    from flocsim.geometry.fit_paper import paper_fit
+    from flocsim.geometry.fit_search import even_start, pattern_fit
+
+    room, margin = padded(mask, count, radius)
+    if method == "pattern":
+        return pattern_fit(room, count, radius, balance=int(preserve_area)) - margin
+    start = even_start(room, count, radius)
+    return (paper_fit(room, start, radius) if method == "paper" else start) - margin
+
+
+def _wrong_pixels(mask, points, radius):
+    """V, counted on an array that the whole shape fits in."""
+    from flocsim.geometry.fit_kernels import count_errors
+
+    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
+    margin = max(0, int(np.ceil(beyond.max() + radius))) + 2
+    return count_errors(np.pad(mask, margin), points + margin, radius)
 
 
 def _percent(wrong, mask):

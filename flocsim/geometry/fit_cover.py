@@ -21,6 +21,21 @@ def squared_distance(x, y, ax, ay, bx, by):
     return dx * dx + dy * dy
 
 
+def is_near(x, y, ax, ay, bx, by, limit):
+    """Whether (x, y) is within √limit of the segment a–b; squared_distance without dividing."""
+    ux, uy = bx - ax, by - ay
+    wx, wy = x - ax, y - ay
+    along = wx * ux + wy * uy
+    if along <= 0.0:
+        return wx * wx + wy * wy <= limit
+    length = ux * ux + uy * uy
+    if along >= length:
+        wx, wy = x - bx, y - by
+        return wx * wx + wy * wy <= limit
+    across = wx * uy - wy * ux
+    return across * across <= limit * length
+
+
 def crossing(ax, ay, bx, by, y):
     """x where the edge a–b crosses the row at height y, −inf if it does not."""
     if (ay > y) == (by > y):
@@ -62,24 +77,26 @@ def add_edge(near, ax, ay, bx, by, radius):
             first_pixel(min(ax, bx) - radius, columns),
             first_pixel(max(ax, bx) + radius + 1.0, columns),
         ):
-            if squared_distance(column, row, ax, ay, bx, by) <= radius * radius:
+            if is_near(column, row, ax, ay, bx, by, radius * radius):
                 near[row, column] += 1
 
 
 def count_wrong(mask, odd, near):
-    """V: the number of pixels where cover and mask differ (paper, section 2.3)."""
-    wrong = 0
+    """V, the pixels where cover and mask differ (paper, section 2.3), and covered − mask's."""
+    wrong, excess = 0, 0
     for row in range(mask.shape[0]):
         for column in range(mask.shape[1]):
             covered = odd[row, column] or near[row, column] > 0
-            wrong += covered != mask[row, column]
-    return wrong
+            if covered != mask[row, column]:
+                wrong += 1
+                excess += 1 if covered else -1
+    return wrong, excess
 
 
 def count_errors(mask, vertices, radius):
     """V of the polygon `vertices` (N, 2) swept by `radius` [px], against a (h, w) bool mask."""
     odd, near = cover(vertices, radius, mask.shape)
-    return count_wrong(mask, odd, near)
+    return count_wrong(mask, odd, near)[0]
 
 
 def row_reach(ax, ay, bx, by, row, radius):
@@ -96,7 +113,9 @@ def row_reach(ax, ay, bx, by, row, radius):
 
 
 def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
-    """Change of V when a vertex goes from `old` to `new`; the counts follow if `keep`.
+    """Change of (V, pixels covered) when a vertex goes from `old` to `new`.
+
+    The counts follow if `keep`.
 
     Only pixels between or near the old and the new edges before–vertex–after can change: in
     every row those at the edges to `before`, those at the edges to `after`, and those between
@@ -105,7 +124,8 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
     reach = radius + 1e-6
     top = min(min(before[1], after[1]), min(old[1], new[1])) - reach
     bottom = max(max(before[1], after[1]), max(old[1], new[1])) + reach
-    change = 0
+    change, growth = 0, 0
+    ends = before, old, after, new
     for row in range(first_pixel(top, len(mask)), first_pixel(bottom, len(mask))):
         a1, a2 = row_reach(before[0], before[1], old[0], old[1], row, reach)
         b1, b2 = row_reach(before[0], before[1], new[0], new[1], row, reach)
@@ -115,14 +135,14 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
         first2, last2 = min(c1, d1), max(c2, d2)
         apart = first1 > last2 or first2 > last1
         if apart and (old[1] > row) == (new[1] > row):
-            ends = before, old, after, new
-            change += change_in_row(mask, odd, near, ends, radius, keep, row, first1, last1)
-            change += change_in_row(mask, odd, near, ends, radius, keep, row, first2, last2)
+            one = change_in_row(mask, odd, near, ends, radius, keep, row, first1, last1)
+            two = change_in_row(mask, odd, near, ends, radius, keep, row, first2, last2)
+            change, growth = change + one[0] + two[0], growth + one[1] + two[1]
         else:
-            ends = before, old, after, new
             first, last = min(first1, first2), max(last1, last2)
-            change += change_in_row(mask, odd, near, ends, radius, keep, row, first, last)
-    return change
+            one = change_in_row(mask, odd, near, ends, radius, keep, row, first, last)
+            change, growth = change + one[0], growth + one[1]
+    return change, growth
 
 
 def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
@@ -134,17 +154,17 @@ def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
     x2 = crossing(old[0], old[1], after[0], after[1], row)
     x3 = crossing(before[0], before[1], new[0], new[1], row)
     x4 = crossing(new[0], new[1], after[0], after[1], row)
-    change = 0
+    change, growth = 0, 0
     for column in range(first_pixel(first, columns), first_pixel(last, columns)):
         flip = (column < x1) ^ (column < x2) ^ (column < x3) ^ (column < x4)
         extra = 0
-        if squared_distance(column, row, before[0], before[1], old[0], old[1]) <= limit:
+        if is_near(column, row, before[0], before[1], old[0], old[1], limit):
             extra -= 1
-        if squared_distance(column, row, old[0], old[1], after[0], after[1]) <= limit:
+        if is_near(column, row, old[0], old[1], after[0], after[1], limit):
             extra -= 1
-        if squared_distance(column, row, before[0], before[1], new[0], new[1]) <= limit:
+        if is_near(column, row, before[0], before[1], new[0], new[1], limit):
             extra += 1
-        if squared_distance(column, row, new[0], new[1], after[0], after[1]) <= limit:
+        if is_near(column, row, new[0], new[1], after[0], after[1], limit):
             extra += 1
         if not flip and extra == 0:
             continue
@@ -153,7 +173,8 @@ def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
         now = (was_odd != flip) or was_near + extra > 0
         if was != now:
             change += 1 if now != mask[row, column] else -1
+            growth += 1 if now else -1
         if keep:
             odd[row, column] = was_odd != flip
             near[row, column] = was_near + extra
-    return change
+    return change, growth

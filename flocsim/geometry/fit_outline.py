@@ -54,38 +54,6 @@ def even_points(outline, count, shift=0.0):
     return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
 
 
-def telling_points(outline, count):
-    """The `count` points that tell most of the outline (Visvalingam and Whyatt 1993).
-
-    The point that spans the smallest triangle with its neighbours is left out, again and again.
-    """
-    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    points = points.copy()
-    areas = _triangle_areas(points)
-    while len(points) > count:
-        k = int(np.argmin(areas))
-        points, areas = np.delete(points, k, axis=0), np.delete(areas, k)
-        for near in ((k - 1) % len(points), k % len(points)):
-            areas[near] = _triangle_areas(points[[near - 1, near, (near + 1) % len(points)]])[1]
-    return points
-
-
-def _triangle_areas(points):
-    """Half the spanned parallelogram of every point with its two neighbours, (len(points),)."""
-    before, after = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
-    return 0.5 * np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
-
-
-def inward_directions(vertices):
-    """Unit bisectors (N, 2) of the corners, inwards for trace_outline's sense."""
-    edges = np.roll(vertices, -1, axis=0) - vertices
-    edges /= np.maximum(np.hypot(*edges.T), 1e-12)[:, None]
-    # Right of the walk, which is the inside; rows count downwards.
-    normals = np.column_stack([-edges[:, 1], edges[:, 0]])
-    sums = normals + np.roll(normals, 1, axis=0)
-    return sums / np.maximum(np.hypot(*sums.T), 1e-12)[:, None]
-
-
 def ring_inside(mask, count):
     """A regular polygon around the deepest pixel of the mask: a start that is always simple."""
     from scipy.ndimage import distance_transform_edt

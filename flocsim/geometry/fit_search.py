@@ -1,88 +1,85 @@
 """From a mask to N vertices: starts, pattern search, and moving vertices to where they are needed.
 
-The kernels are composed (flocsim.composer): compiled on first use and kept on disk.
-"""
+1. Starts: the corners of the best split of the outline into N segments (fit_segments), for small
+   N from several first breaks; the points that tell most; even spacing.
+2. Each start is searched by coarse steps, the best few by fine ones (fit_pattern).
+3. The vertices of the best that count least go to where they lower V (fit_relocate).
 
-from functools import cache
-from itertools import islice
+Every start passes through the same search, so that V never ends above that of even spacing.
+"""
 
 import numpy as np
 
-from flocsim.composer import compose
-from flocsim.geometry import fit_cover, fit_pattern, fit_simple
-from flocsim.geometry.fit_outline import (
-    even_points,
-    inward_directions,
-    ring_inside,
-    telling_points,
-    trace_outline,
-)
+from flocsim.geometry.fit_kernels import compiled, inset, is_simple, searched
+from flocsim.geometry.fit_outline import even_points, ring_inside, trace_outline
+from flocsim.geometry.fit_relocate import relocate
+from flocsim.geometry.fit_segments import split_corners
+from flocsim.geometry.fit_telling import telling_points
 
-ANGLES = np.pi / 4.0 * np.arange(8)
-DIRECTIONS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
+COARSE = np.array([8.0, 4.0, 2.0, 1.0])
+"""First steps of the search [px]: from past the usual detail of a floc to a pixel."""
 
-STEPS = np.array([8.0, 4.0, 2.0, 1.0, 0.5, 0.25])
-"""Steps of the pattern search [px]: from past the usual detail of a floc to below a pixel."""
+FINE = np.array([1.0, 0.5, 0.25])
+"""Last steps [px], below a pixel."""
 
-SHIFTS = (0.0, 0.25, 0.5, 0.75)
-"""Shifts, in spacings, of the evenly spaced starts."""
+FINALISTS = 3
+"""So many starts are searched by fine steps."""
 
-FEWEST = 8
-"""Coarser searches go down to below this many vertices."""
+FEW = 12
+"""Up to so many vertices a search ends in many different places: more starts are tried."""
 
-CANDIDATES = 3
-"""So many of the vertices that count least are tried elsewhere; more gains nearly nothing."""
+FIRST_BREAKS = 8
+"""Splits into few segments that are tried, from first breaks spread over one segment."""
 
-EDGES = 100
-"""Of more edges than this only the longest are given a vertex: the short ones need none."""
+CRAMPED = 3.0
+"""Vertices are many for a floc if they are nearer than so many radii along the outline."""
 
-
-@cache
-def compiled(kernel):
-    """The kernel of fit_cover, fit_simple or fit_pattern, compiled."""
-    return compose(kernel, {}, allocates=True)
+OUTLINE_POINTS = 96
+"""An outline of more points than this and 4 N is thinned out before it is split."""
 
 
-def count_errors(mask, vertices, radius):
-    """V of the swept polygon against the mask."""
-    return int(compiled(fit_cover.count_errors)(mask, np.ascontiguousarray(vertices), radius))
+def even_start(mask, count, radius):
+    """Points evenly spaced on the outline, drawn in by the radius."""
+    return inset(even_points(trace_outline(mask), count), mask, radius)
 
 
-def is_simple(vertices):
-    """Whether no edges cross or nearly touch."""
-    return bool(compiled(fit_simple.is_simple)(np.ascontiguousarray(vertices)))
+def pattern_fit(mask, count, radius, balance=0):
+    """The best of several pattern searches, refined: (N, 2) as x, y-down [px].
 
-
-def even_fit(mask, count, radius):
-    """Points evenly spaced on the outline, drawn in by the radius: (N, 2) as x, y-down [px]; V."""
-    padded, margin = _padded(mask, count, radius)
-    points = even_points(trace_outline(padded), count)
-    vertices = inset(_simple(points, padded), radius)
-    return vertices - margin, count_errors(padded, vertices, radius)
-
-
-def pattern_fit(mask, count, radius):
-    """The best of several pattern searches, refined: vertices as in even_fit, and V."""
-    padded, margin = _padded(mask, count, radius)
-    searched = [_searched(padded, start, radius, STEPS) for start in _starts(padded, count, radius)]
-    vertices, wrong = min(searched, key=lambda found: found[1])
-    vertices, wrong = _relocated(padded, vertices, wrong, radius)
-    return vertices - margin, wrong
-
-
-def _padded(mask, count, radius):
-    """The mask with room around it for the swept polygon, and the width of that margin [px]."""
-    margin = int(np.ceil(radius)) + 6 + count // 100
-    return np.pad(mask, margin), margin
+    mask: with room around it (fit_kernels.padded); balance: weight of the difference in area
+    beside V (fit_pattern).
+    """
+    coarse = [searched(mask, s, radius, COARSE, balance) for s in _starts(mask, count, radius)]
+    coarse.sort(key=lambda found: found[1])
+    fine = [searched(mask, s, radius, FINE, balance) for s, _ in coarse[:FINALISTS]]
+    best, objective = min(fine, key=lambda found: found[1])
+    return relocate(mask, best, objective, radius, balance)
 
 
 def _starts(mask, count, radius):
     outline = trace_outline(mask)
-    choices = [telling_points(outline, count)]
-    choices += [even_points(outline, count, shift) for shift in SHIFTS]
-    starts = [inset(_simple(points, mask), radius) for points in choices]
-    split = _split_coarser(mask, outline, count, radius)
-    return [*starts, split] if is_simple(split) else starts
+    choices = [*_splits(outline, count), _telling(outline, count), even_points(outline, count)]
+    starts = [inset(points, mask, radius) for points in choices]
+    if CRAMPED * count * radius > len(outline):
+        cramped = _split_coarser(mask, outline, count, radius)
+        starts += [start for start in (cramped, ring_inside(mask, count)) if is_simple(start)]
+    return starts
+
+
+def _splits(outline, count):
+    """Corners of the best split, the first break free; of more, with other first breaks, if few."""
+    size = max(min(len(outline), OUTLINE_POINTS), 4 * count)
+    points = even_points(outline, size)
+    farthest = int(np.argmax(np.hypot(*(points - points.mean(axis=0)).T)))
+    yield split_corners(points, count, farthest, 2)
+    for k in range(1, FIRST_BREAKS if count <= FEW else 1):
+        shift = k * size // (count * FIRST_BREAKS)
+        yield split_corners(points, count, (farthest + shift) % size, 0)
+
+
+def _telling(outline, count):
+    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
+    return compiled(telling_points)(points, count)
 
 
 def _split_coarser(mask, outline, count, radius):
@@ -91,83 +88,14 @@ def _split_coarser(mask, outline, count, radius):
     Where vertices are many for the floc's size, starts on the outline are cramped; this is not.
     """
     half = max(2, (count + 1) // 2)
-    if half < FEWEST:
-        start = inset(_simple(telling_points(outline, half), mask), radius)
+    if half < FEW:
+        start = inset(_telling(outline, half), mask, radius)
     else:
-        start = _simple(_split_coarser(mask, outline, half, radius), mask)
-    vertices = _searched(mask, start, radius, STEPS)[0]
+        start = inset(_split_coarser(mask, outline, half, radius), mask, 0.0)
+    vertices = searched(mask, start, radius, np.append(COARSE, FINE[1:]))[0]
     while len(vertices) < count:
         edges = np.roll(vertices, -1, axis=0) - vertices
         longest = int(np.argmax(np.hypot(*edges.T)))
         middle = vertices[longest] + 0.5 * edges[longest]
         vertices = np.insert(vertices, longest + 1, middle, axis=0)
     return vertices
-
-
-def _simple(points, mask):
-    """The points as a simple polygon: as they are, reordered, or a ring in their place."""
-    if is_simple(points):
-        return points
-    reordered = np.array(points)
-    compiled(fit_simple.untangle)(reordered)
-    return reordered if is_simple(reordered) else ring_inside(mask, len(points))
-
-
-def inset(vertices, depth):
-    """The simple polygon with every vertex drawn inwards by `depth` [px], or less where it must."""
-    drawn = np.array(vertices)
-    compiled(fit_simple.draw_in)(drawn, inward_directions(drawn), float(depth))
-    return drawn
-
-
-def _searched(mask, start, radius, steps, active=None):
-    vertices = np.array(start)
-    active = np.ones(len(vertices), bool) if active is None else active
-    search = compiled(fit_pattern.pattern_search)
-    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active))
-
-
-def _relocated(mask, vertices, wrong, radius):
-    """Take vertices out where they count least and put them in anew, as long as V falls."""
-    lowered = len(vertices) > 2
-    while lowered and wrong > 0:
-        lowered = False
-        for trial in _relocations(mask, vertices, radius):
-            if trial[1] < wrong:
-                vertices, wrong = trial
-                lowered = True
-                break
-    return vertices, wrong
-
-
-def _relocations(mask, vertices, radius):
-    """Every search after moving one of the least useful vertices to the middle of another edge."""
-    for removed in _least_useful(mask, vertices, radius):
-        rest = np.delete(vertices, removed, axis=0)
-        for edge in _longest_edges(rest):
-            middle = 0.5 * (rest[edge] + rest[(edge + 1) % len(rest)])
-            start = np.insert(rest, edge + 1, middle, axis=0)
-            if is_simple(start):
-                active = _around(len(start), edge + 1, removed + (removed > edge))
-                yield _searched(mask, start, radius, STEPS[1:], active)
-
-
-def _least_useful(mask, vertices, radius):
-    """Indices of the few vertices without which V grows the least and the polygon stays simple."""
-    without = [np.delete(vertices, k, axis=0) for k in range(len(vertices))]
-    order = np.argsort([count_errors(mask, rest, radius) for rest in without], kind="stable")
-    return list(islice((int(k) for k in order if is_simple(without[k])), CANDIDATES))
-
-
-def _longest_edges(vertices):
-    """Indices, rising, of the edges where a vertex is tried: all, or the longest of very many."""
-    lengths = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
-    return sorted(np.argsort(-lengths, kind="stable")[:EDGES].tolist())
-
-
-def _around(count, *places):
-    """(count,) bool: the vertices up to two from any of the `places`."""
-    active = np.zeros(count, bool)
-    for place in places:
-        active[np.arange(place - 2, place + 3) % count] = True
-    return active

@@ -1,5 +1,7 @@
 """Keeping a polygon simple while its vertices move: plain Python, compiled by fit_search."""
 
+import numpy as np
+
 from flocsim.geometry.fit_cover import squared_distance
 
 CLEARANCE = 0.01
@@ -63,20 +65,6 @@ def is_simple(vertices):
     return True
 
 
-def draw_in(vertices, inwards, depth):
-    """Move every vertex by `depth` [px] along its direction in `inwards` (N, 2), in place.
-
-    Where the polygon would not stay simple, by half of it, or not at all.
-    """
-    for k in range(len(vertices)):
-        for share in (1.0, 0.5):
-            x = vertices[k, 0] + share * depth * inwards[k, 0]
-            y = vertices[k, 1] + share * depth * inwards[k, 1]
-            if stays_simple(vertices, k, x, y):
-                vertices[k, 0], vertices[k, 1] = x, y
-                break
-
-
 def edges_cross(vertices, first, second):
     """Whether the edges that begin at the vertices `first` and `second` cross."""
     count = len(vertices)
@@ -114,3 +102,43 @@ def untangle(vertices):
                     crossed = True
         if not crossed:
             break
+
+
+def bisector(vertices, k):
+    """Unit bisector of the corner k, to the right hand of a walk: inwards for trace_outline's."""
+    count = len(vertices)
+    x, y = vertices[k]
+    ux, uy = x - vertices[k - 1, 0], y - vertices[k - 1, 1]
+    wx, wy = vertices[(k + 1) % count, 0] - x, vertices[(k + 1) % count, 1] - y
+    before, after = max(np.hypot(ux, uy), 1e-12), max(np.hypot(wx, wy), 1e-12)
+    nx, ny = -uy / before - wy / after, ux / before + wx / after
+    length = max(np.hypot(nx, ny), 1e-12)
+    return nx / length, ny / length
+
+
+def draw_in(vertices, depth):
+    """Move every vertex by `depth` [px] along its bisector, in place.
+
+    Where the polygon would not stay simple, by half of it, or not at all.
+    """
+    count = len(vertices)
+    inwards = np.empty((count, 2))
+    for k in range(count):
+        inwards[k, 0], inwards[k, 1] = bisector(vertices, k)
+    for k in range(count):
+        for share in (1.0, 0.5):
+            x = vertices[k, 0] + share * depth * inwards[k, 0]
+            y = vertices[k, 1] + share * depth * inwards[k, 1]
+            if stays_simple(vertices, k, x, y):
+                vertices[k, 0], vertices[k, 1] = x, y
+                break
+
+
+def simple_inset(vertices, depth):
+    """Untangle the polygon and draw it in by `depth` [px], in place; whether that succeeded."""
+    if not is_simple(vertices):
+        untangle(vertices)
+        if not is_simple(vertices):
+            return False
+    draw_in(vertices, depth)
+    return True

@@ -1,9 +1,14 @@
 """What `flocsim fit` tells a person: progress, a line on every picture, a table."""
 
 import sys
+import time
 
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
+
+
+BAR_WIDTH = 30
+"""Letters."""
 
 
 def plural(count, noun):
@@ -11,11 +16,32 @@ def plural(count, noun):
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def show_progress(name, done, total):
-    """How far a picture is, on a line that the next one replaces; only on a terminal."""
-    if sys.stderr.isatty():
-        end = "\r\x1b[K" if done + 1 == total else ""
-        print(f"\r{name}: floc {done + 1} of {total}{end}", end="", file=sys.stderr, flush=True)
+class Bar:
+    """How far the fits are, on a line that renews itself; only on a terminal."""
+
+    def __init__(self, total, stream=None):
+        """``total`` flocs to fit."""
+        self.total, self.done = total, 0
+        self.stream = stream or sys.stderr
+        self.began = self.shown = time.monotonic()
+
+    def count(self, result):
+        """One more is done; gives its result back."""
+        self.done += 1
+        now = time.monotonic()
+        last = self.done == self.total
+        if self.stream.isatty() and (last or now - self.shown > 0.2):
+            self.shown = now
+            print(f"\r{self.text(now)}\x1b[K", end="", file=self.stream, flush=True)
+        return result
+
+    def text(self, now):
+        """The bar, the count and the time left; nothing when all is done."""
+        if self.done == self.total:
+            return ""
+        left = (now - self.began) * (self.total - self.done) / self.done
+        full = "#" * (BAR_WIDTH * self.done // self.total)
+        return f"[{full:<{BAR_WIDTH}}] floc {self.done} of {self.total}, {left:.0f} s left"
 
 
 def describe(name, found, fitted):
@@ -29,19 +55,28 @@ def describe(name, found, fitted):
     return f"{name}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
 
 
-def warn_of_coarse(name, regions, radius):
-    """A line on stderr if the spheroradius is not below r_eq of some flocs (paper, section 3.2)."""
-    coarse = sum(region.equivalent_radius <= radius for region in regions)
-    if coarse:
-        print(
-            f"flocsim: {name}: the spheroradius of {radius:g} px is not below r_eq of "
-            f"{plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
-            file=sys.stderr,
-        )
+def warn_of_coarse(name, regions, radii):
+    """A line on stderr for every spheroradius not below r_eq of some flocs (paper, section 3.2)."""
+    for radius in radii:
+        coarse = sum(region.equivalent_radius <= radius for region in regions)
+        if coarse:
+            print(
+                f"flocsim: {name}: the spheroradius of {radius:g} px is not below r_eq of "
+                f"{plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
+                file=sys.stderr,
+            )
 
 
 def format_errors(entries):
-    """A table of the mean relative error [%] of ShapeEntries by N and size class."""
+    """A table of the mean relative error [%] of ShapeEntries by N and size class, for each r."""
+    radii = sorted({entry.spheroradius for entry in entries})
+    return "\n".join(
+        format_radius(radius, [e for e in entries if e.spheroradius == radius]) for radius in radii
+    )
+
+
+def format_radius(radius, entries):
+    """The table for one spheroradius [px]."""
     classes = {
         f"r_eq <= {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius <= CLASS_LIMIT],
         f"r_eq > {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius > CLASS_LIMIT],
@@ -49,7 +84,7 @@ def format_errors(entries):
     }
     heads = [f"{name} ({len(members)})" for name, members in classes.items()]
     lines = [
-        "mean relative error [%] by vertices and size class (number of flocs)",
+        f"mean relative error [%] by vertices and size class (number of flocs), r = {radius:g} px",
         "  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]),
     ]
     for count in entries[0].fits:

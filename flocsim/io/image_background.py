@@ -8,6 +8,12 @@ SURFACE_ROUNDS = 15
 SURFACE_SAMPLES = 120
 """Points along the longer side that the surface is fitted to: plenty for a degree of 6."""
 
+FEWEST_FRAMES = 3
+"""The median of fewer frames still shows their flocs."""
+
+NOISE_SAMPLES = 500
+"""Points along the longer side that tell the noise."""
+
 DARKEST = 0.01
 """Added before taking logarithms: about the black level of 8-bit cameras."""
 
@@ -28,9 +34,23 @@ def low_pass(grey, scale):
     return fft.idctn(spectrum, norm="ortho")
 
 
+def median_frame(frames):
+    """The light of a fixed camera: per pixel the median of frames (h, w) of one shape."""
+    return np.median(np.stack(frames), axis=0)
+
+
 def robust_deviation(values):
     """The standard deviation of a normal bulk, blind to outliers: 1.4826 × median |v − median|."""
     return 1.4826 * np.median(np.abs(values - np.median(values)))
+
+
+def noise_deviation(fine):
+    """robust_deviation of a sample of the detail that the low pass took out."""
+    return robust_deviation(fine[:: _stride(fine), :: _stride(fine)])
+
+
+def _stride(grey):
+    return max(1, max(grey.shape) // NOISE_SAMPLES)
 
 
 def smooth_surface(grey, degree):
@@ -64,7 +84,9 @@ def _legendre(size, degree):
 def _reweighted_fit(basis, values):
     weights = np.ones_like(values)
     for _ in range(SURFACE_ROUNDS):
-        solution = np.linalg.lstsq(basis * weights[:, None], values * weights, rcond=None)[0]
+        weighted = basis * (weights * weights)[:, None]
+        # Legendre products are near orthogonal: the normal equations are safe, and fast.
+        solution = np.linalg.lstsq(weighted.T @ basis, weighted.T @ values, rcond=None)[0]
         residual = values - basis @ solution
         deviation = robust_deviation(residual) + 1e-3
         weights = 1.0 / (1.0 + ((residual - np.median(residual)) / (1.5 * deviation)) ** 2) ** 2

@@ -22,13 +22,19 @@ def read_grey(path):
     ones, so that they count as background.  Raises ImageError, naming the file, when it is
     missing, damaged, no picture, or a stack of several.
     """
+    pixels = read_pixels(path)
+    return _luminance(_to_unit_range(pixels, path), path)
+
+
+def read_pixels(path):
+    """The pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
     path = Path(path)
     if not path.is_file():
         raise ImageError(f"{path}: no such picture file; check the path")
     pixels = _decode(path)
     if pixels.size == 0 or not np.all(np.isfinite(pixels)):
         raise ImageError(f"{path}: the picture is empty or holds values that are not numbers")
-    return _luminance(_to_unit_range(pixels, path), path)
+    return pixels
 
 
 def _decode(path):

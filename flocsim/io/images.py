@@ -7,46 +7,20 @@ from flocsim.errors import ImageError, UsageError
 from flocsim.io.image_background import (
     light_surface,
     low_pass,
-    robust_deviation,
+    noise_deviation,
     smooth_surface,
 )
 from flocsim.io.image_reading import read_grey
+from flocsim.io.image_regions import Filters, Region, Rejection, filled, find_regions
+from flocsim.io.image_threshold import find_threshold
 
-__all__ = ["Region", "Rejection", "Segmentation", "read_grey", "segment"]
+__all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
 
-NOISE_MARGIN = 5.0
-"""A floc stands out by this many standard deviations of the noise, or it is not one."""
-
-
-@attrs.frozen(eq=False)
-class Region:
-    """One floc: 8-connected, holes filled, clear of the border.
-
-    label: number in the picture, counted from 1 from the top row down; centroid: (x, y) [px],
-    x right and y *down*, the first pixel's centre at (0, 0); bbox: (top, left, bottom, right)
-    [px], bottom and right exclusive; area [px]; equivalent_radius = √(area/π) [px]; mask: bool
-    array of the bbox widened by one pixel on every side.
-    """
-
-    label: int
-    centroid: tuple
-    bbox: tuple
-    area: int
-    equivalent_radius: float
-    mask: np.ndarray
-
-
-@attrs.frozen
-class Rejection:
-    """A region left out: its centroid (x, y) [px, y down], area [px], radius [px] and reason."""
-
-    centroid: tuple
-    area: int
-    equivalent_radius: float
-    reason: str
+COARSE = 4
+"""Every fourth pixel tells whether flocs are dark or bright."""
 
 
 @attrs.frozen(eq=False)
@@ -81,30 +55,42 @@ def segment(
     flocs="auto",
     noise_scale=1.0,
     background_degree=6,
+    background=None,
     saturated=0.001,
     min_radius=4.0,
+    max_radius=np.inf,
+    max_blur=0.4,
+    neck=0.5,
 ):
     """Separate the flocs of a grey picture from its background.
 
-    In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] and of the
-    background (polynomial surface of `background_degree`) in Fourier and real space; contrast
-    stretch between two thresholds, the median and the top `saturated` share; Otsu's threshold.
-    Dark flocs: contrast = 1 − grey/background (light is lost by a factor); bright flocs: contrast
-    = grey − background.  Regions are 8-connected with holes filled; those that touch the border
-    or have r_eq = √(area/π) < `min_radius` [px] are rejected.
+    In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
+    space, and of the background; contrast stretch between two thresholds, the median and the top
+    `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
+    (image_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
+    bright flocs: contrast = grey − background.
 
-    grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast).
-    Returns a Segmentation; no floc is no error.  Raises ImageError for an array that is no
-    picture, UsageError for a wrong option.
+    Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of
+    the smaller part (0: never).  Rejected are those that touch the border, with r_eq = √(area/π)
+    below `min_radius` or above `max_radius` [px], or whose edge is softer than `max_blur`·r_eq
+    (out of focus; inf: none).
+
+    grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast);
+    background: (h, w), for example the median of many frames, or None for a polynomial surface of
+    `background_degree`.  Returns a Segmentation; no floc is no error.  Raises ImageError for an
+    array that is no picture, UsageError for a wrong option.
     """
     grey = _checked(grey)
-    _check_options(flocs, noise_scale, background_degree, saturated, min_radius)
+    filters = Filters(min_radius, max_radius, max_blur, neck)
+    _check_options(flocs, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
+    light = None if background is None else low_pass(_matching(background, grey), noise_scale)
     if flocs == "auto":
-        flocs = _guess_polarity(smooth)
-    contrast, noise = _contrast(grey, smooth, flocs, noise_scale, background_degree)
-    threshold = _threshold(contrast, noise, saturated)
-    foreground, regions, rejected = _regions(contrast > threshold, min_radius)
+        flocs = _guess_polarity(smooth, light)
+    contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
+    threshold = find_threshold(contrast, noise, saturated)
+    foreground = filled(contrast > threshold)
+    regions, rejected = find_regions(foreground, contrast, filters)
     return Segmentation(foreground, regions, rejected, flocs, threshold)
 
 
@@ -117,85 +103,52 @@ def _checked(grey):
     return grey
 
 
-def _check_options(flocs, noise_scale, background_degree, saturated, min_radius):
+def _matching(background, grey):
+    background = _checked(background)
+    if background.shape != grey.shape:
+        raise ImageError(
+            f"the background's shape {background.shape} is not the picture's {grey.shape}; "
+            "make it from frames of the same size"
+        )
+    return background
+
+
+def _check_options(flocs, noise_scale, background_degree, saturated, filters):
     allowed = [
         (flocs in ("auto", "bright", "dark"), "flocs", flocs, "'auto', 'bright' or 'dark'"),
         (0 <= noise_scale < np.inf, "noise_scale", noise_scale, "at least 0 px"),
         (background_degree in range(13), "background_degree", background_degree, "0 to 12"),
         (0 <= saturated < 1, "saturated", saturated, "a share from 0 to below 1"),
-        (0 <= min_radius < np.inf, "min_radius", min_radius, "at least 0 px"),
+        (0 <= filters.min_radius < np.inf, "min_radius", filters.min_radius, "at least 0 px"),
+        (filters.max_radius > 0, "max_radius", filters.max_radius, "above 0 px"),
+        (filters.max_blur > 0, "max_blur", filters.max_blur, "a share of r_eq above 0"),
+        (0 <= filters.neck <= 1, "neck", filters.neck, "a share from 0 to 1"),
     ]
     for right, name, found, wanted in allowed:
         if not right:
             raise UsageError(f"{name} must be {wanted}, found {found!r}")
 
 
-def _guess_polarity(smooth):
-    residual = smooth - smooth_surface(smooth, degree=2)
+def _guess_polarity(smooth, light):
+    """The side of the contrast's longer tail."""
+    coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
+    step = COARSE if coarse is not smooth else 1
+    surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
+    residual = coarse - surface
     skewness = np.mean((residual - np.median(residual)) ** 3)
     return "dark" if skewness < 0 else "bright"
 
 
-def _contrast(grey, smooth, flocs, noise_scale, degree):
+def _contrast(grey, smooth, light, flocs, noise_scale, degree):
     """Contrast against the background, and the standard deviation of its noise."""
     # White noise of deviation s is left with s/(2√π·scale) by the low pass, and the part that is
     # taken out has nearly all of s.
     left_over = 1.0 / max(2.0 * np.sqrt(np.pi) * noise_scale, 1.0)
     if flocs == "bright":
-        contrast = smooth - smooth_surface(smooth, degree)
-        return contrast, left_over * robust_deviation(grey - smooth)
-    light = light_surface(smooth, degree)
+        surface = smooth_surface(smooth, degree) if light is None else light
+        return smooth - surface, left_over * noise_deviation(grey - smooth)
+    light = light_surface(smooth, degree) if light is None else light
     floor = max(UNLIT * light.max(), np.finfo(float).tiny)
-    contrast = np.where(light > floor, 1.0 - smooth / np.maximum(light, floor), 0.0)
-    return contrast, left_over * robust_deviation((grey - smooth) / np.maximum(light, floor))
-
-
-def _threshold(contrast, noise, saturated):
-    from skimage.filters import threshold_otsu
-
-    low = np.median(contrast)
-    high = np.quantile(contrast, 1.0 - saturated)
-    if high <= low:
-        high = contrast.max()
-    if high <= low:
-        return float(low)
-    stretched = np.clip((contrast - low) / (high - low), 0.0, 1.0)
-    otsu = low + threshold_otsu(stretched) * (high - low)
-    return float(max(otsu, low + NOISE_MARGIN * noise))
-
-
-def _regions(raw, min_radius):
-    from scipy.ndimage import binary_fill_holes
-    from skimage.measure import label, regionprops
-
-    foreground = binary_fill_holes(raw)
-    accepted, rejected = [], []
-    for found in regionprops(label(foreground, connectivity=2)):
-        reason = _reason_to_reject(found, foreground.shape, min_radius)
-        if reason:
-            rejected.append(Rejection(_centroid(found), *_size(found), reason))
-        else:
-            accepted.append(_region(found, len(accepted) + 1))
-    return foreground, tuple(accepted), tuple(rejected)
-
-
-def _reason_to_reject(found, shape, min_radius):
-    top, left, bottom, right = found.bbox
-    if _size(found)[1] < min_radius:
-        return "too small"
-    if top == 0 or left == 0 or bottom == shape[0] or right == shape[1]:
-        return "at the border"
-    return None
-
-
-def _centroid(found):
-    return float(found.centroid[1]), float(found.centroid[0])
-
-
-def _size(found):
-    return int(found.area), float(np.sqrt(found.area / np.pi))
-
-
-def _region(found, label):
-    bbox = tuple(int(bound) for bound in found.bbox)
-    return Region(label, _centroid(found), bbox, *_size(found), np.pad(found.image, 1))
+    lit = np.maximum(light, floor)
+    contrast = np.where(light > floor, 1.0 - smooth / lit, 0.0)
+    return contrast, left_over * noise_deviation((grey - smooth) / lit)

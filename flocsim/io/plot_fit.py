@@ -6,6 +6,10 @@ from flocsim.geometry.outline import swept_rings
 from flocsim.io.plot_style import house_style
 
 OUTLINE_COLOUR = "#d55e00"
+REJECTED_COLOUR = "#56b4e9"
+REASONS = {"too small": "·"}
+"""Shorter words: the small are many."""
+
 LONGEST_SIDE = 12.0
 """Longer side of the drawing [inch]."""
 
@@ -18,11 +22,11 @@ def picture_rings(region, fit):
     return [ring * (1.0, -1.0) + (left - 1, top - 1) for ring in rings]
 
 
-def draw_overlay(grey, flocs, title):
-    """A figure of the picture with the outline of every floc.
+def draw_overlay(grey, flocs, title, rejected=()):
+    """A figure of the picture with the outline of every floc, and why others are left out.
 
-    grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line.  Returns the figure,
-    for flocsim.io.plots.save.
+    grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line; rejected: Rejections.
+    Returns the figure, for flocsim.io.plots.save.
     """
     with house_style():
         axes = _picture_axes(grey.shape)
@@ -31,6 +35,9 @@ def draw_overlay(grey, flocs, title):
         axes.set_title(title)
         for region, fit in flocs:
             _draw_floc(axes, region, fit)
+        for region in rejected:
+            axes.annotate(REASONS.get(region.reason, region.reason), region.centroid,
+                          color=REJECTED_COLOUR, fontsize=6, ha="center", va="center")  # fmt: skip
     return axes.figure
 
 

@@ -1,6 +1,7 @@
 """Figures of results and trajectories, and saving them; the one door to matplotlib.
 
-``FIGURES`` maps the names that `flocsim plot` knows to functions of a `Results`.
+``FIGURES`` maps the names that `flocsim plot` knows to functions of a `Results`,
+``POPULATION_FIGURES`` to functions of the entries of a shape library.
 """
 
 import io
@@ -9,14 +10,18 @@ from pathlib import Path
 from flocsim.errors import UsageError
 from flocsim.io.files import replace_file
 from flocsim.io.plot_panels import figure_4, figure_5, figure_6, figure_8, overview
+from flocsim.io.plot_population import POPULATION_FIGURES, figure_2, figure_3
 from flocsim.io.plot_style import house_style
 from flocsim.io.plot_trajectory import draw_distance, draw_strip
 
 __all__ = [
     "FIGURES",
     "FORMATS",
+    "POPULATION_FIGURES",
     "draw_distance",
     "draw_strip",
+    "figure_2",
+    "figure_3",
     "figure_4",
     "figure_5",
     "figure_6",

@@ -2,8 +2,10 @@
 
 Layout, schema version 1; n flocs, in the order in which they were written:
 
-    /                       attributes: kind = "flocsim shape library", schema_version = 1
-    /flocs/id               (n) text, picture and region, e.g. "023.png#7"
+    /                       attributes: kind = "flocsim shape library", schema_version = 1,
+                            and what the fits were made with, as far as given: method, …
+    /flocs/id               (n) text, picture and region, e.g. "023.png#7"; of several
+                            spheroradii each has a row, e.g. "023.png#7 r=2"
     /flocs/image            (n) text, the picture's file name
     /flocs/pixel_size       (n) [m]
     /flocs/centroid         (n, 2) [px] x right, y down, in the picture
@@ -83,8 +85,11 @@ class ShapeEntry:
     fits: dict
 
 
-def make_entry(image, region, fits, pixel_size, spheroradius):
-    """The ShapeEntry of a picture's region (flocsim.io.images) and its fits {N: Fit} in pixels."""
+def make_entry(image, region, fits, pixel_size, spheroradius, name_radius=False):
+    """The ShapeEntry of a picture's region (flocsim.io.images) and its fits {N: Fit} in pixels.
+
+    name_radius: its id names the spheroradius, for libraries with several of one floc.
+    """
     top, left = region.bbox[:2]
     # The mask has a margin of one pixel, and y counts downwards there.
     centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
@@ -94,21 +99,24 @@ def make_entry(image, region, fits, pixel_size, spheroradius):
         )
         for count, fit in fits.items()
     }
+    floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     return ShapeEntry(
-        f"{image}#{region.label}", image, float(pixel_size), region.centroid, region.area,
+        floc_id, image, float(pixel_size), region.centroid, region.area,
         region.equivalent_radius, float(spheroradius), stored,
     )  # fmt: skip
 
 
-def write_library(path, entries):
+def write_library(path, entries, settings=None):
     """Write entries (ShapeEntry, all with fits at the same N) to `path`, whole or not at all.
+
+    settings: {name: text or number}, what the fits were made with.
 
     Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
     written.
     """
     entries = list(entries)
     _check_entries(entries)
-    replace_file(path, seal(_encode(entries)))
+    replace_file(path, seal(_encode(entries, settings or {})))
 
 
 def _check_entries(entries):
@@ -122,13 +130,14 @@ def _check_entries(entries):
         raise UsageError("every floc of a library needs fits at the same numbers of vertices")
 
 
-def _encode(entries):
+def _encode(entries, settings):
     import h5py
 
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=False) as file:
         file.attrs["kind"] = KIND
         file.attrs["schema_version"] = SCHEMA_VERSION
+        file.attrs.update(settings)
         _write_flocs(file.create_group("flocs"), entries)
         for count in sorted(entries[0].fits):
             fits = [entry.fits[count] for entry in entries]
@@ -155,6 +164,25 @@ def _write(group, name, values, units, long_name):
     dataset = group.create_dataset(name, data=values, track_times=False)
     dataset.attrs["units"] = units
     dataset.attrs["long_name"] = long_name
+
+
+def is_library(path):
+    """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
+    import h5py
+
+    try:
+        with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
+            return file.attrs.get("kind") == KIND
+    except OSError:
+        return False
+
+
+def read_settings(path):
+    """{name: value} of what the fits of a shape library were made with."""
+    import h5py
+
+    with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
+        return {k: v for k, v in file.attrs.items() if k not in ("kind", "schema_version")}
 
 
 def read_library(path):

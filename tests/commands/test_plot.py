@@ -12,7 +12,7 @@ from synthetic_results import make_results
 from flocsim.commands import info, plot
 from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots import FIGURES
+from flocsim.io.plots import FIGURES, POPULATION_FIGURES
 from flocsim.io.provenance import provenance
 from flocsim.io.results import write_results
 
@@ -53,12 +53,13 @@ def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkey
 
 @pytest.mark.parametrize("figures", ["7", "4,figure", "", ","])
 def test_unknown_figures_are_refused_before_anything_is_read(figures):
-    with pytest.raises(UsageError, match="choose from 4, 5, 6, 8, overview"):
+    with pytest.raises(UsageError, match="choose from 2, 3, 4, 5, 6, 8, overview"):
         call(plot, "absent.h5", "--figures", figures)
 
 
 def test_the_command_knows_the_figures_that_exist():
     assert tuple(FIGURES) == plot.FIGURE_NAMES
+    assert tuple(POPULATION_FIGURES) == plot.POPULATION_NAMES
 
 
 @pytest.mark.parametrize("command", [plot, info])

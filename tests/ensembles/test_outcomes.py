@@ -101,7 +101,8 @@ def test_no_decision_is_overturned_in_ten_times_the_time(study, condition, verti
 
 
 def test_all_kinds_of_decision_were_put_to_that_test(study):
-    rows = [study.run(0, n, share, k) for n in (4, 16) for share in (0.0, 0.5) for k in range(6)]
+    rows = [study.run(condition, n, share, k) for condition in (0, 2) for n in (4, 16)
+            for share in (0.0, 0.5) for k in range(6)]  # fmt: skip
     assert {outcome(row) for row in rows} >= {"A", "B", "D"}
 
 

@@ -4,6 +4,7 @@ import io
 import re
 import subprocess
 import sys
+import warnings
 
 import attrs
 import numpy as np
@@ -13,7 +14,19 @@ from synthetic_results import make_results
 from flocsim.ensembles.statistics import tabulate, wilson
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plot_trajectory import rounded_length, time_unit
-from flocsim.io.plots import FIGURES, draw_distance, draw_strip, figure_4, figure_6, figure_8, save
+from flocsim.io.plots import (
+    FIGURES,
+    POPULATION_FIGURES,
+    draw_distance,
+    draw_strip,
+    figure_2,
+    figure_3,
+    figure_4,
+    figure_6,
+    figure_8,
+    save,
+)
+from flocsim.io.shape_library import ShapeEntry, StoredFit
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * 1e-5
 
@@ -231,3 +244,33 @@ def test_plotting_loads_no_window_system():
     code += "p.draw_distance([0, 1], [1e-5, 1e-5]); print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
+
+
+def entry(radius, errors, spheroradius=1.0):
+    """A floc of a library with fits at the N of `errors` {N: RE}."""
+    fits = {n: StoredFit(np.zeros((n, 2)), 1e-6, error) for n, error in errors.items()}
+    return ShapeEntry(f"a#{radius}", "a", 1e-6, (0.0, 0.0), 50, radius, spheroradius, fits)
+
+
+@pytest.mark.parametrize(
+    "entries",
+    [
+        [entry(4.0, {1: 30.0, 4: 10.0})],
+        [entry(9.0, {1: 30.0})],
+        [entry(r, {1: 35.0, 4: 9.0, 64: 1.0}, s) for r in (4.0, 8.0, 20.0) for s in (1.0, 2.0)],
+    ],
+)
+def test_populations_of_any_size_are_drawn(entries, tmp_path):
+    for name, draw in POPULATION_FIGURES.items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            save(draw(entries), tmp_path / f"{name}.png")
+
+
+def test_a_floc_counts_once_whatever_its_spheroradii():
+    entries = [entry(r, {1: 35.0, 4: 9.0}, s) for r in (4.0, 8.0, 20.0) for s in (1.0, 2.0)]
+    (axes,) = figure_2(entries).axes
+    assert sum(bar.get_height() for bar in axes.patches) == 3
+    assert [panel.get_title(loc="left") for panel in figure_3(entries).axes] == [
+        "spheroradius r = 1 px", "spheroradius r = 2 px"
+    ]  # fmt: skip

@@ -1,0 +1,137 @@
+"""The options of `flocsim fit`: how they are declared, and the numbers among them, checked."""
+
+import attrs
+
+from flocsim.errors import UsageError
+
+
+@attrs.frozen
+class Options:
+    """What to look for and what to fit, ready to be handed to other processes.
+
+    Radii, blur and saturation as in flocsim.io.images.segment; vertices with 1 among them;
+    radii: spheroradii [px], rising.
+    """
+
+    pixel_size: float
+    vertices: tuple
+    radii: tuple
+    method: str
+    preserve_area: bool
+    max_flocs: int | None
+    masks: bool
+    background: str
+    jobs: int
+    segmentation: dict
+
+
+def add_options(add):
+    """Declare the options by ``add``, argparse's add_argument."""
+    add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
+    add("--pixel-size", metavar="METRES", help="length of a pixel's side in metres, e.g. 0.95e-6")
+    add("--vertices", default="4,8,16,64", metavar="LIST",
+        help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
+    add("--radius", default="1", metavar="LIST",
+        help="spheroradius in pixels, or several with commas (default: %(default)s)")  # fmt: skip
+    add("--method", default="pattern", choices=("pattern", "paper", "even"),
+        help="pattern: the least error; paper: the paper's damped dynamics; even: points evenly on "
+        "the outline, the plain baseline (default: %(default)s)")  # fmt: skip
+    add("--preserve-area", action="store_true", help="give every shape exactly its floc's area")
+    add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
+    add("--masks", action="store_true",
+        help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
+
+
+def add_segmentation(add):
+    """Declare the options of the segmentation by ``add``, argparse's add_argument."""
+    add("--flocs", default="auto", choices=("auto", "bright", "dark"),
+        help="how flocs stand out from the background (default: %(default)s)")  # fmt: skip
+    add("--background", default="surface", choices=("surface", "median"),
+        help="surface: fitted to each picture; median: of all pictures, of one fixed camera "
+        "(default: %(default)s)")  # fmt: skip
+    add("--noise-scale", default="1", metavar="PX",
+        help="detail finer than this is noise (default: %(default)s)")  # fmt: skip
+    add("--saturated", default="0.001", metavar="SHARE",
+        help="share of pixels above the upper threshold of the contrast stretch "
+        "(default: %(default)s)")  # fmt: skip
+    add("--min-radius", default="4", metavar="PX",
+        help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
+    add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
+    add("--max-blur", default="0.4", metavar="SHARE",
+        help="softness of the edge, as a share of r_eq, from which a region is out of focus; "
+        "inf: keep all (default: %(default)s)")  # fmt: skip
+    add("--neck", default="0.5", metavar="SHARE",
+        help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
+        "never (default: %(default)s)")  # fmt: skip
+    add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
+
+
+def add_output(add):
+    """Declare where results go by ``add``, argparse's add_argument."""
+    add("-o", "--output", default="shapes.h5", metavar="FILE",
+        help="shape library to write (default: %(default)s)")  # fmt: skip
+    add("--summary", metavar="FILE",
+        help="table of all regions, rejected ones with the reason (default: beside the library, "
+        "ending .csv)")  # fmt: skip
+    add("--overlay", metavar="FILE",
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
+        "pictures, one file each: FILE-picture.png")  # fmt: skip
+
+
+def read_options(args):
+    """Options from argparse's; UsageError for a number that does not make sense."""
+    if args.pixel_size is None:
+        raise UsageError(
+            "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
+            "of its side in metres, for example --pixel-size 0.95e-6"
+        )
+    return Options(
+        pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
+        vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
+        radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
+        method=args.method,
+        preserve_area=args.preserve_area,
+        max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
+        masks=args.masks,
+        background=args.background,
+        jobs=whole("--jobs", args.jobs),
+        segmentation=read_segmentation(args),
+    )
+
+
+def read_segmentation(args):
+    """The keywords of flocsim.io.images.segment."""
+    limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
+    endless = args.max_blur.strip() == "inf"
+    return {
+        "flocs": args.flocs,
+        "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
+        "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
+        "min_radius": positive("--min-radius", args.min_radius),
+        "max_radius": limit,
+        "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
+        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+    }
+
+
+def number(option, text, meaning, least, most):
+    """A number from `least` to `most`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not least <= value <= most:
+        raise UsageError(f"{option} takes {meaning}, found {text!r}")
+    return value
+
+
+def positive(option, text, meaning="pixels"):
+    """A finite number above 0."""
+    return number(option, text, f"{meaning}, a number above 0", 5e-324, 1.7e308)
+
+
+def whole(option, text):
+    """A whole number from 1."""
+    if not text.strip().isdecimal() or int(text) < 1:
+        raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
+    return int(text)
