@@ -29,7 +29,7 @@ ROWS = [
     ["forces", "integrators"],
     ["body", "state"],
     ["geometry"],
-    ["composer", "fingerprint", "slots", "layout", "fields", "constants", "errors"],
+    ["composer", "fingerprint", "slots", "layout", "fields", "constants", "errors", "interruption"],
 ]
 SIBLING_IMPORTS = {
     ("composer", "constants"),
@@ -42,7 +42,7 @@ SIBLING_IMPORTS = {
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/mpi.py"],
-    "h5py": ["io/results.py", "io/shape_library.py", "io/trajectory.py"],
+    "h5py": ["io/results.py", "io/results_layout.py", "io/shape_library.py", "io/trajectory.py"],
     "skimage": ["io/images.py"],
     "matplotlib": ["io/plots.py", "io/plot_*.py"],
     "shapely": ["geometry/outline.py"],
