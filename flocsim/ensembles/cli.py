@@ -86,16 +86,17 @@ def agree(team, arguments):
 
 def study(config, team, arguments):
     """Run the study and write its results; the exit code."""
-    from flocsim.ensembles.runner import OtherRankFailed, run_to_file
+    from flocsim.ensembles.runner import OtherRankFailed, Told, run_to_file
 
     output = config.output.file
     try:
         ended = run_to_file(config, team, output, arguments.mode, arguments.quiet)
-    except (OtherRankFailed, UsageError) as error:
-        if team.rank == 0:
-            print(f"flocsim: {error}", file=sys.stderr, flush=True)
-        return UsageError.exit_code
-    if ended.stopped:
+    except OtherRankFailed as error:
+        return error.args[0]
+    except Told as error:
+        print(f"flocsim: {error}", file=sys.stderr, flush=True)
+        return error.args[0].exit_code
+    if ended.code == STOPPED:
         if team.rank == 0:
             print(f"flocsim: {stopped_text(ended, output)}", file=sys.stderr, flush=True)
         return STOPPED

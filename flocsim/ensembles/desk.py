@@ -30,6 +30,10 @@ class Done:
     notes: tuple = ()
 
 
+FAREWELL = 5.0
+"""Seconds in which the other ranks leave by themselves, once the study is given up."""
+
+
 class TooManyFailures(FlocsimError):
     """More replicates have failed than the config allows."""
 
@@ -50,6 +54,7 @@ class Desk:
     halted: bool = False
     stopped: bool = False
     over: bool = False
+    given_up: bool = False
     told: bool = False
     error: object = None
     working: set = attrs.Factory(set)
@@ -72,6 +77,17 @@ class Desk:
         self.over = True
         if self.thread is not None:
             self.thread.join()
+
+    def give_up(self):
+        """Send all other ranks home, taking nothing in any more; whether they went in time."""
+        self.given_up = self.halted = self.over = True
+        if self.thread is not None:
+            self.thread.join()
+        until = time.monotonic() + FAREWELL
+        while self.dismissed < self.team.size - 1 and time.monotonic() < until:
+            if not self.serve():
+                time.sleep(SLEEP)
+        return self.dismissed == self.team.size - 1
 
     def exchange(self, done):
         """Hand in what this rank has done, None at first; its next Chunk, None at the end."""
@@ -98,7 +114,7 @@ class Desk:
             if stop:
                 self.halted = self.stopped = True
             self.working.discard(rank)
-            if done is not None:
+            if done is not None and not self.given_up:
                 self.take_in(done)
 
     def next_chunk(self, rank):
@@ -144,8 +160,8 @@ class Desk:
         """Answer the other ranks; whether anything has come."""
         before = len(self.waiting)
         for rank, (done, stop) in self.team.messages():
-            self.hand_in(rank, done, stop)
             self.waiting.append(rank)
+            self.hand_in(rank, done, stop)
         busy = len(self.waiting) > before
         self.waiting = [rank for rank in self.waiting if not self.answer(rank)]
         if self.halted and not self.told:
@@ -159,7 +175,7 @@ class Desk:
         chunk = self.next_chunk(rank)
         if chunk is None and not self.is_over:
             return False
-        self.team.send(rank, (chunk, self.stopped and self.dealer.final < 0))
+        self.team.send(rank, chunk)
         self.dismissed += chunk is None
         return True
 
@@ -187,7 +203,6 @@ class FarDesk:
     def __init__(self, team):
         """The desk of this team's rank 0."""
         self.team = team
-        self.stopped = False
         self.told = False
 
     def exchange(self, done):
@@ -195,9 +210,8 @@ class FarDesk:
         self.team.send(0, (done, stop_requested()))
         while (answer := self.team.receive(0, heed_signals=False)) == "halt":
             self.told = True
-        chunk, self.stopped = answer
-        self.told = self.told and chunk is None
-        return chunk
+        self.told = self.told and answer is None
+        return answer
 
     def is_halted(self):
         """Whether the replicate at hand is to be given up."""

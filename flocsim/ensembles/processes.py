@@ -6,9 +6,9 @@ import os
 import sys
 from multiprocessing.connection import wait
 
-from flocsim.ensembles.team import Team
+from flocsim.ensembles.team import StopRequested, Team
 from flocsim.errors import FlocsimError
-from flocsim.interruption import INTERRUPTION, install
+from flocsim.interruption import INTERRUPTION, STOPPED, install
 
 LAST_SECONDS = 5.0
 """Seconds in which the others end by themselves when the work is done."""
@@ -52,6 +52,8 @@ class ProcessTeam(Team):
             os._exit(FlocsimError.exit_code)
         process = self.others[rank - 1]
         process.join(LAST_SECONDS)
+        if process.exitcode == STOPPED:
+            raise StopRequested(f"rank {rank} was stopped by a signal; go on with --resume")
         raise LostRank(
             f"the process of rank {rank} has died (exit code {process.exitcode}); what was "
             "computed is kept: go on with --resume"

@@ -21,6 +21,8 @@ from flocsim.ensembles.study import Study, flocs_of
 from flocsim.ensembles.summary import Reader, summarize
 from flocsim.ensembles.team import Alone
 from flocsim.ensembles.worker import FAILED, work
+from flocsim.errors import FlocsimError
+from flocsim.interruption import STOPPED
 from flocsim.io.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
 from flocsim.io.results import write_results
@@ -29,9 +31,9 @@ from flocsim.io.results_schema import Results
 
 @attrs.define
 class Ended:
-    """How a run ended: ``stopped`` early by a signal, or with its results on rank 0."""
+    """How a run ended, the same on all ranks: exit code 0 or STOPPED; on rank 0 the results."""
 
-    stopped: bool = False
+    code: int = 0
     results: Results = None
     computed: int = 0
     kept: int = 0
@@ -50,8 +52,10 @@ def run(config, team=None, quiet=True):
     if team.rank == 0:
         identity = identity_of(study)
         start = Beginning(RowStore(MemoryJournal(), study.conditions), identity)
-    ended = run_study(study, start, team, Progress(study.size, quiet or team.rank > 0))
-    return ended.results
+    try:
+        return run_study(study, start, team, Progress(study.size, quiet or team.rank > 0)).results
+    except Told as error:
+        raise error.args[0] from None
 
 
 def run_to_file(config, team, output, mode, quiet=True):
@@ -67,7 +71,7 @@ def run_to_file(config, team, output, mode, quiet=True):
         for remark in start.remarks if start else ():
             progress.warn(remark)
         ended = run_study(study, start, team, progress, output)
-        if start is not None and not ended.stopped:
+        if start is not None and ended.code == 0:
             start.journal.remove()
     return ended
 
@@ -80,16 +84,25 @@ def from_first(team, make):
             made = make()
         except Exception as problem:
             error = problem
-    failed = team.share(error is not None)
+    code = team.share(exit_code_of(error))
     if error is not None:
-        raise error
-    if failed:
-        raise OtherRankFailed
+        raise (Told(error) if code else error) from error
+    if code:
+        raise OtherRankFailed(code)
     return made
 
 
+def exit_code_of(error):
+    """0 without an error that a user can meet."""
+    return error.exit_code if isinstance(error, FlocsimError) else 0
+
+
+class Told(Exception):
+    """An error of rank 0, the argument, that the other ranks know of."""
+
+
 class OtherRankFailed(Exception):
-    """Rank 0 has failed, and says why."""
+    """Rank 0 has failed, and says why; the argument is the exit code."""
 
 
 def make_study(config, team):
@@ -118,21 +131,42 @@ def run_study(study, start, team, progress, output=None):
     # From here on a signal is the desk's business, which waits for all ranks to report.
     key = team.share(short(start.identity) if start else None, heed_signals=False)
     if team.rank > 0:
-        desk = FarDesk(team)
-        work(study, desk, key)
-        return Ended(desk.stopped)
+        work(study, FarDesk(team), key)
+        return Ended(told_by_first(team))
     desk = make_desk(study, start, team, dealer, progress)
-    desk.open()
-    work(study, desk, key)
-    desk.close()
-    start.journal.sync()
-    progress.finish()
-    kept = sum(total(each) for each in start.found(study.config.replicates))
-    ended = Ended(desk.stopped and dealer.final < 0, None, desk.computed, kept)
-    ended.wall_time = time.monotonic() - began
-    if not ended.stopped:
-        ended.results = make_results(study, start, team, desk, ended, output)
+    with telling_others(team, desk):
+        desk.open()
+        work(study, desk, key)
+        desk.close()
+        start.journal.sync()
+        progress.finish()
+        kept = sum(total(each) for each in start.found(study.config.replicates))
+        ended = Ended(STOPPED if dealer.final < 0 else 0, None, desk.computed, kept)
+        ended.wall_time = time.monotonic() - began
+        if ended.code == 0:
+            ended.results = make_results(study, start, team, desk, ended, output)
+    team.share(ended.code)
     return ended
+
+
+def told_by_first(team):
+    """How rank 0 says that the run has ended; OtherRankFailed where that is with an error."""
+    code = team.receive(0, heed_signals=False)
+    if code not in (0, STOPPED):
+        raise OtherRankFailed(code)
+    return code
+
+
+@contextlib.contextmanager
+def telling_others(team, desk):
+    """An error of rank 0 ends the other ranks in good order, so that all have one exit code."""
+    try:
+        yield
+    except FlocsimError as error:
+        if desk.give_up():
+            team.share(error.exit_code)
+            raise Told(error) from error
+        raise
 
 
 def make_dealer(study, start, team):
