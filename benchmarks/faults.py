@@ -1,6 +1,7 @@
 """What is left of a study after kills, signals, full disks and damaged files.
 
     python benchmarks/faults.py [--quick] [--markdown] [--only kills signals disk flips]
+                                [--seconds S]
 
 Every fault hits a real job at a random time (fixed seed, real clock), half of them while it writes.
 After each, a copy of what is left is finished in this process and compared byte for byte with an
@@ -8,6 +9,7 @@ undisturbed run, and must have computed just what was missing. The job itself th
 another number of ranks, into the next fault, until it is finished.
 """
 
+import math
 import resource
 import shutil
 import signal
@@ -58,7 +60,7 @@ def begin_job(folder, rng, **more):
     job = Job.start(folder, kind, **more)
     if rng.random() < 0.75:
         job.wait_for_journal()
-        time.sleep(rng.uniform(0.0, 1.2))
+        time.sleep(rng.uniform(0.0, 0.6))
     else:
         time.sleep(rng.uniform(0.3, 1.5))
     return kind, job
@@ -70,11 +72,21 @@ def fresh(root, number):
     return folder if folder.exists() else make_study(folder)
 
 
-def kill_often(root, reference, count, rng):
+def within(count, seconds):
+    """0, 1, … below ``count``, for so many seconds."""
+    until = time.monotonic() + seconds
+    for number in range(count):
+        if time.monotonic() > until:
+            print(f"time is up after {number} of {count}", file=sys.stderr)
+            return
+        yield number
+
+
+def kill_often(root, reference, count, rng, seconds):
     """{target: Tally} of kills of a rank, of the launcher, of all."""
     tallies = {target: Tally() for target in ("rank", "launcher", "group")}
     number = 0
-    for _ in range(count):
+    for _ in within(count, seconds):
         folder = fresh(root, number)
         target = rng.choice(list(tallies))
         before = whole_rows(folder)
@@ -91,10 +103,10 @@ def kill_often(root, reference, count, rng):
     return tallies
 
 
-def signal_often(root, reference, count, rng):
+def signal_often(root, reference, count, rng, seconds):
     """{signal: Tally}: each has to end the job in time with exit code 75."""
     tallies = {number.name: Tally() for number in SIGNALS}
-    for number in range(count):
+    for number in within(count, seconds):
         folder = fresh(root, f"-signal{number}")
         sign = SIGNALS[number % len(SIGNALS)]
         kind, job = begin_job(folder, rng)
@@ -169,9 +181,11 @@ def add_rows(table, name, tallies):
 
 def main():
     """Print the table; exit code 1 if anything was lost."""
-    arguments = parse_arguments(__doc__, only={"nargs": "+", "default": list(COUNTS),
+    most = {"type": float, "default": math.inf, "help": "seconds for kills, and for signals"}
+    arguments = parse_arguments(__doc__, seconds=most, only={"nargs": "+", "default": list(COUNTS),
                                                "choices": list(COUNTS)})  # fmt: skip
     print_heading(("h5py", "mpi4py", "mpich"))
+    most = arguments.seconds
     counts = QUICK if arguments.quick else COUNTS
     rng = np.random.default_rng(int(time.time()))
     table = Table(
@@ -182,8 +196,8 @@ def main():
         (root / "study.toml").write_text((make_study(root / "ref") / "study.toml").read_text())
         reference = run_here(root / "ref")
         parts = {
-            "kills": lambda count: kill_often(root, reference, count, rng),
-            "signals": lambda count: signal_often(root, reference, count, rng),
+            "kills": lambda count: kill_often(root, reference, count, rng, most),
+            "signals": lambda count: signal_often(root, reference, count, rng, most),
             "disk": lambda count: fill_disk(root, reference, count, rng),
             "flips": lambda count: (
                 damage_journal(root, reference, count // 2, rng)

@@ -25,7 +25,7 @@ PATIENCE = 30.0
 STUDY = """\
 preset = "tang2014"
 seed = 3
-replicates = 500
+replicates = 200
 [scene]
 types = ["I", "III"]
 delta = [0.0, 0.25, 0.5, 0.75, 1.0]

@@ -52,7 +52,7 @@ def run(args):
     from flocsim.io.plots import FIGURES, save
     from flocsim.io.results import read_results
 
-    results = read_results(args.results)
+    results = read_results(args.results, replicates=False)
     folder = made_folder(args.output_dir)
     for name in names:
         label = f"figure-{name}" if name.isdigit() else name
