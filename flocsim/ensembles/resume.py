@@ -66,6 +66,7 @@ def begin(study, identity, output, mode):
             os.unlink(path)
     journal = Journal(path)
     start = Beginning(RowStore(journal, study.conditions), identity)
+    start.resources.callback(journal.close)
     try:
         take_journal(start)
         if mode == RESUME and os.path.exists(output):

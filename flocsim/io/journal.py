@@ -112,6 +112,10 @@ class Journal:
             os.unlink(self.path)
         self.file.close()
 
+    def close(self):
+        """Let go of the file, as it is."""
+        self.file.close()
+
     def drop_if_empty(self):
         """Let go of the file, and leave none behind in which there is nothing."""
         if self.size() == 0:
