@@ -10,7 +10,7 @@ import sys
 import time
 
 from flocsim.errors import FlocsimError
-from flocsim.interruption import stop_requested
+from flocsim.interruption import INTERRUPTION, stop_requested
 
 LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS")
 """Environment variables in which launchers tell a process how many ranks there are."""
@@ -58,7 +58,7 @@ class Team:
             if self.inbox[source]:
                 break
             if heed_signals and stop_requested():
-                raise StopRequested("stopped before anything was computed")
+                raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
             time.sleep(SLEEP)
         return self.inbox[source].popleft()
 

@@ -141,9 +141,9 @@ def test_other_flocs_are_refused(tmp_path, monkeypatch):
 def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):
     path = stopped / "r.h5.journal"
     data = bytearray(path.read_bytes())
-    data[-3000] ^= 4
+    data[data.rindex(b"\x93FLOCREC") - 1] ^= 4  # the last byte of the last chunk but one
     path.write_bytes(data)
-    assert go_on(stopped).computed > 50
+    assert go_on(stopped).computed == 51
     said = capsys.readouterr().err
     assert "r.h5.journal: damaged from byte " in said
     assert "(type I, N = 1, delta " in said
@@ -205,7 +205,7 @@ def extended(tmp_path, whole, **more):
         ({"replicates": 12}, 0),
         ({"scene": {"types": ["I", "III"], "delta": [0.0, 0.5, 1.0]}}, 40),
         ({"scene": {"types": ["III", "II"], "delta": [1.0]}}, 20),
-        ({"shapes": {"vertices": [1, 4], "pool": 10}}, 80),
+        ({"shapes": {"vertices": [1, 4]}}, 80),
     ],
 )
 def test_a_finished_study_is_extended(tmp_path, whole, more, computed):
