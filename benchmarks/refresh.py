@@ -1,4 +1,4 @@
-"""Run the benchmarks and put their tables into docs/benchmarks.md, each between its marks.
+"""Run the benchmarks and put their tables into docs/*.md, each between its marks.
 
     python benchmarks/refresh.py [--only NAME …] [--quick]
 
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "benchmarks.md"
+PAGES = (ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "cluster.md")
 BLOCK = re.compile(r"(<!-- (\w+): (python [^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -44,8 +44,9 @@ def main():
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
-    text = refreshed(PAGE.read_text("utf-8"), arguments.only, arguments.quick)
-    PAGE.write_text(text, "utf-8")
+    for page in PAGES:
+        text = refreshed(page.read_text("utf-8"), arguments.only, arguments.quick)
+        page.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":
