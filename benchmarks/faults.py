@@ -58,11 +58,12 @@ def begin_job(folder, rng, **more):
     """A job on a random number of ranks, at a random time: half of them once it writes."""
     kind = rng.choice(list(KINDS))
     job = Job.start(folder, kind, **more)
+    job.wait_for_handlers()
     if rng.random() < 0.75:
         job.wait_for_journal()
         time.sleep(rng.uniform(0.0, 0.6))
     else:
-        time.sleep(rng.uniform(0.3, 1.5))
+        time.sleep(rng.uniform(0.0, 1.5))
     return kind, job
 
 

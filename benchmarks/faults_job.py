@@ -82,6 +82,15 @@ def alive(pids):
                 yield pid
 
 
+def listens(pid):
+    """Whether a process has a handler of its own for SIGTERM."""
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path("/proc", str(pid), "status").read_text().splitlines()
+        caught = next(line for line in lines if line.startswith("SigCgt:"))
+        return bool(int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1)
+    return False
+
+
 @attrs.define
 class Job:
     """A running study in its folder."""
@@ -89,6 +98,7 @@ class Job:
     folder: Path
     process: subprocess.Popen
     errors: object
+    ranks: int
 
     @classmethod
     def start(cls, folder, kind, **more):
@@ -98,7 +108,7 @@ class Job:
             command(kind), cwd=folder, stdout=subprocess.DEVNULL, stderr=errors,
             start_new_session=True, **more,
         )  # fmt: skip
-        return cls(folder, process, errors)
+        return cls(folder, process, errors, int(kind[-1]) if kind[-1].isdigit() else 1)
 
     def wait_for_journal(self):
         """Until the run has begun to write, or has ended."""
@@ -107,6 +117,15 @@ class Job:
         until = time.monotonic() + PATIENCE
         while self.process.poll() is None and time.monotonic() < until:
             if path.exists() and path.stat().st_size > before:
+                return
+            time.sleep(0.005)
+
+    def wait_for_handlers(self):
+        """Until every rank listens: before that a signal ends it as it ends any program."""
+        until = time.monotonic() + PATIENCE
+        while self.process.poll() is None and time.monotonic() < until:
+            ranks = [pid for pid in descendants(self.process.pid) if is_python(pid)]
+            if len(ranks) >= self.ranks and all(listens(pid) for pid in ranks):
                 return
             time.sleep(0.005)
 

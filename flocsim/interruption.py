@@ -19,7 +19,7 @@ STOPPED = 75
 INTERRUPTED = 130
 """Exit code where somebody insists: a second signal ends the process at once."""
 
-PATIENCE = 1.5
+PATIENCE = 1.2
 """Seconds after a signal in which the run may end by itself."""
 
 INSISTENCE = 0.25

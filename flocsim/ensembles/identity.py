@@ -30,7 +30,7 @@ PHYSICS = (
     "body.py", "state.py", "system.py", "fields.py", "layout.py", "constants.py", "slots.py",
     "forces", "integrators", "geometry",
     *(f"ensembles/{name}.py" for name in (
-        "bonds", "chunks", "config", "failures", "flocs", "memo", "methods", "outcomes",
+        "bonds", "failures", "flocs", "memo", "methods", "outcomes",
         "sampling", "scene", "settling", "start", "study", "zone")),
 )  # fmt: skip
 """The modules, or folders of such, whose code decides what is in a row."""

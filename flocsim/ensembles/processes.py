@@ -8,7 +8,7 @@ from multiprocessing.connection import wait
 
 from flocsim.ensembles.team import StopRequested, Team
 from flocsim.errors import FlocsimError
-from flocsim.interruption import INTERRUPTION, STOPPED, install
+from flocsim.interruption import INTERRUPTION, STOPPED, install, stop_requested
 
 LAST_SECONDS = 5.0
 """Seconds in which the others end by themselves when the work is done."""
@@ -52,8 +52,8 @@ class ProcessTeam(Team):
             os._exit(FlocsimError.exit_code)
         process = self.others[rank - 1]
         process.join(LAST_SECONDS)
-        if process.exitcode == STOPPED:
-            raise StopRequested(f"rank {rank} was stopped by a signal; go on with --resume")
+        if process.exitcode == STOPPED or stop_requested():
+            raise StopRequested("stopped by a signal; go on with --resume")
         raise LostRank(
             f"the process of rank {rank} has died (exit code {process.exitcode}); what was "
             "computed is kept: go on with --resume"

@@ -20,20 +20,25 @@ NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, throw it away."""
 
 MOST_DIFFERENCES = 5
+HISTORY = ("date", "command")
+"""What is kept of a run that contributed to a results file."""
 
 
 @attrs.define(eq=False)
 class Beginning:
     """What a study starts from.
 
-    ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones.
+    ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
+    ``history`` has date and command of the runs before; ``complete`` is what an older results
+    file holds, (conditions, replicates of each), where nothing else was found.
     """
 
     store: RowStore
     identity: dict
     remarks: list = attrs.Factory(list)
     notes: list = attrs.Factory(list)
-    sessions: int = 1
+    history: list = attrs.Factory(list)
+    complete: tuple = None
     resources: object = attrs.Factory(contextlib.ExitStack)
 
     @property
@@ -94,13 +99,13 @@ def take_journal(start):
         raise FileError(
             f"{journal.path} is no journal of flocsim, or damaged from its start: move it away"
         )
-    sessions = {r.description["short"]: r.description for r in journal.records if r.kind == SESSION}
-    start.sessions += len(sessions)
-    for description in sessions.values():
+    sessions = [record.description for record in journal.records if record.kind == SESSION]
+    start.history += [{key: each[key] for key in HISTORY} for each in sessions]
+    for description in sessions:
         refuse_other(start, journal.path, description["identity"])
         if description["layout"] != layout():
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
-    known = {*sessions, short(start.identity)}
+    known = {*(each["short"] for each in sessions), short(start.identity)}
     places = {condition: place for place, condition in enumerate(start.store.conditions)}
     for record in journal.records:
         if record.kind == CHUNK and fits(record.description, record.length):
@@ -163,7 +168,10 @@ def take_results(start, output):
         if condition in places and count:
             start.store.add(place, 0, count, -1)
     start.store.old = OldTable(rows, places)
-    start.notes += stored_notes(file)
+    start.notes += stored(file, "failed", [])
+    start.history = [*stored(file, "history", []), earlier(file), *start.history]
+    if not begun:
+        start.complete = (tuple(places), count)
 
 
 def stored_identity(output, file):
@@ -173,9 +181,14 @@ def stored_identity(output, file):
     return json.loads(file["run/identity"].asstr()[()])
 
 
-def stored_notes(file):
-    """Notes on failed replicates in a results file."""
-    return json.loads(file["run/failed"].asstr()[()]) if "failed" in file["run"] else []
+def stored(file, name, default):
+    """What a results file holds as JSON."""
+    return json.loads(file[f"run/{name}"].asstr()[()]) if name in file["run"] else default
+
+
+def earlier(file):
+    """Date and command of the run that wrote a results file."""
+    return {key: file[f"run/{key}"].asstr()[()] for key in HISTORY if key in file["run"]}
 
 
 def old_places(rows):

@@ -25,7 +25,7 @@ from flocsim.errors import FlocsimError
 from flocsim.interruption import STOPPED
 from flocsim.io.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
-from flocsim.io.results import write_results
+from flocsim.io.results import read_results, write_results
 from flocsim.io.results_schema import Results
 
 
@@ -196,6 +196,8 @@ def count_failed(start, replicates):
 
 def make_results(study, start, team, desk, ended, output):
     """The Results of a finished study; written to ``output`` where there is one."""
+    if output and start.complete == (study.conditions, desk.dealer.final):
+        return read_results(output, replicates=False)  # as it is: nothing has been added
     config = study.config
     reader = Reader(start.store, (*study.shape[:3], desk.dealer.final))
     probabilities, pooled, differences = summarize(reader)
@@ -227,7 +229,8 @@ def facts(study, start, team, desk, ended):
         "identity": storable(json.dumps(identity, sort_keys=True)),
         "failed": storable(json.dumps(desk.notes)),
         "ranks": team.size,
-        "sessions": start.sessions,
+        "sessions": 1 + len(start.history),
+        "history": storable(json.dumps(start.history)),
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",

@@ -51,8 +51,9 @@ RUN = """\
 Scalars. `config` (the file's text), `overrides` (JSON: what the command line laid over it),
 `seed`, `preset`; `identity` (JSON: all that the rows follow from, which a resumed run compares);
 `kernel_fingerprint`; versions of flocsim, Python, numpy, numba and h5py; `platform`, `processor`,
-`hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `computed` (replicates that
-the last of them ran), `wall_time` [s]; `failed` (JSON: up to 1000 failed replicates with reasons).
+`hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `history` (JSON: date and
+command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];
+`failed` (JSON: up to 1000 failed replicates with reasons).
 
 ## flocs
 

@@ -47,6 +47,32 @@ sys.exit(code)
 """
 
 
+def test_without_threads_in_mpi_rank_0_answers_between_two_replicates(serial):
+    env = os.environ | {"MPI4PY_RC_THREAD_LEVEL": "funneled"}
+    done = run_command(serial, "small.toml", "--output", "slow.h5", "--quiet", ranks=3, env=env)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert same_data(serial / "slow.h5", serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
+    name = f"jobs{jobs}.h5"
+    done = run_command(serial, "small.toml", "--output", name, "--jobs", jobs)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"on {jobs} ranks" in done.stdout
+    assert same_data(serial / name, serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize(
+    ("words", "ranks", "said"),
+    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one of the two")],
+)
+def test_jobs_that_cannot_be_are_refused(serial, words, ranks, said):
+    done = run_command(serial, "small.toml", *words, ranks=ranks)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
 def test_without_a_launcher_mpi_is_not_even_imported(serial):
     done = subprocess.run(
         [sys.executable, "-c", PROBE], cwd=serial, capture_output=True, text=True, timeout=120

@@ -1,5 +1,7 @@
 """Stopped, damaged, extended: what exists is used, what is missing is run, nothing else is."""
 
+import json
+
 import attrs
 import numpy as np
 import pytest
@@ -212,10 +214,22 @@ def test_a_finished_study_is_extended(tmp_path, whole, more, computed):
     assert extended(tmp_path, whole, **more) == computed
 
 
-def test_a_finished_study_has_nothing_left_to_do(tmp_path, whole):
+def test_a_finished_study_stays_as_it_is(tmp_path, whole):
     (tmp_path / "r.h5").write_bytes(whole.read_bytes())
-    assert go_on(tmp_path).computed == 0
-    assert same_data(tmp_path / "r.h5", whole) == []
+    ended = go_on(tmp_path)
+    assert (ended.computed, ended.results.count) == (0, 20)
+    assert (tmp_path / "r.h5").read_bytes() == whole.read_bytes()
+    assert not (tmp_path / "r.h5.journal").exists()
+
+
+def test_a_results_file_tells_of_all_runs_that_it_took(tmp_path, whole):
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    go_on(tmp_path, replicates=21)
+    go_on(tmp_path, replicates=22)
+    run = read_results(tmp_path / "r.h5").run
+    assert run["sessions"] == 3
+    first = json.loads(run["history"])[0]
+    assert first["date"] == read_results(whole).run["date"]
 
 
 def failing(monkeypatch, *replicates):

@@ -112,6 +112,25 @@ def test_results_hold_what_was_run(study, alone, tmp_path):
     assert same_arrays(again.pooled, results.pooled)
 
 
+@pytest.mark.filterwarnings("error")
+def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    results = results_of(study)
+    path = tmp_path / "a.h5"
+    write_results(path, results)
+    with xarray.open_dataset(path, group="differences", engine="h5netcdf") as table:
+        assert table["difference"].dims == ("against", "event", "type", "vertices", "delta")
+        own = table["difference"].sel(
+            against="delta", event="inside", type="I", vertices=4, delta=0
+        )
+        assert own == 0.0
+    with xarray.open_dataset(path, group="pooled", engine="h5netcdf") as table:
+        assert table["pr_a"].sel(type="I", vertices=1) == results.pooled["pr_a"][0, 0]
+    with xarray.open_dataset(path, group="flocs", engine="h5netcdf") as table:
+        assert list(table["floc"].values) == list(results.flocs)
+
+
 def test_run_is_the_whole_way(tmp_path, capsys):
     spheres = {"shapes": {"vertices": [1]}}
     config = small_study(tmp_path, spheres).config
