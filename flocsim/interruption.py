@@ -22,6 +22,12 @@ INTERRUPTED = 130
 PATIENCE = 1.2
 """Seconds after a signal in which the run may end by itself."""
 
+SHORTEST_PATIENCE = 0.3
+"""Seconds that it has at least, from when it has joined the other ranks."""
+
+LAUNCHER_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "PMIX_RANK")
+"""Environment variables that only a process started by an MPI launcher has."""
+
 INSISTENCE = 0.25
 """Seconds within which a second signal is taken for the same one: a launcher forwards what the
 whole process group has got as well."""
@@ -35,7 +41,11 @@ SIGNALS = tuple(
 
 
 class Interruption:
-    """What this process has been asked to do; one for each process."""
+    """What this process has been asked to do; one for each process.
+
+    ``held``: the process has yet to join the other ranks of its job, who would wait for it for
+    ever if it went now; ``leave(code)`` ends it, and under MPI them; ``speaks``: it may say so.
+    """
 
     def __init__(self):
         """Nothing has been asked."""
@@ -43,6 +53,8 @@ class Interruption:
         self.since = 0.0
         self.installed = False
         self.speaks = True
+        self.held = False
+        self.leave = os._exit
 
     @property
     def requested(self):
@@ -76,6 +88,7 @@ def install():
     if INTERRUPTION.installed or threading.current_thread() is not threading.main_thread():
         return
     INTERRUPTION.installed = True
+    INTERRUPTION.held = any(name in os.environ for name in LAUNCHER_RANKS)
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
@@ -97,13 +110,15 @@ def watch(reading):
 
 def end_in_time():
     """End the process where the run has not done so by itself."""
-    time.sleep(PATIENCE)
+    while INTERRUPTION.held:
+        time.sleep(0.05)
+    time.sleep(max(INTERRUPTION.since + PATIENCE - time.monotonic(), SHORTEST_PATIENCE))
     # Whatever the main thread may be writing is made to be cut off; what is in a buffer is not.
     with contextlib.suppress(Exception):
         sys.stdout.flush()
         if INTERRUPTION.speaks:
             print(f"flocsim: stopped by {INTERRUPTION.name}", file=sys.stderr, flush=True)
-    os._exit(STOPPED)
+    INTERRUPTION.leave(STOPPED)
 
 
 def end_with_parent():

@@ -158,6 +158,8 @@ def guarded(team, arguments):
     except StopRequested as error:
         if team.rank == 0:
             print(f"flocsim: {error}", file=sys.stderr, flush=True)
+        if team.size > 1:
+            team.abort(STOPPED)  # others may wait for this rank
         return STOPPED
     except FlocsimError as error:
         return end_all(team, str(error), error.exit_code)

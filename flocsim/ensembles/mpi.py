@@ -41,6 +41,9 @@ class MpiTeam(Team):
                 "Python"
             )
         INTERRUPTION.speaks = self.rank == 0
+        if self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE:
+            # Where one rank just goes, the launcher kills the others, and says so by its code.
+            INTERRUPTION.leave = self.world.Abort
         end_with_parent()
 
     @property

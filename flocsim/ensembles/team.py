@@ -10,13 +10,10 @@ import sys
 import time
 
 from flocsim.errors import FlocsimError
-from flocsim.interruption import INTERRUPTION, stop_requested
+from flocsim.interruption import INTERRUPTION, LAUNCHER_RANKS, stop_requested
 
 LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS")
 """Environment variables in which launchers tell a process how many ranks there are."""
-
-LAUNCHER_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "PMIX_RANK")
-"""Environment variables that only a process started by a launcher has."""
 
 SLEEP = 5e-4
 """Seconds between two looks for a message."""
@@ -126,9 +123,12 @@ def launched_rank():
 
 def find_team():
     """The ranks of this job: MPI only where a launcher started more than one."""
-    size = launched_size()
-    if size in (0, 1):
-        return Alone()
-    from flocsim.ensembles.mpi import MpiTeam
+    try:
+        size = launched_size()
+        if size in (0, 1):
+            return Alone()
+        from flocsim.ensembles.mpi import MpiTeam
 
-    return MpiTeam(size)
+        return MpiTeam(size)
+    finally:
+        INTERRUPTION.held = False
