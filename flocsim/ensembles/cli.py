@@ -79,7 +79,7 @@ def agree(team, arguments):
     problems = [each for each in team.collect(problem) if each is not None]
     if problems:
         if team.rank == 0:
-            print(problems[0][0], file=sys.stderr, flush=True)
+            tell(problems[0][0], sys.stderr)
         return None, problems[0][1]
     return config, 0
 
@@ -94,11 +94,11 @@ def study(config, team, arguments):
     except OtherRankFailed as error:
         return error.args[0]
     except Told as error:
-        print(f"flocsim: {error}", file=sys.stderr, flush=True)
+        tell(f"flocsim: {error}", sys.stderr)
         return error.args[0].exit_code
     if ended.code == STOPPED:
         if team.rank == 0:
-            print(f"flocsim: {stopped_text(ended, output)}", file=sys.stderr, flush=True)
+            tell(f"flocsim: {stopped_text(ended, output)}", sys.stderr)
         return STOPPED
     if team.rank == 0 and not arguments.quiet:
         report(ended, output)
@@ -143,7 +143,7 @@ def work(team, arguments):
 def end_all(team, text, code):
     """Print why, and end every rank; returns the exit code where this process is alone."""
     who = f"rank {team.rank}: " if team.size > 1 else ""
-    print(f"flocsim: {who}{text}", file=sys.stderr, flush=True)
+    tell(f"flocsim: {who}{text}", sys.stderr)
     if team.size > 1:
         team.abort(code)
     return code
@@ -157,7 +157,7 @@ def guarded(team, arguments):
         return code
     except StopRequested as error:
         if team.rank == 0:
-            print(f"flocsim: {error}", file=sys.stderr, flush=True)
+            tell(f"flocsim: {error}", sys.stderr)
         if team.size > 1:
             team.abort(STOPPED)  # others may wait for this rank
         return STOPPED

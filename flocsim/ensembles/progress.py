@@ -32,11 +32,14 @@ def plain_warnings(silent=False):
 
 
 def tell(text, stream=None, end="\n"):
-    """Print; a reader that has gone (`| head`) must not cost a study its results."""
+    """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
+
+    What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
+    """
     stream = stream or sys.stdout
     try:
         print(text, end=end, file=stream, flush=True)
-    except BrokenPipeError:
+    except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
