@@ -91,7 +91,9 @@ def start_processes(jobs, target, arguments):
         process.start()
         far_end.close()
         others.append(process)
-    return ProcessTeam(0, jobs, pipes, others)
+    team = ProcessTeam(0, jobs, pipes, others)
+    INTERRUPTION.leave = team.abort
+    return team
 
 
 def join_team(target, rank, jobs, pipe, arguments):
