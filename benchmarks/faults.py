@@ -126,11 +126,11 @@ def signal_often(root, reference, count, rng, seconds):
     return tallies
 
 
-def fill_disk(root, reference, count, rng):
+def fill_disk(root, reference, count, rng, seconds):
     """{"file-size limit": Tally, "full tmpfs": Tally}: exit code 74, and chunks whole."""
     tallies = {"file-size limit": Tally(), "full tmpfs": Tally()}
     room = 2.2 * Path(reference).stat().st_size
-    for number in range(count):
+    for number in within(count, seconds):
         way = "full tmpfs" if number % 3 == 0 and can_mount(root) else "file-size limit"
         # A file is as long as the results, a disk holds journal and results.
         size = int(rng.uniform(3e3, room if way == "full tmpfs" else 0.5 * room))
@@ -182,7 +182,7 @@ def add_rows(table, name, tallies):
 
 def main():
     """Print the table; exit code 1 if anything was lost."""
-    most = {"type": float, "default": math.inf, "help": "seconds for kills, and for signals"}
+    most = {"type": float, "default": math.inf, "help": "seconds for kills, for signals, for disks"}
     arguments = parse_arguments(__doc__, seconds=most, only={"nargs": "+", "default": list(COUNTS),
                                                "choices": list(COUNTS)})  # fmt: skip
     print_heading(("h5py", "mpi4py", "mpich"))
@@ -199,7 +199,7 @@ def main():
         parts = {
             "kills": lambda count: kill_often(root, reference, count, rng, most),
             "signals": lambda count: signal_often(root, reference, count, rng, most),
-            "disk": lambda count: fill_disk(root, reference, count, rng),
+            "disk": lambda count: fill_disk(root, reference, count, rng, most),
             "flips": lambda count: (
                 damage_journal(root, reference, count // 2, rng)
                 | damage_results(root, reference, count // 2, rng)
