@@ -140,7 +140,7 @@ def fill_disk(root, reference, count, rng, seconds):
         problem = f"{way} of {size}: {problem}" if problem else ""
         tallies[way].add(problem, seconds, code is None)
         if way == "full tmpfs":
-            subprocess.run(["umount", folder], check=True)
+            subprocess.run(["umount", "-l", folder], check=True)
         shutil.rmtree(folder)
     return tallies
 
