@@ -1,10 +1,29 @@
 """flocsim: when two flocs of real shape meet in water, do they collide, and do they stick?"""
 
-from flocsim.body import Body, Fluid
-from flocsim.geometry.sphere import Sphere
-from flocsim.geometry.spheropolygon import SpheroPolygon
-from flocsim.system import System, Trajectory
+import importlib
 
 __version__ = "0.1.0"
 
+HOMES = {
+    "Body": "body",
+    "Fluid": "body",
+    "Sphere": "geometry.sphere",
+    "SpheroPolygon": "geometry.spheropolygon",
+    "System": "system",
+    "Trajectory": "system",
+}
+"""Public name → module. Loaded when asked for: a job takes over Ctrl-C before it loads any."""
+
 __all__ = ["Body", "Fluid", "Sphere", "SpheroPolygon", "System", "Trajectory", "__version__"]
+
+
+def __getattr__(name):
+    if name not in HOMES:
+        raise AttributeError(f"module 'flocsim' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"flocsim.{HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *HOMES})

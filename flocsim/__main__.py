@@ -5,7 +5,13 @@ import os
 import sys
 
 from flocsim import __version__
+from flocsim.interruption import install
+
+if "ensemble" in sys.argv[1:2]:
+    install()  # before anything slow is imported
+
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
+from flocsim.ensembles.cli import silent_unless_first
 from flocsim.ensembles.progress import plain_warnings
 from flocsim.errors import FlocsimError
 
@@ -36,7 +42,8 @@ def main(argv=None):
     """Run a subcommand; the exit code. Errors are one line on stderr."""
     tolerant_streams()
     plain_warnings()
-    arguments = make_parser().parse_args(argv)
+    with silent_unless_first():
+        arguments = make_parser().parse_args(argv)
     try:
         return arguments.run(arguments)
     except FlocsimError as error:

@@ -2,7 +2,11 @@
 
 import sys
 
-from flocsim.ensembles.cli import main
+from flocsim.interruption import install
 
 if __name__ == "__main__":
+    install()  # before anything slow is imported
+
+    from flocsim.ensembles.cli import main
+
     sys.exit(main())

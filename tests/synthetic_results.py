@@ -53,6 +53,8 @@ def make_results(
         "rejected": rng.integers(0, 50, shape),
         "error": rng.uniform(0.0, 1e-8, shape),
         "failure": failure,
+        "floc_i": rng.integers(0, 4, shape),
+        "floc_j": rng.integers(0, 4, shape),
     }
     run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
     table = tabulate(outcome, inside)

@@ -29,7 +29,17 @@ ROWS = [
     ["forces", "integrators"],
     ["body", "state"],
     ["geometry"],
-    ["composer", "linking", "fingerprint", "slots", "layout", "fields", "constants", "errors"],
+    [
+        "composer",
+        "linking",
+        "fingerprint",
+        "slots",
+        "layout",
+        "fields",
+        "constants",
+        "errors",
+        "interruption",
+    ],
 ]
 SIBLING_IMPORTS = {
     ("composer", "constants"),
@@ -43,7 +53,7 @@ SIBLING_IMPORTS = {
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/mpi.py"],
-    "h5py": ["io/results.py", "io/shape_library.py", "io/trajectory.py"],
+    "h5py": ["io/results.py", "io/results_layout.py", "io/shape_library.py", "io/trajectory.py"],
     "skimage": ["io/image_*.py"],
     "matplotlib": ["io/plots.py", "io/plot_*.py"],
     "shapely": ["geometry/outline.py"],

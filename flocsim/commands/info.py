@@ -1,10 +1,16 @@
 """`flocsim info`: what a results file holds, for a person to read."""
 
+import json
 import math
 import sys
 import tomllib
 
 from flocsim.errors import FileError
+
+APART = ("config", "preset", "identity", "failed", "overrides", "history")
+"""What the group ``run`` holds besides what is printed as it is."""
+
+MOST_FAILURES = 10
 
 
 def add_parser(subparsers):
@@ -25,17 +31,18 @@ def add_parser(subparsers):
 
 def run(args):
     """Print the description, or the config; returns the exit code."""
+    from flocsim.io.replicate_totals import replicate_totals
     from flocsim.io.results import read_results
     from flocsim.io.shape_library import is_library
 
     if not args.config and is_library(args.results):
         print(describe_library(args.results))
         return 0
-    results = read_results(args.results)
+    results = read_results(args.results, replicates=False)
     if args.config:
         sys.stdout.write(config_text(args.results, results))
     else:
-        print(describe(args.results, results))
+        print(describe(args.results, results, replicate_totals(args.results)))
     return 0
 
 
@@ -63,72 +70,74 @@ def config_text(path, results):
     return results.run["config"]
 
 
-def describe(path, results):
+def describe(path, results, totals):
     """The whole description as text."""
     from flocsim.ensembles.report import format_table
 
-    facts = conditions(results) + outcomes(results) + origin(results)
+    facts = conditions(results) + outcomes(results, totals) + origin(results)
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
+    lines += failed_lines(results)
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
     return "\n".join([*lines, "", table])
 
 
 def conditions(results):
     """(name, value) of what was simulated."""
-    count = results.replicates["outcome"].shape[-1]
     vertices = (f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)
     return [
         ("preset", preset(results.run)),
         ("types", ", ".join(results.types)),
         ("vertices", ", ".join(vertices)),
         ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
-        ("replicates", f"{count} in each of {math.prod(results.shape)} conditions"),
+        ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
+        *overrides(results.run),
     ]
 
 
 def preset(run):
     """The preset's name: stored by itself, or in the config."""
     if "preset" in run:
-        return run["preset"]
+        return run["preset"] or "none named"
     try:
         return tomllib.loads(run.get("config", "")).get("preset", "none named")
     except tomllib.TOMLDecodeError:
         return "unknown, the config cannot be read"
 
 
-def outcomes(results):
-    """(name, value) of what came out, all conditions together."""
-    import numpy as np
+def overrides(run):
+    """(name, value) of what the command line laid over the config."""
+    given = json.loads(run.get("overrides", "{}"))
+    return [("over the config", json.dumps(given))] if given else []
 
+
+def outcomes(results, totals):
+    """(name, value) of what came out, all conditions together."""
     from flocsim.io.results import OUTCOMES
 
-    data = results.replicates
-    found = np.bincount(data["outcome"].ravel(), minlength=len(OUTCOMES))
-    rows = [("outcomes", ", ".join(f"{n} {w}" for w, n in zip(OUTCOMES, found, strict=True)))]
-    reasons = np.bincount(data["failure"].ravel(), minlength=len(results.failures))
-    named = list(zip(results.failures, reasons, strict=True))[1:]
+    found = zip(OUTCOMES, totals.outcomes, strict=True)
+    rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
+    named = list(zip(results.failures, totals.failures, strict=True))[1:]
     if any(number for _, number in named):
         rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))
-    if data["steps"].size:
-        steps, rejected = data["steps"], data["rejected"]
+    if totals.count:
         rows.append(
             (
                 "steps",
-                f"{np.median(steps):g} in the median replicate, {steps.max()} at most; "
-                f"{rejected.sum()} of {(steps + rejected).sum()} rejected",
+                f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
+                f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected",
             )
         )
     return rows
 
 
 def origin(results):
-    """(name, value) of all that the group ``run`` knows, but for the config's text."""
+    """(name, value) of all that the group ``run`` knows and a person wants to."""
     return [
         (name.replace("_", " "), readable(name, value))
         for name, value in results.run.items()
-        if name not in ("config", "preset") and value != ""
+        if name not in APART and value != ""
     ]
 
 
@@ -137,3 +146,14 @@ def readable(name, value):
     if isinstance(value, float):
         return f"{value:.6g} s" if "time" in name else f"{value:.6g}"
     return str(value)
+
+
+def failed_lines(results):
+    """The replicates that failed, each with the words that run it again."""
+    from flocsim.ensembles.desk import describe_note
+
+    notes = json.loads(results.run.get("failed", "[]"))
+    lines = [f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES]]
+    if len(notes) > MOST_FAILURES:
+        lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
+    return ["", *lines] if lines else []

@@ -62,6 +62,10 @@ name = "implicit"
 tolerance = "1 nm"         # largest error in position of a step
 # max_steps = 200000       # a replicate that needs more ends undecided
 
+# [stop]                   # end before all replicates are run
+# half_width = 0.02        # of the 95 % intervals, in every condition
+# failed = 0.1             # give the study up where a larger share of replicates fails
+
 [output]
 file = "results.h5"
 """

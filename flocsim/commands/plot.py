@@ -76,7 +76,7 @@ def read_content(path):
 
     if is_library(path):
         return read_library(path), POPULATION_FIGURES
-    return read_results(path), FIGURES
+    return read_results(path, replicates=False), FIGURES
 
 
 def figure_names(text):

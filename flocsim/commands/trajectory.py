@@ -14,6 +14,9 @@ def add_parser(subparsers):
     )
     parser.add_argument("config", help="config file (TOML)")
     parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    parser.add_argument(
+        "--scene", metavar="TYPE,N,F", help="collision type, vertices and displacement in one word"
+    )
     parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
     parser.add_argument(
         "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
@@ -40,6 +43,19 @@ def chosen(value, known, option, default):
     if value not in known:
         raise UsageError(f"{option} must be one of {', '.join(map(str, known))}, found {value}")
     return known.index(value)
+
+
+def take_scene(args):
+    """Split --scene into the three options that it stands for."""
+    if args.scene is None:
+        return
+    if (args.type, args.vertices, args.delta) != (None, None, None):
+        raise UsageError("--scene stands for --type, --vertices and --delta: leave those out")
+    try:
+        args.type, vertices, delta = args.scene.rsplit(",", 2)
+        args.vertices, args.delta = int(vertices), float(delta)
+    except ValueError:
+        raise UsageError(f"--scene must be TYPE,N,F such as I,16,0.5, found {args.scene}") from None
 
 
 def select(config, args):
@@ -129,6 +145,7 @@ def run(args):
     from flocsim.io.trajectory import write_trajectory
 
     config = load_config(args.config, {} if args.seed is None else {"seed": args.seed})
+    take_scene(args)
     place = select(config, args)
     check_study(config)
     figures = [path for path in (strip_path(args), args.distance) if path]

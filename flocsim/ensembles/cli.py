@@ -7,19 +7,36 @@ import sys
 import traceback
 
 from flocsim.ensembles.progress import plain_warnings, tell
-from flocsim.ensembles.team import Alone, find_team, launched_rank
-from flocsim.errors import FlocsimError
+from flocsim.ensembles.team import Alone, StopRequested, find_team, launched_rank
+from flocsim.errors import FlocsimError, UsageError
+from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
 
-INTERRUPTED = 130
 INTERNAL = 70
 
 
 def add_arguments(parser):
     """The arguments of the command."""
     parser.add_argument("config", help="config file (TOML); `flocsim init` writes an example")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's, e.g. --set 'scene.delta=[0.0, 0.5]' or --set "
+        "forces.contact.k_n='10 N/m'; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, help="seed, instead of the config's")
     parser.add_argument("--replicates", type=int, help="replicates, instead of the config's")
     parser.add_argument("--output", metavar="FILE", help="results file, instead of the config's")
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
+    )
+    begin = parser.add_mutually_exclusive_group()
+    begin.add_argument(
+        "--resume", action="store_const", const="resume", default="new", dest="mode",
+        help="go on with an unfinished run, or extend a finished one; starts one if there is none",
+    )  # fmt: skip
+    begin.add_argument(
+        "--restart", action="store_const", const="restart", dest="mode",
+        help="throw an unfinished run away and start anew",
+    )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="say what would be run, and stop")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     return parser
@@ -27,7 +44,9 @@ def add_arguments(parser):
 
 def overrides(arguments):
     """The command line's values as a nested dict over the config's."""
-    given = {}
+    from flocsim.ensembles.settings import nested, parsed
+
+    given = nested(map(parsed, arguments.settings))
     if arguments.seed is not None:
         given["seed"] = arguments.seed
     if arguments.replicates is not None:
@@ -60,31 +79,51 @@ def agree(team, arguments):
     problems = [each for each in team.collect(problem) if each is not None]
     if problems:
         if team.rank == 0:
-            print(problems[0][0], file=sys.stderr, flush=True)
+            tell(problems[0][0], sys.stderr)
         return None, problems[0][1]
     return config, 0
 
 
 def study(config, team, arguments):
-    """Run the study and write its results."""
-    from flocsim.ensembles.report import format_table
-    from flocsim.ensembles.runner import run
-    from flocsim.io.results import write_results
+    """Run the study and write its results; the exit code."""
+    from flocsim.ensembles.runner import OtherRankFailed, Told, run_to_file
 
-    results = run(config, team, quiet=arguments.quiet)
-    if team.rank > 0:
-        return
-    # The table first: should the disk be full, it is not lost with the file.
-    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-    if not arguments.quiet:
-        tell(table)
-    write_results(config.output.file, results)
-    if not arguments.quiet:
-        seconds = results.run["wall_time"]
-        tell(
-            f"{config.output.file}: {results.replicates['outcome'].size} replicates in "
-            f"{seconds:.1f} s, {results.replicates['outcome'].size / seconds:.0f}/s"
-        )
+    output = config.output.file
+    try:
+        ended = run_to_file(config, team, output, arguments.mode, arguments.quiet)
+    except OtherRankFailed as error:
+        return error.args[0]
+    except Told as error:
+        tell(f"flocsim: {error}", sys.stderr)
+        return error.args[0].exit_code
+    if ended.code == STOPPED:
+        if team.rank == 0:
+            tell(f"flocsim: {stopped_text(ended, output)}", sys.stderr)
+        return STOPPED
+    if team.rank == 0 and not arguments.quiet:
+        report(ended, output)
+    return 0
+
+
+def stopped_text(ended, output):
+    """What was saved when a signal came."""
+    who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
+    return (
+        f"stopped by {who}: {ended.kept} finished replicates are in {output}.journal; go on with "
+        "--resume"
+    )
+
+
+def report(ended, output):
+    """Print the table of a finished study, and where it is."""
+    from flocsim.ensembles.report import format_table
+
+    results = ended.results
+    tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
+    total = int(results.probabilities["n_total"].sum())
+    seconds = ended.wall_time
+    tell(f"{output}: {total} replicates, {ended.computed} of them run in {seconds:.1f} s, "
+         f"{ended.computed / seconds:.0f}/s")  # fmt: skip
 
 
 def work(team, arguments):
@@ -98,14 +137,13 @@ def work(team, arguments):
         if team.rank == 0:
             tell(dry_run(config, team))
         return 0
-    study(config, team, arguments)
-    return 0
+    return study(config, team, arguments)
 
 
 def end_all(team, text, code):
     """Print why, and end every rank; returns the exit code where this process is alone."""
     who = f"rank {team.rank}: " if team.size > 1 else ""
-    print(f"flocsim: {who}{text}", file=sys.stderr, flush=True)
+    tell(f"flocsim: {who}{text}", sys.stderr)
     if team.size > 1:
         team.abort(code)
     return code
@@ -114,22 +152,50 @@ def end_all(team, text, code):
 def guarded(team, arguments):
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
     try:
-        return work(team, arguments)
+        code = work(team, arguments)
+        team.close()
+        return code
+    except StopRequested as error:
+        if team.rank == 0:
+            tell(f"flocsim: {error}", sys.stderr)
+        if team.size > 1:
+            team.abort(STOPPED)  # others may wait for this rank
+        return STOPPED
     except FlocsimError as error:
         return end_all(team, str(error), error.exit_code)
     except KeyboardInterrupt:
-        return end_all(team, "interrupted; nothing was saved", INTERRUPTED)
+        return end_all(team, "interrupted; go on with --resume", INTERRUPTED)
     except MemoryError:
-        return end_all(team, "out of memory: ask for fewer replicates at a time", INTERNAL)
+        return end_all(team, "out of memory: ask for fewer ranks on a machine", INTERNAL)
     except Exception:
         text = f"internal error, please report it:\n{traceback.format_exc()}"
         return end_all(team, text, INTERNAL)
 
 
+def gather_team(arguments):
+    """The ranks of the job: those that a launcher started, or --jobs processes."""
+    team = find_team()
+    if arguments.jobs == 1 or arguments.dry_run:
+        return team
+    if arguments.jobs < 1:
+        raise UsageError(f"--jobs must be at least 1, found {arguments.jobs}")
+    if team.size > 1:
+        raise UsageError("--jobs is for runs without an MPI launcher: leave out one of the two")
+    from flocsim.ensembles.processes import start_processes
+
+    return start_processes(arguments.jobs, on_process, arguments)
+
+
+def on_process(team, arguments):
+    """What a process that --jobs started does; its exit code."""
+    plain_warnings(silent=True)
+    return guarded(team, arguments)
+
+
 def run_command(arguments):
     """Find the ranks of the job and do the work; the exit code."""
     try:
-        team = find_team()
+        team = gather_team(arguments)
     except FlocsimError as error:
         return end_all(Alone(), str(error), error.exit_code)
     plain_warnings(silent=team.rank > 0)

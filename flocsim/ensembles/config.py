@@ -20,12 +20,13 @@ from flocsim.ensembles.config_fields import (
     word,
 )
 from flocsim.ensembles.config_scene import SceneConfig
+from flocsim.ensembles.config_stop import StopConfig
 from flocsim.ensembles.presets import PRESETS
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, quantity, word_or_quantity
 
 LARGEST_SEED = 2**63 - 1
-MOST_REPLICATES = 10**7
+MOST_REPLICATES = 10**9
 MOST_STEPS = 10**12
 MOST_VERTICES = 512
 
@@ -155,7 +156,7 @@ class Config:
 
     ``forces`` (Force objects) and ``force_names`` go in step: gravity, drag, van_der_waals,
     double_layer, contact, then the user's own as in the file. ``text`` is the file's source and
-    ``folder`` where it lies.
+    ``folder`` where it lies; ``overrides`` what was laid over it.
     """
 
     preset: str | None = attrs.field(
@@ -178,9 +179,11 @@ class Config:
     force_names: tuple = attrs.field(kw_only=True)
     zone: ZoneConfig = attrs.Factory(ZoneConfig)
     integrator: IntegratorConfig = attrs.Factory(IntegratorConfig)
+    stop: StopConfig = attrs.Factory(StopConfig)
     output: OutputConfig = attrs.Factory(OutputConfig)
     text: str = ""
     folder: Path = attrs.Factory(Path)
+    overrides: dict = attrs.Factory(dict)
 
     @property
     def body_options(self):

@@ -3,9 +3,11 @@
 from flocsim.ensembles.memo import COLLIDED, INSIDE
 from flocsim.ensembles.outcomes import BOUND, DEPARTED, MISSED
 from flocsim.integrators.status import Status
-from flocsim.io.results_schema import OUTCOMES
+from flocsim.io.results_schema import NOT_APPLICABLE, OUTCOMES
 
-FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite")
+NAN = float("nan")
+
+FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""
 
 UNDECIDED = {
@@ -31,6 +33,28 @@ def outcome_of(status, code, memo):
     if status in UNDECIDED:
         return OUTCOMES.index("undecided"), FAILURES.index(UNDECIDED[status])
     return OUTCOMES.index("failed"), FAILURES.index(FAILED[status])
+
+
+EXCEPTION = FAILURES.index("exception")
+NOT_FINITE = FAILURES.index("not finite")
+
+
+def failed_row(failure, angles=(float("nan"), float("nan"))):
+    """The row of a replicate that ended without a result, as a dict."""
+    nothing = dict.fromkeys(("d_c_collision", "d_c_max", "d_c_last", "t_collision", "t_end"), NAN)
+    return nothing | {
+        "angle_i": angles[0],
+        "angle_j": angles[1],
+        "outcome": OUTCOMES.index("failed"),
+        "inside": NOT_APPLICABLE,
+        "crossed_zone": NOT_APPLICABLE,
+        "steps": 0,
+        "rejected": 0,
+        "error": NAN,
+        "failure": failure,
+        "floc_i": -1,
+        "floc_j": -1,
+    }
 
 
 def collided(memo):

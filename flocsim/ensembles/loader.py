@@ -13,6 +13,7 @@ from flocsim.ensembles.config import (
     OutputConfig,
     SceneConfig,
     ShapesConfig,
+    StopConfig,
     ZoneConfig,
 )
 from flocsim.ensembles.force_tables import read_forces
@@ -36,6 +37,7 @@ TABLES = {
     "fluid": Fluid,
     "zone": ZoneConfig,
     "integrator": IntegratorConfig,
+    "stop": StopConfig,
     "output": OutputConfig,
 }
 """Name of a top-level table → class; [forces] is read by itself."""
@@ -65,7 +67,8 @@ def load_config(path, overrides=None):
     table = lay_over(PRESETS.get(preset, {}), own)
     parts = read_parts(table, Path(path).parent, problems)
     problems.raise_if_any()
-    return Config(preset=preset, text=text, folder=Path(path).parent, **parts)
+    folder = Path(path).parent
+    return Config(preset=preset, text=text, folder=folder, overrides=overrides, **parts)
 
 
 def read_preset(table, problems):

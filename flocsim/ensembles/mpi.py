@@ -3,7 +3,9 @@
 import sys
 import time
 
+from flocsim.ensembles.team import Team
 from flocsim.errors import UsageError
+from flocsim.interruption import INTERRUPTION, end_with_parent
 
 LAST_WORDS = 0.5
 """Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
@@ -22,12 +24,14 @@ def load_mpi():
     return MPI
 
 
-class MpiTeam:
+class MpiTeam(Team):
     """The ranks of MPI's world."""
 
     def __init__(self, launched):
         """Join the world; UsageError where its size is not what the launcher started."""
-        self.world = load_mpi().COMM_WORLD
+        super().__init__()
+        self.mpi = load_mpi()
+        self.world = self.mpi.COMM_WORLD
         self.rank = self.world.rank
         self.size = self.world.size
         if launched is not None and launched != self.size:
@@ -36,22 +40,27 @@ class MpiTeam:
                 "MPI library that mpi4py uses are of different kinds; use the mpirun beside this "
                 "Python"
             )
+        INTERRUPTION.speaks = self.rank == 0
+        if self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE:
+            # Where one rank just goes, the launcher kills the others, and says so by its code.
+            INTERRUPTION.leave = self.world.Abort
+        end_with_parent()
 
-    def gather(self, value):
-        """The values of all ranks, on rank 0."""
-        return self.world.gather(value, root=0)
+    @property
+    def threads(self):
+        """Whether a thread of rank 0 may use MPI while the main one computes."""
+        return self.mpi.Query_thread() >= self.mpi.THREAD_SERIALIZED
 
-    def share(self, value):
-        """Rank 0's value, on all ranks."""
-        return self.world.bcast(value, root=0)
+    def send(self, to, message):
+        """Send an object to a rank."""
+        self.world.send(message, to)
 
-    def collect(self, value):
-        """The values of all ranks, on all ranks."""
-        return self.world.allgather(value)
-
-    def wait(self):
-        """Until all ranks are here."""
-        self.world.Barrier()
+    def arrived(self):
+        """(source, message) of all that has come."""
+        status = self.mpi.Status()
+        while self.world.Iprobe(status=status):
+            source = status.Get_source()
+            yield source, self.world.recv(source=source)
 
     def abort(self, code):
         """End the whole job: every rank, wherever it is."""

@@ -32,20 +32,23 @@ def plain_warnings(silent=False):
 
 
 def tell(text, stream=None, end="\n"):
-    """Print; a reader that has gone (`| head`) must not cost a study its results."""
+    """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
+
+    What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
+    """
     stream = stream or sys.stdout
     try:
         print(text, end=end, file=stream, flush=True)
-    except BrokenPipeError:
+    except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class Progress:
-    """Reports on rank 0; its own share of the work stands for everybody's."""
+    """Reports on rank 0, which knows what is done."""
 
     def __init__(self, total, quiet, stream=None):
         """``total`` replicates in all; nothing is printed where ``quiet``."""
-        self.total = total
+        self.total = self.todo = total
         self.quiet = quiet
         self.stream = stream or sys.stdout
         self.tty = self.stream.isatty()
@@ -57,14 +60,24 @@ class Progress:
         if not self.quiet:
             tell(text, self.stream)
 
-    def report(self, share):
-        """Report that a share of the work is done, if it is time to."""
+    def warn(self, text):
+        """Print a line on stderr, quiet or not."""
+        tell(f"flocsim: {text}", sys.stderr)
+
+    def start(self, todo):
+        """The work begins now: so many replicates are to be run."""
+        self.todo = todo
+        self.began = self.printed = time.monotonic()
+
+    def report(self, missing):
+        """Report how many replicates are missing, if it is time to."""
+        share = (self.todo - missing) / self.todo if self.todo else 1.0
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
             return
         self.printed = now
         left = (now - self.began) * (1.0 - share) / share if share > 0.0 else 0.0
-        text = f"{share:4.0%}  {int(share * self.total)} of {self.total} replicates, "
+        text = f"{share:4.0%}  {self.total - missing} of {self.total} replicates, "
         text += f"{duration(left)} left"
         if self.tty:
             tell(f"\r{text:<70}", self.stream, end="")

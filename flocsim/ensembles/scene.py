@@ -20,6 +20,7 @@ from flocsim.layout import (
     CODE,
     ERROR,
     NOW,
+    PAUSE_AT,
     RECORDED,
     REJECTED,
     STEPS,
@@ -34,6 +35,9 @@ OBSERVER = {slots.awaits_touch: outcomes.has_not_touched, slots.observe: outcome
 
 REST_TURNS = 3.0
 """Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
+
+STEPS_AT_A_TIME = 5_000
+"""Steps between two looks at whether to stop: some 50 ms."""
 
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
@@ -121,11 +125,12 @@ def make_encounter(config, shapes, zone):
     return Encounter(system, config.scene, zone)
 
 
-def run_encounter(encounter, driver, angles, share, max_steps, record=None):
+def run_encounter(encounter, driver, angles, share, max_steps, record=None, halted=None):
     """Run one replicate; the row of the table of replicates as a dict.
 
     ``driver`` is the compiled driver of the encounter's scene; ``record`` (k, 13), optional,
-    receives the motion; where it is full, recording ends.
+    receives the motion; where it is full, recording ends. ``halted()``, optional, is asked every
+    some thousand steps whether to give up; the row is None then.
     """
     work = encounter.start(angles, share)
     memo = encounter.memo()
@@ -134,11 +139,16 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None):
     clock[UNTIL] = encounter.time_limit()
     rows = np.zeros((0, 13)) if record is None else record.begin(work)
     while True:
+        # A pause comes between two steps, so that it changes nothing.
+        counts[PAUSE_AT] = counts[STEPS] + STEPS_AT_A_TIME
         status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
         if record is not None:
             record.take(counts)
         if status == Status.NO_ROOM:
             work = with_capacity(work, 2 * len(work.candidates))
+        elif status == Status.PAUSED:
+            if halted is not None and halted():
+                return None
         elif status != Status.RECORD_FULL:
             return replicate_row(status, angles, memo, clock, counts)
 

@@ -1,16 +1,24 @@
 """A study: all conditions of a config, and any one replicate of them by its number."""
 
+from itertools import product
+
 import attrs
 import numpy as np
 
+from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.flocs import Wardrobe, load_flocs
 from flocsim.ensembles.sampling import draws, orientations
 from flocsim.ensembles.scene import OBSERVER, make_encounter, run_encounter
 from flocsim.ensembles.zone import zone_distance
-from flocsim.io.results_schema import REPLICATES
 
-ROW = np.dtype([("place", "i8")] + [(name, kind) for name, (kind, _, _) in REPLICATES.items()])
-"""One replicate: its place in the study, and its row of the results file."""
+NO_FLOC = -1
+"""In ``floc_i`` and ``floc_j``: a sphere."""
+
+
+def flocs_of(config):
+    """The flocs that a config's study needs: none for spheres alone."""
+    polygons = any(n > 1 for n in config.shapes.vertices)
+    return load_flocs(config.shapes, config.seed) if polygons else []
 
 
 @attrs.define(eq=False)
@@ -31,8 +39,7 @@ class Study:
             for name, radius_i, radius_j in config.scene.conditions
         }
         if self.flocs is None:
-            polygons = any(n > 1 for n in config.shapes.vertices)
-            self.flocs = load_flocs(config.shapes, config.seed) if polygons else []
+            self.flocs = flocs_of(config)
         self.wardrobe = Wardrobe(self.flocs, config.shapes.radius, config.shapes.pool)
 
     @property
@@ -69,21 +76,39 @@ class Study:
             self.drivers[kind] = encounter.system.compose(observer=OBSERVER)
         return self.drivers[kind]
 
-    def run(self, condition, vertices, share, replicate, record=None):
-        """Run one replicate: condition's place, N, share of δ_max, index. The row as a dict."""
+    @property
+    def conditions(self):
+        """All conditions, in the order of the results file."""
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        names = [name for name, _, _ in scene.conditions]
+        return tuple(Condition(*each) for each in product(names, vertices, scene.delta))
+
+    @property
+    def places(self):
+        """(place of the collision type, N, share of δ_max) of every condition."""
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        return tuple(product(range(len(scene.conditions)), vertices, scene.delta))
+
+    def run(self, condition, vertices, share, replicate, record=None, halted=None):
+        """Run one replicate: condition's place, N, share of δ_max, index. The row as a dict.
+
+        ``halted()``, looked at now and then, gives the replicate up: None then.
+        """
         numbers = draws(self.config.seed, replicate)
         encounter = self.encounter(condition, vertices, numbers)
         driver = self.driver(encounter)
         angles = orientations(numbers)
         max_steps = self.config.integrator.max_steps
-        return run_encounter(encounter, driver, angles, share, max_steps, record)
+        row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)
+        return row if row is None else row | self.flocs_of(condition, vertices, numbers)
 
-    def run_place(self, place):
-        """Run the replicate at a place of the study (C order of ``shape``); the row as a tuple."""
-        condition, v, d, replicate = np.unravel_index(place, self.shape)
-        vertices = self.config.shapes.vertices[v]
-        row = self.run(condition, vertices, self.config.scene.delta[d], int(replicate))
-        return (place, *(row[name] for name in REPLICATES))
+    def flocs_of(self, condition, vertices, numbers):
+        """Places of the flocs that a replicate's random numbers choose."""
+        if vertices == 1:
+            return {"floc_i": NO_FLOC, "floc_j": NO_FLOC}
+        _, radius_i, radius_j = self.config.scene.conditions[condition]
+        places = self.wardrobe.choose(numbers, radius_i, radius_j)
+        return dict(zip(("floc_i", "floc_j"), places, strict=True))
 
     @property
     def kinds(self):

@@ -5,6 +5,7 @@ it: a damaged HDF5 file can crash its reader or keep it busy for ever, a wrong c
 """
 
 import contextlib
+import errno
 import hashlib
 import os
 import secrets
@@ -15,6 +16,8 @@ from flocsim.errors import FileError
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
 SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
+BLOCK = 2**20
+"""Bytes that are read or written at a time."""
 
 
 def replace_file(path, data):
@@ -35,6 +38,58 @@ def replace_file(path, data):
     finally:
         with contextlib.suppress(OSError, ValueError):
             temporary.unlink()
+
+
+def replace_by_blocks(path, size, blocks):
+    """Put ``blocks`` (bytes, in order, ``size`` in all) at ``path``, sealed; never a part of them.
+
+    For files larger than the memory. The space is taken before the first block, so that a full
+    disk is found at once; an unfinished file of a run that was killed is written over.
+    Raises FileError as `replace_file` does.
+    """
+    target = ordinary_target(path)
+    temporary = target.with_name(f".{target.name}.unfinished")
+    try:
+        with open(temporary, "wb") as file:
+            reserve(file.fileno(), size + SEAL_LENGTH)
+            file.writelines(sealed(blocks))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+        sync_folder(target.parent)
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise unwritable(path, error) from error
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            temporary.unlink()
+
+
+def reserve(descriptor, size):
+    """Take the space of a file on the disk, where the system can; OSError where it is full."""
+    if not hasattr(os, "posix_fallocate"):
+        return
+    try:
+        os.posix_fallocate(descriptor, 0, size)
+    except OSError as error:
+        # Some file systems cannot; then a full disk shows when it is written to.
+        if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+            raise
+
+
+def sealed(blocks):
+    """The blocks, then their seal."""
+    digest = hashlib.blake2b(digest_size=32)
+    for block in blocks:
+        digest.update(block)
+        yield block
+    yield seal_of(digest)
+
+
+def seal_of(digest):
+    """The seal of the data that a blake2b-256 has taken in."""
+    return SEAL_MARK + digest.hexdigest().encode() + b"\n"
 
 
 def ordinary_target(path):
@@ -77,36 +132,64 @@ def sync_folder(folder):
 
 def seal(data):
     """The bytes of an HDF5 file with their checksum appended."""
-    return data + SEAL_MARK + hashlib.blake2b(data, digest_size=32).hexdigest().encode() + b"\n"
+    return data + seal_of(hashlib.blake2b(data, digest_size=32))
 
 
 def read_sealed(path):
     """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
+    with checked_sealed(path) as (file, size):
+        return file.read(size)
+
+
+@contextlib.contextmanager
+def checked_sealed(path):
+    """(open file, size of its HDF5 data), once its checksum has been found right.
+
+    Read a block at a time, so that files larger than the memory can be checked.
+    """
     try:
         if Path(path).exists() and not Path(path).is_file():
             raise FileError(f"{path} is not an ordinary file: name a results file")
-        data = Path(path).read_bytes()
+        file = open(path, "rb")  # noqa: SIM115 (closed below)
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):
             raise
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path} could not be read: {reason}; check the name") from error
-    return unseal(path, data)
+    with file:
+        size = check_seal(path, file)
+        file.seek(0)
+        yield file, size
 
 
-def unseal(path, data):
-    """``data`` without its seal, once the checksum has been found right."""
-    if not data.startswith(HDF5_SIGNATURE):
+def check_seal(path, file):
+    """The size of the data before the seal; FileError where either is wrong."""
+    if not file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
         raise FileError(f"{path} is not an HDF5 file: name a file that flocsim wrote")
-    content, tail = data[:-SEAL_LENGTH], data[-SEAL_LENGTH:]
+    size = max(file.seek(0, os.SEEK_END) - SEAL_LENGTH, 0)
+    file.seek(size)
+    tail = file.read()
     if not tail.startswith(SEAL_MARK):
         raise FileError(
             f"{path} does not end in flocsim's checksum: it is of another kind, was cut short or "
             "was changed by another program; use the original file"
         )
-    if seal(content) != data:
+    if seal_of(digest_of(file, size)) != tail:
         raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
-    return content
+    return size
+
+
+def digest_of(file, size):
+    """The blake2b-256 of a file's first bytes."""
+    digest = hashlib.blake2b(digest_size=32)
+    file.seek(0)
+    while size > 0:
+        block = file.read(min(size, BLOCK))
+        if not block:
+            break
+        digest.update(block)
+        size -= len(block)
+    return digest
 
 
 def check_writable(path):

@@ -24,17 +24,21 @@ def wilson(successes, trials, confidence=0.95):
     successes, trials = checked_counts(successes, trials)
     if not 0.0 < confidence < 1.0:
         raise UsageError(f"confidence must lie between 0 and 1, found {confidence!r}")
-    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = successes / trials
-        spread = z * np.sqrt(share * (1.0 - share) / trials + (z / (2.0 * trials)) ** 2)
-        scale = 1.0 + z * z / trials
-        centre = share + z * z / (2.0 * trials)
-        low, high = (centre - spread) / scale, (centre + spread) / scale
+        low, high = score_interval(successes / trials, trials, confidence)
     # At the ends the formula gives 0 and 1, but only up to rounding.
     low = np.where((successes == 0) & (trials > 0), 0.0, low)
     high = np.where((successes == trials) & (trials > 0), 1.0, high)
     return low, high
+
+
+def score_interval(share, trials, confidence=0.95):
+    """Wilson's score interval (low, high) of a share among ``trials``, which need not be whole."""
+    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+    spread = z * np.sqrt(share * (1.0 - share) / trials + (z / (2.0 * trials)) ** 2)
+    scale = 1.0 + z * z / trials
+    centre = share + z * z / (2.0 * trials)
+    return (centre - spread) / scale, (centre + spread) / scale
 
 
 def proportion(successes, trials, confidence=0.95):

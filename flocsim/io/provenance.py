@@ -1,5 +1,6 @@
 """Where a result came from: config, seed, versions, machine, date and command line."""
 
+import contextlib
 import datetime
 import platform
 import shlex
@@ -15,7 +16,7 @@ def provenance(config_text, seed, kernel_fingerprint=""):
     ``config_text`` is the config file as the user wrote it, ``seed`` the whole number that keys
     all random draws, ``kernel_fingerprint`` the hash of the compiled kernels' source. Returns a
     dict of text and numbers: config, seed, kernel_fingerprint, <package>_version, python_version,
-    platform, hostname, date [UTC, ISO 8601] and command. No package is imported for it.
+    processor, platform, hostname, date [UTC, ISO 8601] and command. No package is imported for it.
     """
     versions = {f"{name}_version": package_version(name) for name in PACKAGES}
     facts = {
@@ -24,12 +25,18 @@ def provenance(config_text, seed, kernel_fingerprint=""):
         "kernel_fingerprint": kernel_fingerprint,
         **versions,
         "python_version": platform.python_version(),
+        "processor": processor(),
         "platform": platform.platform(),
         "hostname": platform.node(),
-        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "date": now(),
         "command": shlex.join(sys.argv),
     }
     return {name: storable(value) for name, value in facts.items()}
+
+
+def now():
+    """Date and time [UTC, ISO 8601]."""
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
 def package_version(name):
@@ -38,6 +45,15 @@ def package_version(name):
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return str(getattr(sys.modules.get(name), "__version__", "unknown"))
+
+
+def processor():
+    """The processor's name, as far as the system gives it."""
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as file:
+        for line in file:
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def storable(value):

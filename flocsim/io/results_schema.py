@@ -31,7 +31,11 @@ REPLICATES = {  # name: (dtype, units, long name)
     "rejected": ("i8", "1", "rejected integrator steps"),
     "error": ("f8", "m", "sum of the estimated position errors"),
     "failure": ("u1", "1", "reason of an undecided or failed outcome"),
+    "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
+    "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
 }
+ROW_SIZE = sum(np.dtype(kind).itemsize for kind, _, _ in REPLICATES.values())
+"""Bytes of one replicate."""
 
 COUNTS = {
     "n_total": "replicates",
@@ -55,6 +59,22 @@ TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
     for name, text in PROBABILITIES.items()
     for suffix, bound in BOUNDS.items()
 }
+POOLED = {
+    name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
+    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+    for suffix, bound in BOUNDS.items()
+} | {
+    f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
+    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+}
+DIFFERENCES = {
+    "n_pairs": ("i8", "1", "replicates that count in both conditions"),
+    "difference": ("f8", "1", "probability here minus that in the condition compared with"),
+    "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
+    "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
+}
+EVENTS = ("inside", "aggregated")
+"""Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
 FLAGS = {
     "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
     "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
@@ -69,6 +89,9 @@ COORDINATES = {
         "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
     ),
     "replicate": ("1", "replicate index"),
+    "floc": ("1", "name of the floc"),
+    "against": ("1", "compared with the condition that comes first along this axis"),
+    "event": ("1", "inside: of all collisions; aggregated: of the decided ones"),
 }
 
 
@@ -77,34 +100,53 @@ class Results:
     """All that one ensemble found, checked for names, shapes and exact conversion.
 
     ``types`` names; ``vertices`` N [-]; ``delta`` shares of delta_max [-]; ``replicates`` the
-    arrays of `REPLICATES`, each (type, vertices, delta, replicate); ``probabilities`` those of
-    `TABLE`, each (type, vertices, delta), with ``class`` A–D last where the name has it; ``run``
-    plain scalars; ``failures`` the words for the codes of ``replicates["failure"]``, the first
-    being "none". Give ``failures`` in a fixed order, else equal runs differ in bytes.
+    arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where they were left
+    on the disk, with their ``count`` then; ``probabilities`` those of `TABLE`, each (type,
+    vertices, delta), with ``class`` A–D last where the name has it; ``run`` plain scalars;
+    ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
+    a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
+    the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
+    event, type, vertices, delta), or nothing.
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
 
     types: tuple = attrs.field(converter=lambda names: tuple(str(name) for name in names))
     vertices: np.ndarray = attrs.field(converter=lambda counts: exact(counts, "i8", "vertices"))
     delta: np.ndarray = attrs.field(converter=lambda shares: exact(shares, "f8", "delta"))
-    replicates: dict
+    replicates: dict | None
     probabilities: dict
     run: dict = attrs.field(factory=dict)
     failures: tuple = attrs.field(
         default=("none",), converter=lambda words: tuple("_".join(str(w).split()) for w in words)
     )
+    flocs: tuple = attrs.field(default=(), converter=tuple)
+    pooled: dict = attrs.field(factory=dict)
+    differences: dict = attrs.field(factory=dict)
+    count: int | None = None
 
     def __attrs_post_init__(self):
         shape = self.shape
         tails = {name: (len(CLASSES),) for name in TABLE if "class" in name}
-        replicate = np.shape(self.replicates.get("outcome", ()))[3:4]
-        for group, schema in (("replicates", REPLICATES), ("probabilities", TABLE)):
-            shapes = {
-                name: shape + (replicate if group == "replicates" else tails.get(name, ()))
-                for name in schema
-            }
-            checked = checked_arrays(group, getattr(self, group), schema, shapes)
-            object.__setattr__(self, group, checked)
+        shapes = {name: shape + tails.get(name, ()) for name in TABLE}
+        self.check("probabilities", TABLE, shapes)
+        if self.pooled:
+            self.check("pooled", POOLED, dict.fromkeys(POOLED, shape[:2]))
+        if self.differences:
+            wanted = (len(AXES), len(EVENTS), *shape)
+            self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
+        if self.replicates is not None:
+            self.check_replicates()
+
+    def check(self, group, schema, shapes):
+        """Replace a group's arrays by themselves in the schema's order and types."""
+        checked = checked_arrays(group, getattr(self, group), schema, shapes)
+        object.__setattr__(self, group, checked)
+
+    def check_replicates(self):
+        """The table of replicates fits the rest."""
+        tail = np.shape(self.replicates.get("outcome", ()))[3:4]
+        self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, self.shape + tail))
+        object.__setattr__(self, "count", tail[0])
         if np.any(self.replicates["failure"] >= len(self.failures)):
             raise UsageError("replicates/failure holds a code without a word in failures")
 

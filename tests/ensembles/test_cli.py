@@ -39,7 +39,7 @@ def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
     lines = output.splitlines()
     assert lines[0].startswith("12 replicates: 2 types x 1 numbers of vertices x 2 displacements")
     assert "type I" in lines
-    assert lines[-1].startswith("small.h5: 12 replicates in ")
+    assert lines[-1].startswith("small.h5: 12 replicates, 12 of them run in ")
     assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
 
 
@@ -190,8 +190,8 @@ def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypat
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
-        (KeyboardInterrupt, 130, "flocsim: interrupted; nothing was saved\n"),
-        (MemoryError, 70, "flocsim: out of memory: ask for fewer replicates at a time\n"),
+        (KeyboardInterrupt, 130, "flocsim: interrupted; go on with --resume\n"),
+        (MemoryError, 70, "flocsim: out of memory: ask for fewer ranks on a machine\n"),
     ],
 )
 def test_other_ends(folder, capsys, monkeypatch, error, code, said):

@@ -47,6 +47,32 @@ sys.exit(code)
 """
 
 
+def test_without_threads_in_mpi_rank_0_answers_between_two_replicates(serial):
+    env = os.environ | {"MPI4PY_RC_THREAD_LEVEL": "funneled"}
+    done = run_command(serial, "small.toml", "--output", "slow.h5", "--quiet", ranks=3, env=env)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert same_data(serial / "slow.h5", serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
+    name = f"jobs{jobs}.h5"
+    done = run_command(serial, "small.toml", "--output", name, "--jobs", jobs)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"on {jobs} ranks" in done.stdout
+    assert same_data(serial / name, serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize(
+    ("words", "ranks", "said"),
+    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one of the two")],
+)
+def test_jobs_that_cannot_be_are_refused(serial, words, ranks, said):
+    done = run_command(serial, "small.toml", *words, ranks=ranks)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
 def test_without_a_launcher_mpi_is_not_even_imported(serial):
     done = subprocess.run(
         [sys.executable, "-c", PROBE], cwd=serial, capture_output=True, text=True, timeout=120
@@ -61,12 +87,13 @@ from flocsim.ensembles.study import Study
 from flocsim.forces import CentreForce
 
 
-def run_place(study, place):
-    raise RuntimeError("the disk of rank one is gone")
+def run(study, *place, **more):
+    raise MemoryError
 
 
 if os.environ["PMI_RANK"] == "1":
-    Study.run_place = run_place
+    Study.compile = lambda study, kinds: None
+    Study.run = run
 
 
 @attrs.frozen
@@ -116,40 +143,22 @@ def test_a_rank_that_fails_half_way_ends_the_whole_job(tmp_path):
     done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
     assert time.monotonic() - began < 15.0
     assert done.returncode == 70
-    assert "flocsim: rank 1: internal error, please report it:" in done.stderr
-    assert "RuntimeError: the disk of rank one is gone" in done.stderr
+    assert "flocsim: rank 1: out of memory: ask for fewer ranks on a machine" in done.stderr
     assert not (tmp_path / "small.h5").exists()
 
 
-FAILS_SOON = """\
-import os, sys
-import attrs
-from flocsim.forces import CentreForce
-
-
-@attrs.frozen
-class Soon(CentreForce):
-    @property
-    def reach(self):
-        # The report is loaded once all ranks have agreed to go on.
-        if "flocsim.ensembles.report" in sys.modules and os.environ["PMI_RANK"] == "1":
-            raise RuntimeError("the disk of rank one is gone")
-        return 1e-6
-
-    @staticmethod
-    def kernel(pair):
-        return 0.0
-"""
+FAILS_SOON = FAILS_LATE.replace("lambda study, kinds: None", "run")
+"""A rank 1 that fails at once, while rank 0 compiles."""
 
 
 def test_a_rank_that_fails_while_another_compiles_does_not_wait_for_it(tmp_path):
-    with_force(tmp_path, FAILS_SOON, "Soon")
+    with_force(tmp_path, FAILS_SOON, "Late")
     write_small(tmp_path, (tmp_path / "small.toml").read_text(), vertices="[1, 4]")
     began = time.monotonic()
     done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
     assert time.monotonic() - began < 15.0
-    assert done.returncode == 2
-    assert "flocsim: rank 1: Soon: its 'reach' cannot be computed" in done.stderr
+    assert done.returncode == 70
+    assert "flocsim: rank 1: out of memory" in done.stderr
 
 
 def test_a_config_that_one_rank_cannot_load_stops_all(tmp_path):
@@ -188,8 +197,8 @@ def test_wrong_arguments_and_help_are_printed_once(tmp_path):
 
 
 @pytest.mark.parametrize("ranks", [None, 2])
-def test_ctrl_c_ends_the_job_at_once(serial, ranks):
-    words = ["small.toml", "--replicates", "100000", "--output", "never.h5"]
+def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
+    words = ["small.toml", "--replicates", "100000", "--output", f"late{ranks}.h5"]
     job = subprocess.Popen(
         command(*words, ranks=ranks),
         cwd=serial, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -201,10 +210,17 @@ def test_ctrl_c_ends_the_job_at_once(serial, ranks):
     os.killpg(job.pid, signal.SIGINT)
     _, errors = job.communicate(timeout=30)
     assert time.monotonic() - began < 5.0
-    assert job.returncode == 130
-    assert "interrupted; nothing was saved" in errors
+    assert job.returncode == 75
+    assert "stopped by SIGINT: " in errors
     assert "Traceback" not in errors
-    assert not (serial / "never.h5").exists()
+    assert not (serial / f"late{ranks}.h5").exists()
+    again = ["small.toml", "--output", f"late{ranks}.h5"]
+    done = run_command(serial, *again, timeout=60)
+    assert done.returncode == 2
+    assert "holds an unfinished run: go on with it by --resume" in done.stderr
+    done = run_command(serial, *again, "--resume", "--jobs", 2, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert same_data(serial / f"late{ranks}.h5", serial / "serial.h5") == []
 
 
 def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):

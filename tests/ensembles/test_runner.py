@@ -1,22 +1,28 @@
-"""Shares of ranks put together again: the same arrays whoever ran what."""
+"""A study run by a team: the same arrays whoever ran what."""
 
 import numpy as np
 import pytest
 from small_study import small_study
 
+from flocsim.ensembles import worker
+from flocsim.ensembles.dealer import Dealer
 from flocsim.ensembles.progress import Progress
-from flocsim.ensembles.runner import describe, in_order, own_places, results_of, run, run_share
+from flocsim.ensembles.resume import Beginning
+from flocsim.ensembles.row_store import RowStore
+from flocsim.ensembles.runner import describe, make_desk, run, run_study
 from flocsim.ensembles.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.ensembles.team import Alone
+from flocsim.io.journal import MemoryJournal
 from flocsim.io.results import read_results, same_data, write_results
 
 
 class Rank(Alone):
-    """One rank of several, as far as the share of the work goes."""
+    """One rank of several, as far as a line of text goes."""
 
     def __init__(self, rank, size):
         """Rank ``rank`` of ``size``."""
+        super().__init__()
         self.rank, self.size = rank, size
 
 
@@ -26,12 +32,15 @@ def study(tmp_path_factory):
     return small_study(tmp_path_factory.mktemp("study"))
 
 
-def table_of(study, size):
-    """The table of replicates as ``size`` ranks make it."""
-    quiet = Progress(study.size, True)
-    shares = [run_share(study, Rank(rank, size), quiet) for rank in range(size)]
-    # Ranks answer in their order, but nothing should hang on it.
-    return in_order(study, shares[::-1])
+def beginning(study):
+    """A study's start with nothing."""
+    return Beginning(RowStore(MemoryJournal(), study.conditions), {"seed": study.config.seed})
+
+
+def results_of(study):
+    """The Results of a Study that this process runs alone."""
+    team = Alone()
+    return run_study(study, beginning(study), team, Progress(study.size, True)).results
 
 
 def same_arrays(table, other):
@@ -42,18 +51,27 @@ def same_arrays(table, other):
 @pytest.fixture(scope="module")
 def alone(study):
     """The table of one rank."""
-    return table_of(study, 1)
+    return results_of(study).replicates
 
 
-@pytest.mark.parametrize("size", [2, 3, 7, 100])
-def test_the_number_of_ranks_changes_nothing(study, alone, size):
-    assert same_arrays(table_of(study, size), alone)
+@pytest.mark.parametrize("size", [2, 5, 40])
+def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone, size):
+    from flocsim.ensembles.summary import Reader
 
-
-@pytest.mark.parametrize("size", [1, 2, 5, 36, 50])
-def test_every_place_is_run_once(study, size):
-    places = [place for rank in range(size) for place in own_places(study, Rank(rank, size))]
-    assert sorted(places) == list(range(study.size))
+    start = beginning(study)
+    dealer = Dealer.of(start.found(3), [3], size)
+    desk = make_desk(study, start, Rank(0, size), dealer, Progress(study.size, True))
+    held = [desk.next_chunk(rank) for rank in range(size)]
+    rng = np.random.default_rng(size)
+    while any(held):
+        rank = rng.choice([rank for rank in range(size) if held[rank]])
+        done = worker.run_chunk(study, held[rank], study.places, lambda: False, 1e-9, "key")
+        desk.hand_in(rank, done, False)
+        held[rank] = desk.next_chunk(rank)
+        held = [chunk or desk.next_chunk(other) for other, chunk in enumerate(held)]
+    assert dealer.left == 0
+    assert desk.computed == study.size
+    assert same_arrays(Reader(start.store, study.shape).arrays(alone), alone)
 
 
 def test_angles_are_the_same_in_all_conditions(alone):
@@ -63,31 +81,54 @@ def test_angles_are_the_same_in_all_conditions(alone):
 
 
 def test_more_replicates_leave_the_first_ones_as_they_are(tmp_path, alone):
-    fewer = table_of(small_study(tmp_path, {"replicates": 2}), 1)
+    fewer = results_of(small_study(tmp_path, {"replicates": 2})).replicates
     assert same_arrays(fewer, {name: array[..., :2] for name, array in alone.items()})
 
 
 def test_fewer_conditions_leave_the_others_as_they_are(tmp_path, alone):
     fewer = {"scene": {"types": ["III"], "delta": [1.0]}}
-    part = table_of(small_study(tmp_path, fewer), 1)
+    part = results_of(small_study(tmp_path, fewer)).replicates
     assert same_arrays(part, {name: array[1:, :, 1:] for name, array in alone.items()})
 
 
 def test_another_seed_draws_other_collisions(tmp_path, alone):
-    other = table_of(small_study(tmp_path, {"seed": 2, "shapes": {"vertices": [1]}}), 1)
-    assert not np.any(other["angle_i"] == alone["angle_i"][:, :1])
+    other = small_study(tmp_path, {"seed": 2, "shapes": {"vertices": [1]}})
+    assert not np.any(results_of(other).replicates["angle_i"] == alone["angle_i"][:, :1])
 
 
 def test_results_hold_what_was_run(study, alone, tmp_path):
-    results = results_of(study, alone, {"seed": 1})
+    results = results_of(study)
     assert (results.types, list(results.vertices)) == (("I", "III"), [1, 4, 16])
     table = tabulate(alone["outcome"], alone["inside"])
     for name in table:
         np.testing.assert_array_equal(results.probabilities[name], table[name])
     assert table["n_total"].sum() == 36
+    assert results.flocs == tuple(floc.name for floc in study.flocs)
     write_results(tmp_path / "a.h5", results)
     again = read_results(tmp_path / "a.h5")
     assert same_arrays(again.replicates, alone)
+    assert again.flocs == results.flocs
+    assert same_arrays(again.differences, results.differences)
+    assert same_arrays(again.pooled, results.pooled)
+
+
+@pytest.mark.filterwarnings("error")
+def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    results = results_of(study)
+    path = tmp_path / "a.h5"
+    write_results(path, results)
+    with xarray.open_dataset(path, group="differences", engine="h5netcdf") as table:
+        assert table["difference"].dims == ("against", "event", "type", "vertices", "delta")
+        own = table["difference"].sel(
+            against="delta", event="inside", type="I", vertices=4, delta=0
+        )
+        assert own == 0.0
+    with xarray.open_dataset(path, group="pooled", engine="h5netcdf") as table:
+        assert table["pr_a"].sel(type="I", vertices=1) == results.pooled["pr_a"][0, 0]
+    with xarray.open_dataset(path, group="flocs", engine="h5netcdf") as table:
+        assert list(table["floc"].values) == list(results.flocs)
 
 
 def test_run_is_the_whole_way(tmp_path, capsys):
@@ -95,7 +136,7 @@ def test_run_is_the_whole_way(tmp_path, capsys):
     config = small_study(tmp_path, spheres).config
     results = run(config)
     assert capsys.readouterr().out == ""
-    assert same_arrays(results.replicates, table_of(Study(config), 1))
+    assert same_arrays(results.replicates, results_of(Study(config)).replicates)
     assert (results.run["ranks"], results.run["preset"]) == (1, "tang2014")
     assert results.run["wall_time"] > 0.0
     for name, part in (("a.h5", results), ("b.h5", run(config))):
@@ -106,4 +147,4 @@ def test_run_is_the_whole_way(tmp_path, capsys):
 def test_the_run_is_announced_in_one_line(study):
     line = "36 replicates: 2 types x 3 numbers of vertices x 2 displacements x 3, on "
     assert describe(study, Alone()) == line + "1 rank"
-    assert describe(study, Rank(0, 4)) == line + "4 ranks"
+    assert describe(study, Rank(0, 4), 7) == line + "4 ranks; 7 of them exist already"

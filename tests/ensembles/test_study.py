@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from small_study import small_config, small_study
 
+from flocsim.ensembles import scene
 from flocsim.ensembles.sampling import draws
-from flocsim.ensembles.study import ROW, Study
+from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.io.results_schema import REPLICATES
 
@@ -21,13 +22,29 @@ def test_shape_and_size(study):
     assert study.size == 36
 
 
-def test_places_run_through_replicates_first(study):
-    expected = study.run(1, 4, 1.0, 2)
-    place = int(np.ravel_multi_index((1, 1, 1, 2), study.shape))
-    row = np.array([study.run_place(place)], dtype=ROW)[0]
-    assert row["place"] == place
-    for name in REPLICATES:
-        np.testing.assert_equal(row[name], expected[name])
+def test_conditions_are_in_the_order_of_the_results_file(study):
+    place = int(np.ravel_multi_index((1, 1, 1), study.shape[:3]))
+    assert study.conditions[place] == ("III", 4, 1.0)
+    assert study.places[place] == (1, 4, 1.0)
+    assert len(set(study.conditions)) == len(study.places) == 12
+
+
+def test_a_row_has_all_columns_and_names_its_flocs(study):
+    row = study.run(1, 4, 1.0, 2)
+    assert set(row) == set(REPLICATES)
+    chosen = study.wardrobe.choose(draws(1, 2), *study.config.scene.conditions[1][1:])
+    assert (row["floc_i"], row["floc_j"]) == chosen
+    sphere = study.run(1, 1, 1.0, 2)
+    assert (sphere["floc_i"], sphere["floc_j"]) == (-1, -1)
+
+
+def test_a_replicate_that_is_given_up_has_no_row(study, monkeypatch):
+    monkeypatch.setattr(scene, "STEPS_AT_A_TIME", 5)
+    looks = []
+    whole = study.run(0, 4, 0.0, 0, halted=lambda: looks.append(0))
+    assert len(looks) > 2
+    np.testing.assert_equal(whole, study.run(0, 4, 0.0, 0))
+    assert study.run(0, 4, 0.0, 0, halted=lambda: True) is None
 
 
 def test_an_encounter_is_made_once_for_each_pair_of_shapes(study):

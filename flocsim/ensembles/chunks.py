@@ -1,0 +1,82 @@
+"""Chunks: runs of replicates of one condition, the unit of handing out, writing and resuming."""
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+
+from flocsim.io.records import CHUNK, encode
+from flocsim.io.results_schema import REPLICATES, ROW_SIZE
+
+MOST_ROWS = 16_384
+"""Rows of the longest chunk, 1.8 MB."""
+
+ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()])
+"""One replicate: its row of the results file."""
+
+SIZES = [ROW[name].itemsize for name in ROW.names]
+STARTS = {name: sum(SIZES[:place]) for place, name in enumerate(ROW.names)}
+"""Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
+
+
+class Condition(NamedTuple):
+    """A condition by its name: collision type, number of vertices, share of δ_max."""
+
+    type: str
+    vertices: int
+    delta: float
+
+
+class Chunk(NamedTuple):
+    """Replicates ``first`` to ``stop`` − 1 of the condition at a place of the study's list."""
+
+    condition: int
+    first: int
+    stop: int
+
+
+def chunk_record(condition, first, rows, identity, notes=()):
+    """The record of finished rows, for the journal: column by column.
+
+    ``identity`` is the digest of all that the rows follow from; ``notes`` tell of failed ones.
+    """
+    description = {**condition._asdict(), "first": first, "count": len(rows), "identity": identity}
+    if notes:
+        description["notes"] = list(notes)
+    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in ROW.names))
+
+
+def condition_of(description):
+    """The Condition that a chunk's description names."""
+    return Condition(description["type"], description["vertices"], description["delta"])
+
+
+def named(description):
+    """A chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
+    if description is None or "first" not in description:
+        return "what it held is unknown"
+    last = description["first"] + description["count"] - 1
+    return (
+        f"type {description['type']}, N = {description['vertices']}, delta "
+        f"{description['delta']:g}, replicates {description['first']} to {last}"
+    )
+
+
+def column_place(description, offset, name, first, stop):
+    """(offset, length) of a part of a column in a journal; ``offset`` is that of the chunk's data.
+
+    ``first`` and ``stop`` are numbers of replicates.
+    """
+    size = ROW[name].itemsize
+    place = offset + description["count"] * STARTS[name]
+    return place + size * (first - description["first"]), size * (stop - first)
+
+
+def fits(description, length):
+    """Whether a chunk's data are as long as its description says."""
+    return length == description["count"] * ROW_SIZE
+
+
+def layout():
+    """The columns of a chunk as text, to tell another version's."""
+    return json.dumps([[name, ROW[name].str] for name in ROW.names])

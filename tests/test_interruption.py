@@ -1,0 +1,58 @@
+"""Signals: noted by a thread, answered in time, whatever the main thread is doing."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+WAITS = """\
+import sys, time
+from flocsim import interruption
+interruption.install()
+print("ready", flush=True)
+until = time.monotonic() + 20
+while not interruption.stop_requested() and time.monotonic() < until:
+    time.sleep(0.01)
+print(interruption.INTERRUPTION.name, flush=True)
+sys.exit(interruption.STOPPED)
+"""
+
+DEAF = WAITS[: WAITS.index("until")] + "time.sleep(20)\n" * 2
+"""A main thread that hears nothing."""
+
+
+def started(code):
+    """A process that is ready for signals."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
+def test_a_signal_is_a_request(sign):
+    process = started(WAITS)
+    process.send_signal(sign)
+    output, errors = process.communicate(timeout=20)
+    assert (process.returncode, output, errors) == (75, f"{sign.name}\n", "")
+
+
+def test_a_process_that_does_not_answer_is_ended_in_time():
+    process = started(DEAF)
+    began = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=20)
+    assert time.monotonic() - began < 10.0
+    assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")
+
+
+def test_a_second_signal_ends_it_at_once():
+    process = started(DEAF)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=20)
+    assert process.returncode == 130
