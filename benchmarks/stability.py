@@ -1,6 +1,6 @@
 """The stability table: cases over the whole range of the model, each right or clearly failed.
 
-    python benchmarks/stability.py [--quick] [--cases 2000] [--case 1234] [--markdown FILE]
+    python benchmarks/stability.py [--quick] [--cases 2000] [--case 1234] [--markdown]
 
 draws the cases with a fixed seed, runs each in a process that is killed after --limit seconds, and
 holds it against a reference (see stability_cases.py) and against invariants. --case reruns one case
@@ -21,6 +21,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "tests"), str(HERE.parent)]
 
 import attrs  # noqa: E402
+from reporting import commit  # noqa: E402
 from stability_cases import FAMILIES, case_of, family_of  # noqa: E402
 from stability_report import BAD, decile_rows, family_rows, offenders, table  # noqa: E402
 from stability_verdict import judge  # noqa: E402
@@ -37,7 +38,7 @@ def arguments():
     parser.add_argument("--limit", type=float, default=30.0, help="seconds for a case")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--family", choices=list(FAMILIES), help="cases of this family only")
-    parser.add_argument("--markdown", help="also write the tables to this file")
+    parser.add_argument("--markdown", action="store_true", help="the tables are so anyway")
     parser.add_argument("--save", help="also write every verdict to this file, one JSON a line")
     parser.add_argument("--again", help="rerun the offenders of such a file only")
     return parser.parse_args()
@@ -96,7 +97,7 @@ def main():
     found.sort(key=lambda verdict: verdict.index)
     text = "\n\n".join(
         [
-            f"`{' '.join(['python', *sys.argv])}`: {len(found)} cases in "
+            f"commit {commit()}: {' '.join(['python', *sys.argv])}: {len(found)} cases in "
             f"{time.monotonic() - began:.0f} s",
             table(*family_rows(found)),
             table(*decile_rows(found)),
@@ -107,8 +108,6 @@ def main():
     if options.save:
         lines = [json.dumps(attrs.asdict(verdict), default=float) for verdict in found]
         Path(options.save).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    if options.markdown:
-        Path(options.markdown).write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
