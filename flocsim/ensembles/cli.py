@@ -24,7 +24,9 @@ def add_arguments(parser):
     )  # fmt: skip
     parser.add_argument("--seed", type=int, help="seed, instead of the config's")
     parser.add_argument("--replicates", type=int, help="replicates, instead of the config's")
-    parser.add_argument("--output", metavar="FILE", help="results file, instead of the config's")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="results file, instead of the config's"
+    )
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
     )
