@@ -135,7 +135,7 @@ class IntegratorConfig:
         default="implicit", help="implicit, overdamped, dormand_prince54 or velocity_verlet"
     )
     tolerance: float = quantity(
-        "m", above=0.0, default=1e-8, help="largest error of a step, what it leads to included"
+        "m", above=0.0, default=1e-9, help="largest error of a step, what it leads to included"
     )
     max_steps: int = whole(
         1, MOST_STEPS, default=200_000, help="steps after which a replicate ends undecided"

@@ -120,7 +120,7 @@ class DormandPrince54(Integrator):
     Source: Dormand & Prince (1980), as in Hairer, Nørsett & Wanner (1993), table II.5.2.
     """
 
-    tolerance: float = quantity("m", above=0.0, default=1e-8)
+    tolerance: float = quantity("m", above=0.0, default=1e-9)
     first_step: float = quantity("s", above=0.0, default=1e-6)
 
     @property
