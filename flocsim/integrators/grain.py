@@ -46,7 +46,8 @@ def switch_share(scene, work, memo, clock, step):
     locate_contacts(scene, work, NEW)
     if clock[TOLERANCE] < math.inf or awaits_touch(memo):
         grain = grain_of(work, clock)
-        depth = grain if deepest_overlap(work) > 0.0 else max(grain, SHALLOWEST_TOUCH)
+        shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
+        depth = grain if deepest_overlap(work) > 0.0 else max(grain, shallowest)
         share = first_switch(scene, work, step, grain, depth)
         return kink_share(scene, work, share) if share > 1.0 else share
     return math.inf

@@ -131,12 +131,10 @@ def crossing(scene, work, step, row, rival, high, grain):
 def least_depth(scene, work, step, row, grain, depth):
     """The overlap at the end of a step below which an open pair has not touched yet [m].
 
-    One that goes on approaching, or was as near before, has, however little it overlaps by now.
+    One that goes on approaching has, however little it overlaps by now.
     """
     approach = -step * normal_rate(work, NEW, row)
-    if approach > depth or work.geometry[NOW, row, 2] < depth:
-        return touch_grain(scene, work, NEW, row, grain)
-    return depth
+    return touch_grain(scene, work, NEW, row, grain) if approach > depth else depth
 
 
 def switch_of(scene, work, step, row, rival, earliest, grain, depth):
