@@ -95,7 +95,7 @@ def test_an_unfinished_run_is_in_the_way_of_a_new_one(stopped, whole):
         ({"seed": 2}, "seed is 1 in the file, 2 now"),
         ({"forces": {"contact": {"k_n": 30.0}}}, "forces.contact.k_n is 20.0 in the file, 30.0"),
         ({"forces": {"gravity": {"g": 9.8}}}, "forces.gravity.g is 9.81 in the file, 9.8 now"),
-        ({"integrator": {"tolerance": 1e-9}}, "integrator.tolerance is 1e-08 in the file, 1e-09"),
+        ({"integrator": {"tolerance": 1e-8}}, "integrator.tolerance is 1e-09 in the file, 1e-08"),
         ({"scene": {"receiver": "fixed"}}, 'scene.receiver is "free" in the file, "fixed" now'),
         ({"shapes": {"vertices": [1], "radius": 5e-7}}, "shapes.radius is 1e-06 in the file"),
     ],
