@@ -135,6 +135,17 @@ def run_readings(arguments):
     return paths
 
 
+def draw_trajectory(path, replicate, changes):
+    """Fig. 7 for one replicate of Type I, N = 64, δ = 0: frames, distance, forces, animation."""
+    if path.with_suffix(".gif").exists():
+        return
+    flocsim(
+        "trajectory", STUDY, *settings(changes), "--scene", "I,64,0", "--replicate", replicate,
+        "-o", path.with_suffix(".png"), "--distance", f"{path}-distance.png",
+        "--forces", f"{path}-forces.png", "--animation", path.with_suffix(".gif"),
+    )  # fmt: skip
+
+
 def main():
     """All steps."""
     arguments = parse_arguments()
@@ -155,17 +166,9 @@ def main():
     tighter = changes | {"integrator": {"tolerance": tolerance}}
     ensemble(arguments, folder / "check.h5", checked, tighter)
     readings = run_readings(arguments) if arguments.readings else {}
-    errors = folder / "errors.h5"
-    pages.write(folder, errors if arguments.images else None, readings)
+    pages.write(folder, folder / "errors.h5" if arguments.images else None, readings)
     for name, replicate in pages.examples_of_classes(folder / "study.h5").items():
-        scene = f"I,{pages.MOST_VERTICES},0.0"
-        draw = [folder / f"figure-7-{name}{end}" for end in (".png", "-distance.png", "-forces.png",
-                                                              ".gif")]  # fmt: skip
-        flocsim(
-            "trajectory", arguments.output / "study.toml", "--scene", scene,
-            "--replicate", replicate, "--frames", 6, "-o", draw[0], "--distance", draw[1],
-            "--forces", draw[2], "--animation", draw[3],
-        )  # fmt: skip
+        draw_trajectory(folder / f"figure-7-{name}", replicate, changes)
 
 
 if __name__ == "__main__":
