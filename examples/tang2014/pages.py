@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 
-from flocsim.ensembles.claims import check_claims
+from flocsim.ensembles.claims import FIT_CLAIMS, check_claims
 from flocsim.ensembles.claims.table import claims_table, verdicts_table
 from flocsim.ensembles.config import IntegratorConfig
 from flocsim.ensembles.flips import flips_between, share
@@ -38,7 +38,7 @@ def write(folder, library, readings):
     write_probabilities(folder / "probabilities.csv", study, flips)
     write_claims(folder / "claims.md", study, entries, flips)
     if readings:
-        write_readings(folder / "readings.md", readings, entries)
+        write_readings(folder / "readings.md", readings)
 
 
 def save_all(folder, name, figure):
@@ -57,8 +57,7 @@ def draw_results(folder, study, check, flips):
         changed = getattr(flips, kind)
         for place, axes in enumerate(figure.axes[: len(study.types)]):
             text = flip_text(changed[place] & among[place], among[place])
-            axes.text(0.98, 0.02, text, transform=axes.transAxes, ha="right", va="bottom",
-                      fontsize=6, color="0.35")  # fmt: skip
+            axes.set_title(text, loc="right", fontsize=6, color="0.35")
         save_all(folder, name, figure)
 
 
@@ -120,14 +119,14 @@ def counts_text(results):
     return ", ".join(counts)
 
 
-def write_readings(path, readings, entries):
-    """Claims against readings; the fits are the same for all but their own reading."""
+def write_readings(path, readings):
+    """The claims about collisions against the readings."""
     results = {name: read_results(file) for name, file in readings.items()}
-    found = {name: check_claims(each, entries) for name, each in results.items()}
+    found = {name: check_claims(each)[len(FIT_CLAIMS) :] for name, each in results.items()}
     lines = [verdicts_table(found), ""]
     lines += [f"- {name}: {counts_text(each)}" for name, each in results.items()]
     for name, findings in found.items():
-        lines += ["", f"## {name}", "", claims_table(findings[5:])]
+        lines += ["", f"## {name}", "", claims_table(findings)]
     path.write_text("\n".join(lines) + "\n", "utf-8")
     print(path)
 
