@@ -146,9 +146,21 @@ def draw_trajectory(path, replicate, changes):
     )  # fmt: skip
 
 
+def refuse_launchers():
+    """This script starts the launcher for the steps that have work for many ranks."""
+    from flocsim.ensembles.team import launched_rank, launched_size
+
+    if launched_size() not in (0, 1):
+        if launched_rank() == 0:
+            text = 'start it once, with --launch "mpirun -n 2", not under mpirun itself'
+            print(f"reproduce.py: {text}", file=sys.stderr)
+        sys.exit(2)
+
+
 def main():
     """All steps."""
     arguments = parse_arguments()
+    refuse_launchers()
     sys.path.insert(0, str(HERE))
     import pages
 

@@ -1,6 +1,7 @@
 """examples/tang2014/reproduce.py: the whole study, reduced, and what it leaves behind."""
 
 import csv
+import os
 import subprocess
 import sys
 import tomllib
@@ -16,10 +17,10 @@ FOLDER = ROOT / "examples" / "tang2014"
 READINGS = tomllib.loads((FOLDER / "readings.toml").read_text("utf-8"))
 
 
-def reproduce(folder, *words):
+def reproduce(folder, *words, env=None):
     """Run the script; the finished process."""
     script = [sys.executable, FOLDER / "reproduce.py", "-o", folder / "out", "--jobs", "1"]
-    return subprocess.run([*script, *words], capture_output=True, text=True, timeout=300)
+    return subprocess.run([*script, *words], capture_output=True, text=True, timeout=300, env=env)
 
 
 def test_the_study_is_the_papers():
@@ -68,3 +69,12 @@ def test_a_failing_step_ends_the_study(tmp_path):
     assert done.returncode == 2
     assert "nowhere" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_it_is_not_started_under_a_launcher(tmp_path):
+    done = reproduce(tmp_path, env=os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0"})
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        'reproduce.py: start it once, with --launch "mpirun -n 2", not under mpirun itself'
+    ]
+    assert not (tmp_path / "out").exists()
