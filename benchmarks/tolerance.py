@@ -11,9 +11,9 @@ import sys
 
 import numpy as np
 
+from flocsim.ensembles.flips import flips_between, share
 from flocsim.ensembles.loader import load_config
 from flocsim.ensembles.runner import run
-from flocsim.io.results import CLASSES
 
 
 def commit():
@@ -30,19 +30,18 @@ def study(arguments, tolerance):
     return run(load_config(arguments.config, changes))
 
 
-def share(changed, among):
-    """Percent of the cells in ``among`` that have changed."""
-    return 100.0 * np.count_nonzero(changed & among) / max(np.count_nonzero(among), 1)
-
-
 def compare(found, exact):
     """(aggregation flips, zone flips, any flips below the largest δ) in percent."""
-    a, b = found.replicates["outcome"], exact.replicates["outcome"]
-    decided = (a < len(CLASSES)) & (b < len(CLASSES))
-    polygons = np.broadcast_to((found.vertices > 1)[None, :, None, None], a.shape)
-    inner = np.broadcast_to((found.delta < found.delta.max())[None, None, :, None], a.shape)
-    zone = found.replicates["inside"] != exact.replicates["inside"]
-    return share(a % 2 != b % 2, decided), share(zone, decided), share(a != b, polygons & inner)
+    flips = flips_between(found, exact)
+    polygons = (found.vertices > 1)[None, :, None, None]
+    inner = (found.delta < found.delta.max())[None, None, :, None]
+    among = np.broadcast_to(polygons & inner, flips.outcome.shape)
+    changed = found.replicates["inside"] != exact.replicates["inside"]
+    return (
+        share(flips.aggregation, flips.both),
+        share(changed, flips.both),
+        share(flips.outcome, among),
+    )
 
 
 def main():

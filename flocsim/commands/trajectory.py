@@ -6,6 +6,8 @@ import attrs
 
 from flocsim.errors import UsageError
 
+ANIMATION_FRAMES = 60
+
 
 def add_parser(subparsers):
     """Add the subcommand to argparse's ``subparsers``."""
@@ -30,6 +32,12 @@ def add_parser(subparsers):
     parser.add_argument(
         "--distance", metavar="FILE", help="also draw the centre distance against time"
     )
+    parser.add_argument("--forces", metavar="FILE", help="also draw the forces against time")
+    parser.add_argument("--animation", metavar="FILE.gif", help="also write an animation")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's, as in flocsim ensemble; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
     return parser
@@ -114,6 +122,44 @@ def strip_path(args):
     return Path(args.output or f"trajectory-{args.replicate}.png")
 
 
+def overrides(args):
+    """The command line's values as a nested dict over the config's."""
+    from flocsim.ensembles.settings import nested, parsed
+
+    given = nested(map(parsed, args.settings))
+    return given if args.seed is None else given | {"seed": args.seed}
+
+
+def check_animation(path):
+    """UsageError for an animation whose name does not end in .gif."""
+    if path and Path(path).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {path} must end in .gif")
+
+
+def draw_more(args, encounter, arrays, row, title):
+    """Draw the forces and the animation where asked for; the paths written."""
+    from flocsim.ensembles.frames import frames_of
+    from flocsim.ensembles.loads import loads_of
+    from flocsim.io.plots import draw_forces, save, write_animation
+
+    times, position, _ = arrays
+    if args.forces:
+        instants, loads = loads_of(encounter, *arrays)
+        save(draw_forces(instants, loads, row["t_collision"], title), Path(args.forces))
+    if args.animation:
+        frames = frames_of(encounter.shapes, times, position, row["t_collision"], ANIMATION_FRAMES)
+        distance = centre_distance(position)
+        write_animation(args.animation, frames, (times, distance), encounter.zone_distance, title)
+    return [Path(path) for path in (args.forces, args.animation) if path]
+
+
+def centre_distance(position):
+    """d_c (k,) [m]."""
+    import numpy as np
+
+    return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+
+
 def draw(args, frames, motion, zone, title):
     """Draw and save what was asked for; the paths written."""
     from flocsim.io.plots import draw_distance, draw_strip, save
@@ -134,8 +180,6 @@ def draw(args, frames, motion, zone, title):
 
 def run(args):
     """Run the replicate, draw it, print what happened; the exit code."""
-    import numpy as np
-
     from flocsim.ensembles.frames import frames_of
     from flocsim.ensembles.loader import load_config
     from flocsim.ensembles.preflight import check_study
@@ -144,23 +188,26 @@ def run(args):
     from flocsim.ensembles.study import Study
     from flocsim.io.trajectory import write_trajectory
 
-    config = load_config(args.config, {} if args.seed is None else {"seed": args.seed})
+    config = load_config(args.config, overrides(args))
     take_scene(args)
     place = select(config, args)
     check_study(config)
-    figures = [path for path in (strip_path(args), args.distance) if path]
-    check_outputs(args.config, figures, [args.save] if args.save else [])
+    figures = [path for path in (strip_path(args), args.distance, args.forces) if path]
+    check_animation(args.animation)
+    check_outputs(args.config, figures, [path for path in (args.animation, args.save) if path])
     study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)
     encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))
     times, position, velocity = record.arrays()
     frames = frames_of(encounter.shapes, times, position, row["t_collision"], args.frames)
-    distance = np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+    distance = centre_distance(position)
     title = describe(config, place, args.replicate, row)
     print(title)
     zone = encounter.zone_distance
-    for path in draw(args, frames, (times, distance), zone, title.split(";")[0]):
+    short = title.split(";")[0]
+    written = draw(args, frames, (times, distance), zone, short)
+    for path in written + draw_more(args, encounter, record.arrays(), row, short):
         print(path)
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate, "zone_distance": zone}

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from flocsim.errors import UsageError
 from flocsim.io.files import replace_file
+from flocsim.io.plot_animation import write_animation
+from flocsim.io.plot_forces import draw_forces
 from flocsim.io.plot_panels import figure_4, figure_5, figure_6, figure_8, overview
 from flocsim.io.plot_population import POPULATION_FIGURES, figure_2, figure_3
 from flocsim.io.plot_style import house_style
@@ -19,6 +21,7 @@ __all__ = [
     "FORMATS",
     "POPULATION_FIGURES",
     "draw_distance",
+    "draw_forces",
     "draw_strip",
     "figure_2",
     "figure_3",
@@ -28,6 +31,7 @@ __all__ = [
     "figure_8",
     "overview",
     "save",
+    "write_animation",
 ]
 
 FIGURES = {"4": figure_4, "5": figure_5, "6": figure_6, "8": figure_8, "overview": overview}

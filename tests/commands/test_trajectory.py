@@ -40,6 +40,24 @@ def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
     assert seal(sealed) == (folder / "motion.h5").read_bytes()
 
 
+def test_forces_and_an_animation(folder, capsys):
+    from PIL import Image
+
+    words = ["--type", "III", "--vertices", 4, "--forces", "f.png", "--animation", "a.gif"]
+    code, output, errors = call(capsys, "small.toml", *words, "--set", "scene.start_gap=1e-6")
+    assert (code, errors, output[2:]) == (0, [], ["f.png", "a.gif"])
+    with Image.open(folder / "a.gif") as animation:
+        assert animation.n_frames > 20
+        assert animation.info["loop"] == 0
+
+
+def test_set_changes_the_scene(folder, capsys):
+    lines = [call(capsys, "small.toml", "--vertices", 4, *more)[1][0]
+             for more in ([], ["--set", "zone.root=inner"])]  # fmt: skip
+    assert lines[0].split(";")[1] == lines[1].split(";")[1]  # the same touch
+    assert [line.split(";")[0][-1] for line in lines] == ["A", "C"]
+
+
 def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
     from flocsim.ensembles.cli import main as ensemble
     from flocsim.io.results import read_results
@@ -136,6 +154,12 @@ def test_wrong_configs_are_one_line(folder, capsys, changes, said):
     code, output, errors = call(capsys, "small.toml")
     assert (code, output, len(errors)) == (2, [], 1)
     assert errors[0].startswith(said)
+
+
+def test_an_animation_is_a_gif(folder, capsys):
+    code, output, errors = call(capsys, "small.toml", "--animation", "a.mp4")
+    assert (code, output) == (2, [])
+    assert errors == ["flocsim: --animation a.mp4 must end in .gif"]
 
 
 def test_numbers_of_the_line_are_finite_and_in_order(folder, capsys):

@@ -1,0 +1,187 @@
+"""The study of Tang, Alonso-Marroquín & Maggi (2014): shapes, collisions, figures, claims.
+
+    python examples/tang2014/reproduce.py --images DIR… --launch "mpirun -n 2"
+    python examples/tang2014/reproduce.py --replicates 100 --jobs 2      # synthetic flocs, reduced
+
+Each step shows its command and leaves its files in the output folder; what is finished is not done
+again, and what was interrupted goes on, so the same command resumes.
+"""
+
+import argparse
+import shlex
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+STUDY, READINGS = HERE / "study.toml", HERE / "readings.toml"
+CHECKED_SHARE = 0.05
+"""Share of the replicates that is run again for the numerical error."""
+TIGHTER = 0.01
+"""Factor on the tolerance there."""
+READING_VERTICES = (1, 4, 16, 64)
+ERROR_RADII = "1,2,4"
+ERROR_VERTICES = "4,8,16,28,40,52,64"
+"""Of the fits for Fig. 3."""
+
+
+def parse_arguments():
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--images", nargs="+", metavar="DIR", help="pictures of flocs, or masks")
+    parser.add_argument("--masks", action="store_true", help="the images are masks")
+    parser.add_argument("--pixel-size", default="0.95e-6", metavar="METRES")
+    parser.add_argument("--replicates", type=int, default=1000, help="default: %(default)s")
+    parser.add_argument("--vertices", metavar="LIST", help="instead of the study's, e.g. 1,4,16,64")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes, without MPI")
+    parser.add_argument("--launch", metavar="COMMAND", help='e.g. "mpirun -n 2" or "srun"')
+    parser.add_argument("--readings", action="store_true", help="run the other readings too")
+    parser.add_argument("--reading-replicates", type=int, default=100, metavar="N")
+    parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
+    return parser.parse_args()
+
+
+def call(*words):
+    """Show a command, run it; whatever goes wrong there ends this one with its exit code."""
+    print("$ " + shlex.join(map(str, words)), flush=True)
+    began = time.monotonic()
+    code = subprocess.run([str(word) for word in words]).returncode
+    if code != 0:
+        sys.exit(code)
+    print(f"  {time.monotonic() - began:.0f} s", flush=True)
+
+
+def flocsim(*words):
+    """Run a subcommand of flocsim."""
+    call(sys.executable, "-m", "flocsim", *words)
+
+
+def fit(arguments, output, vertices, radius, *more):
+    """Fit a shape library, unless it is there."""
+    if output.exists():
+        return
+    masks = ["--masks"] if arguments.masks else []
+    flocsim(
+        "fit", *arguments.images, *masks, "--pixel-size", arguments.pixel_size,
+        "--vertices", vertices, "--radius", radius, "--jobs", arguments.jobs, *more, "-o", output,
+    )  # fmt: skip
+
+
+def fit_all(arguments, vertices):
+    """The libraries of the study, of Fig. 3, and of the readings."""
+    folder = arguments.output
+    polygons = ",".join(str(n) for n in vertices if n > 1)
+    fit(arguments, folder / "shapes.h5", polygons, "1")
+    fit(arguments, folder / "errors.h5", ERROR_VERTICES, ERROR_RADII)
+    if arguments.readings:
+        few = ",".join(str(n) for n in READING_VERTICES if n > 1)
+        fit(arguments, folder / "area.h5", few, "1", "--preserve-area")
+
+
+def settings(table, prefix=""):
+    """A nested table as --set words."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from settings(value, f"{prefix}{key}.")
+        else:
+            shown = str(list(value)) if isinstance(value, list | tuple) else toml_scalar(value)
+            yield from ("--set", f"{prefix}{key}={shown}")
+
+
+def toml_scalar(value):
+    """A flag, text or number as TOML writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def ensemble(arguments, output, replicates, changes):
+    """Run the study with changes into a results file, or go on with it."""
+    launch = shlex.split(arguments.launch) if arguments.launch else []
+    jobs = [] if launch else ["--jobs", arguments.jobs]
+    call(
+        *launch, sys.executable, "-m", "flocsim.ensemble", STUDY, *settings(changes), *jobs,
+        "--replicates", replicates, "--output", output, "--resume", "--quiet",
+    )  # fmt: skip
+
+
+def changes_of(arguments, vertices, more=None):
+    """What a run changes of study.toml: shapes and a reading, as one nested table."""
+    more = dict(more or {})
+    shapes = {"vertices": vertices} | more.pop("shapes", {})
+    if arguments.images:
+        file = arguments.output / shapes.get("file", "shapes.h5")
+        shapes |= {"source": "library", "file": str(file.resolve())}
+    return {"shapes": shapes} | more
+
+
+def readings_of(arguments):
+    """{name: changes} of the readings that can be run: fits need images."""
+    readings = tomllib.loads(READINGS.read_text("utf-8"))
+    return {n: c for n, c in readings.items() if arguments.images or "shapes" not in c}
+
+
+def run_readings(arguments):
+    """Run every reading, and the study's own with the same few N."""
+    paths = {}
+    for name, more in {"tang2014": {}, **readings_of(arguments)}.items():
+        paths[name] = arguments.output / f"reading-{name.replace(' ', '-')}.h5"
+        changes = changes_of(arguments, READING_VERTICES, more)
+        ensemble(arguments, paths[name], arguments.reading_replicates, changes)
+    return paths
+
+
+def draw_trajectory(path, replicate, changes):
+    """Fig. 7 for one replicate of Type I, N = 64, δ = 0: frames, distance, forces, animation."""
+    if path.with_suffix(".gif").exists():
+        return
+    flocsim(
+        "trajectory", STUDY, *settings(changes), "--scene", "I,64,0", "--replicate", replicate,
+        "-o", path.with_suffix(".png"), "--distance", f"{path}-distance.png",
+        "--forces", f"{path}-forces.png", "--animation", path.with_suffix(".gif"),
+    )  # fmt: skip
+
+
+def refuse_launchers():
+    """This script starts the launcher for the steps that have work for many ranks."""
+    from flocsim.ensembles.team import launched_rank, launched_size
+
+    if launched_size() not in (0, 1):
+        if launched_rank() == 0:
+            text = 'start it once, with --launch "mpirun -n 2", not under mpirun itself'
+            print(f"reproduce.py: {text}", file=sys.stderr)
+        sys.exit(2)
+
+
+def main():
+    """All steps."""
+    arguments = parse_arguments()
+    refuse_launchers()
+    sys.path.insert(0, str(HERE))
+    import pages
+
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    study = tomllib.loads(STUDY.read_text("utf-8"))
+    vertices = study["shapes"]["vertices"]
+    if arguments.vertices:
+        vertices = [int(word) for word in arguments.vertices.split(",")]
+    if arguments.images:
+        fit_all(arguments, vertices)
+    folder, changes = arguments.output, changes_of(arguments, vertices)
+    ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
+    checked = max(1, round(CHECKED_SHARE * arguments.replicates))
+    tolerance = TIGHTER * study.get("integrator", {}).get("tolerance", pages.default_tolerance())
+    tighter = changes | {"integrator": {"tolerance": tolerance}}
+    ensemble(arguments, folder / "check.h5", checked, tighter)
+    readings = run_readings(arguments) if arguments.readings else {}
+    pages.write(folder, folder / "errors.h5" if arguments.images else None, readings)
+    for name, replicate in pages.examples_of_classes(folder / "study.h5").items():
+        draw_trajectory(folder / f"figure-7-{name}", replicate, changes)
+
+
+if __name__ == "__main__":
+    main()
