@@ -21,6 +21,7 @@ from pathlib import Path
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint, reached, refuse_closure
 from flocsim.linking import pipeline
+from flocsim.typing_memory import quick_typing
 
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
@@ -158,6 +159,9 @@ def guarded(dispatcher, compiler_error):
 
     def call(*arguments):
         try:
+            if not dispatcher.signatures:
+                with quick_typing():
+                    dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments)))
             return dispatcher(*arguments)
         except compiler_error as error:
             raise KernelError(compiler_complaint(str(error))) from None

@@ -32,6 +32,7 @@ ROWS = [
     [
         "composer",
         "linking",
+        "typing_memory",
         "fingerprint",
         "slots",
         "layout",
@@ -46,6 +47,7 @@ SIBLING_IMPORTS = {
     ("composer", "errors"),
     ("composer", "fingerprint"),
     ("composer", "linking"),
+    ("composer", "typing_memory"),
     ("fingerprint", "errors"),
     ("fields", "errors"),
 }
