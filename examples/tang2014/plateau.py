@@ -6,8 +6,10 @@ The explanation: the attraction is held at its cut-off d_min, so that it is at m
 H_A r*/(6 d_min²); a pair is bound if that exceeds the largest load L of settling and if the pair,
 turning, brings its centres to where the attraction exceeds L, which is geometry. It predicts that
 
-1. the transition lies at H* = 6 d_min² L/r*: curves for several d_min are one against H_A/H*;
-2. at the preset a replicate aggregates if and only if its d_c comes below r_i + r_j + d*, where
+1. equivalent spheres, which always come near enough, aggregate always above H* = 6 d_min² L/r*
+   and never below;
+2. so do spheropolygons, as far as they come near: curves for several d_min are one against H_A/H*;
+3. at the preset a replicate aggregates if and only if its d_c comes below r_i + r_j + d*, where
    H_A r*/(6 d*²) = L.
 
 Writes plateau.png, .pdf and plateau.md.
@@ -65,6 +67,30 @@ def cut_off_sweeps(make, pairs):
                         ))  # fmt: skip
             found.append((cut_off, kind, critical, one))
     return found
+
+
+def sphere_transition(make, kind, critical, cut_off):
+    """(low, high) of H_A/H*: equivalent spheres depart at the one and aggregate at the other."""
+    low, high = 0.1, 10.0
+    scene = {"scene": {"types": [TYPES[kind]]}, "shapes": {"vertices": [1]}}
+    while high > 1.01 * low:
+        middle = float(np.sqrt(low * high))
+        config = attraction_at(lambda change: make(scene, change), middle * critical, cut_off)
+        bound = Study(config).run(0, 1, SHARE, 0)["outcome"] in (0, 2)
+        low, high = (low, middle) if bound else (middle, high)
+    return low, high
+
+
+def spheres_table(make, pairs):
+    """Where equivalent spheres begin to aggregate."""
+    rows = []
+    for cut_off in CUT_OFFS:
+        for kind, (reduced, load) in enumerate(pairs):
+            critical = 6.0 * cut_off**2 * load / reduced
+            low, high = sphere_transition(make, kind, critical, cut_off)
+            rows.append((f"{1e9 * cut_off:g}", TYPES[kind], f"{critical:.3g}",
+                         f"{low:.3f} to {high:.3f}"))  # fmt: skip
+    return markdown(("d_min [nm]", "type", "H* [J]", "never below, always above H_A/H*"), rows)
 
 
 def sweeps_table(found):
@@ -170,7 +196,8 @@ def main():
     swept = cut_off_sweeps(make, pairs)
     for ending in ("png", "pdf"):
         save(figure(swept, found[SHOWN], reaches[SHOWN]), arguments.output / f"plateau.{ending}")
-    text = f"<!-- cut-offs -->\n\n{sweeps_table(swept)}\n\n<!-- end -->\n\n"
+    text = f"<!-- spheres -->\n\n{spheres_table(make, pairs)}\n\n<!-- end -->\n\n"
+    text += f"<!-- cut-offs -->\n\n{sweeps_table(swept)}\n\n<!-- end -->\n\n"
     text += f"<!-- approaches -->\n\n{table}\n\n<!-- end -->\n"
     (arguments.output / "plateau.md").write_text(text, "utf-8")
     print(text)

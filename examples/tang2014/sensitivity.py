@@ -113,7 +113,7 @@ def write_points(path, sweeps):
 
 
 def transitions(sweeps):
-    """A table: where Pr[A] has made 5, 50 and 95 % of its way between the ends of a sweep."""
+    """A table: where Pr[A] has made 5, 50 and 95 % of the ways way between the ends of a sweep."""
     rows = []
     for name, found in sweeps.items():
         kept = solid(found)
@@ -128,7 +128,7 @@ def transitions(sweeps):
         "quantity",
         "type",
         "Pr[A] from → to",
-        *(f"{100 * level:g} % of it" for level in LEVELS),
+        *(f"{100 * level:g} % of the way" for level in LEVELS),
     )
     return markdown(heads, rows)
 

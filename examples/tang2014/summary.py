@@ -2,6 +2,7 @@
 
 import numpy as np
 import steps
+from beside import beside_table
 
 from flocsim.ensembles.claims.robust import ALWAYS, contradicting
 from flocsim.ensembles.claims.table import claims_table, markdown, verdicts_table
@@ -27,6 +28,7 @@ def write_summary(folder, study, flips, findings, readings, zones):
         "flips": flips_table(flips),
         "claims": claims_table(findings),
         "against": against(study, zones),
+        "beside": beside_table(study),
     }
     if readings:
         parts["readings"] = verdicts_table({name: found for name, (_, found) in readings.items()})

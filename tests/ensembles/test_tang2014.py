@@ -59,7 +59,7 @@ def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     assert {row["run_again"] for row in rows} == {"1"}
     summary = (out / "summary.md").read_text()
     parts = re.findall(r"<!-- ([a-z-]+) -->\n\n.+?\n\n<!-- end -->", summary, re.DOTALL)
-    assert parts == ["times", "totals", "flips", "claims", "against"]
+    assert parts == ["times", "totals", "flips", "claims", "against", "beside"]
     assert "| all | 120 |" in summary
     before = (out / "study.h5").read_bytes()
     again = reproduce(tmp_path, *words)
