@@ -34,6 +34,8 @@ from flocsim.io.plots import save
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)
 """H_A/H* of the sweeps."""
+ASIDE = 1.08
+"""Factor that keeps the curves of the figure apart: they would cover each other."""
 SHARE, VERTICES = 0.5, 16
 SHOWN = 0
 """Place of the type that the figure shows."""
@@ -148,9 +150,10 @@ def figure(found, approach, reach):
         left, right = whole.subplots(1, 2)
         colours = graded_colours(len(CUT_OFFS))
         shown = [(cut_off, one) for cut_off, kind, _, one in found if kind == SHOWN]
-        for (cut_off, one), colour in zip(shown, colours, strict=True):
+        for place, ((cut_off, one), colour) in enumerate(zip(shown, colours, strict=True)):
+            shifted = RATIOS * ASIDE ** (place - 0.5 * (len(shown) - 1))
             value, low, high = (band[:, 0] for band in one.bands)
-            left.errorbar(RATIOS, value, np.clip([value - low, high - value], 0.0, None),
+            left.errorbar(shifted, value, np.clip([value - low, high - value], 0.0, None),
                           color=colour, marker="o", ms=3, lw=0.9, elinewidth=0.7,
                           label=f"{1e9 * cut_off:g} nm")  # fmt: skip
         left.set_xscale("log")
