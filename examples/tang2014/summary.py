@@ -50,6 +50,7 @@ def times(folder, study):
     rows = [(name, f"{sum(each):.0f}", len(each)) for name, each in goes.items()]
     rows.append(("all", f"{sum(sum(each) for each in goes.values()):.0f}", ""))
     where = (
+        f"**{study.count} replicates in each of {np.prod(study.shape)} conditions.** "
         f"flocsim {run['flocsim_version']}, {run['date']}, {run['processor']}, Python "
         f"{run['python_version']}, numpy {run['numpy_version']}, numba {run['numba_version']}. The "
         f"study on {run['ranks']} rank{'s' if run['ranks'] > 1 else ''}: {run['computed']} "
@@ -95,8 +96,12 @@ def flips_table(flips):
 
 def against(study, zones):
     """The replicates that contradict a claim about every collision, one row each."""
-    heads = ("claim", "type", "replicate", "flocs i, j", "conditions", "N", "δ", "d_c / D_0")
-    rows = [row for number in ALWAYS for row in rows_against(study, zones, number)]
+    heads = ("claims", "type", "replicate", "flocs i, j", "conditions", "N", "δ", "d_c / D_0")
+    numbers = {}
+    for number in ALWAYS:
+        for row in rows_against(study, zones, number):
+            numbers.setdefault(row, []).append(str(number))
+    rows = [(", ".join(each), *row) for row, each in numbers.items()]
     return markdown(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
 
 
@@ -110,7 +115,7 @@ def rows_against(study, zones, number):
             where = listed(study.vertices[place[1]]), listed(study.delta[place[2]])
             reach = f"{ratios.min():.3f} to {ratios.max():.3f}"
             flocs = " and ".join(floc_names(study, place))
-            yield number, name, k, flocs, len(ratios), *where, reach
+            yield name, k, flocs, len(ratios), *where, reach
 
 
 def floc_names(study, place):
