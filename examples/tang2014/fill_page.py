@@ -1,16 +1,20 @@
 """Put the numbers and figures of a finished study into docs/reproduction.md.
 
-    python examples/tang2014/fill_page.py DIR
+    python examples/tang2014/fill_page.py [--draw] DIR
 
 Every part ``<!-- name -->`` … ``<!-- end -->`` of the page is replaced by that of the same name in
 DIR's summary.md, sensitivity.md or plateau.md; parts without one stay. Figures that the page shows,
 figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
+--draw first makes summary.md and the figures anew from the results in DIR, running nothing.
 """
 
 import argparse
 import re
 import shutil
+import tomllib
 from pathlib import Path
+
+import reproduce
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
 SOURCES = ("summary.md", "sensitivity.md", "plateau.md")
@@ -37,11 +41,30 @@ def copy_figures(text, folder, target):
     return names
 
 
+def draw(folder):
+    """Make the figures of the results and summary.md anew."""
+    import pages
+
+    from flocsim.ensembles import load_config
+
+    names = ["tang2014", *tomllib.loads(reproduce.READINGS.read_text("utf-8"))]
+    files = {name: reproduce.reading_file(folder, name) for name in names}
+    readings = {name: path for name, path in files.items() if path.exists()}
+    library = folder / "errors.h5"
+    pages.write(
+        folder, load_config(reproduce.STUDY), library if library.exists() else None, readings
+    )
+
+
 def main():
     """Fill the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, metavar="DIR")
-    folder = parser.parse_args().folder
+    parser.add_argument("--draw", action="store_true", help="make summary and figures anew first")
+    arguments = parser.parse_args()
+    folder = arguments.folder
+    if arguments.draw:
+        draw(folder)
     parts = parts_of(folder)
     text = PAGE.read_text("utf-8")
     PAGE.write_text(filled(text, parts), "utf-8")

@@ -119,11 +119,16 @@ def readings_of(arguments):
     return {n: c for n, c in readings.items() if arguments.images or "shapes" not in c}
 
 
+def reading_file(folder, name):
+    """Where a reading's results go."""
+    return folder / f"reading-{name.replace(' ', '-')}.h5"
+
+
 def run_readings(arguments):
     """Run every reading, and the study's own with the same few N."""
     paths = {}
     for name, more in {"tang2014": {}, **readings_of(arguments)}.items():
-        paths[name] = arguments.output / f"reading-{name.replace(' ', '-')}.h5"
+        paths[name] = reading_file(arguments.output, name)
         changes = changes_of(arguments, READING_VERTICES, more)
         ensemble(arguments, paths[name], arguments.reading_replicates, changes)
     return paths

@@ -32,9 +32,17 @@ QUANTITIES = {
     "$k_n$": (("forces", "contact", "k_n"), 20.0, "N/m", np.geomspace(2.0, 2000.0, 10)),
     "$\\rho_s$": (("bodies", "surface_density"), 2.0, "kg/m²", np.geomspace(2e-3, 200.0, 11)),
 }  # fmt: skip
+PLAIN = {"$H_A$": "H_A", "$\\varphi$": "φ", "$1/\\kappa$": "1/κ", "$k_n$": "k_n",
+         "$\\rho_s$": "ρ_s"}  # fmt: skip
+"""Names in tables."""
 SHARES = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 0.99)
 DELTA = r"$\delta / \delta_{\max}$"
 LEVELS = (0.05, 0.5, 0.95)
+
+
+def plain(name):
+    """ "H_A [J]" of a quantity's name in the figure."""
+    return f"{PLAIN[name]} [{QUANTITIES[name][2]}]" if name in QUANTITIES else "δ/δ_max"
 
 
 def run_all(library, replicates):
@@ -109,7 +117,9 @@ def write_points(path, sweeps):
             for place, kind in np.ndindex(found.bands[0].shape):
                 band = [f"{each[place, kind]:.4g}" for each in found.bands]
                 counts = [int(each[place, kind].sum()) for each in (found.decided, found.open)]
-                rows.writerow([name, f"{found.values[place]:.6g}", TYPES[kind], *band, *counts])
+                rows.writerow(
+                    [plain(name), f"{found.values[place]:.6g}", TYPES[kind], *band, *counts]
+                )
 
 
 def transitions(sweeps):
@@ -123,7 +133,7 @@ def transitions(sweeps):
             found_at = [transition(kept, kind, level, name in QUANTITIES) for level in LEVELS]
             cells = [f"{number_text(v)} [{number_text(a)}, {number_text(b)}]" if v == v else "-"
                      for v, a, b in found_at]  # fmt: skip
-            rows.append((name, word, f"{ends[0]:.2f} → {ends[1]:.2f}", *cells))
+            rows.append((plain(name), word, f"{ends[0]:.2f} → {ends[1]:.2f}", *cells))
     heads = (
         "quantity",
         "type",
