@@ -61,6 +61,12 @@ def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     parts = re.findall(r"<!-- ([a-z-]+) -->\n\n.+?\n\n<!-- end -->", summary, re.DOTALL)
     assert parts == ["times", "totals", "flips", "claims", "against", "beside"]
     assert "| all | 120 |" in summary
+    (out / "summary.md").unlink()
+    (out / "figure-4.png").unlink()
+    draw = f"import fill_page, pathlib; fill_page.draw(pathlib.Path({str(out)!r}))"
+    subprocess.run([sys.executable, "-c", draw], cwd=FOLDER, check=True, timeout=300)
+    assert (out / "figure-4.png").exists()
+    assert (out / "summary.md").read_text() == summary
     before = (out / "study.h5").read_bytes()
     again = reproduce(tmp_path, *words)
     assert (again.returncode, again.stderr) == (0, "")

@@ -14,7 +14,7 @@ from flocsim.ensembles.claims.verdicts import (
     always,
     occurs,
 )
-from flocsim.ensembles.statistics import FAILED, MISSED
+from flocsim.ensembles.statistics import FAILED, UNDECIDED
 from flocsim.io.results_schema import CLASSES
 
 SHOWN = 3
@@ -101,8 +101,8 @@ def identities(results):
     decided = outcome < len(CLASSES)
     agrees = np.where(outcome <= 1, inside == 1, inside == 0)
     yield "decided collisions whose class agrees with their side", decided, agrees
-    ended = (inside <= 1) & (outcome != FAILED) & (outcome != MISSED)
-    yield "collisions that are of a class", ended, decided
+    ended = (inside <= 1) & (outcome != FAILED) & (outcome != UNDECIDED)
+    yield "decided collisions that are of a class", ended, decided
 
 
 def small_classes(results):

@@ -60,7 +60,7 @@ def all_depart_outside(outcome, inside):
         (sphere_departs, {6}),
         (small_outside, {7, 10}),
         (no_class_c, {11}),
-        (undecided_collision, {9}),
+        (undecided_collision, set()),
         (bound_outside, {11, 15, 16, 17}),
         (all_depart_outside, {11, 15, 17}),
     ],
@@ -86,6 +86,12 @@ def test_the_replicates_that_contradict_are_found():
 )
 def test_claims_see_what_is_where(names, broken):
     assert failing(relabelled(paper_results(), **names)) == broken
+
+
+def test_a_collision_without_a_class_is_seen():
+    results = paper_results()
+    results.replicates["outcome"][1, 1, 1, 0] = 4
+    assert 9 in failing(results)
 
 
 def test_a_class_that_disagrees_with_its_side_is_seen():
