@@ -3,12 +3,12 @@
 import csv
 
 import numpy as np
+from summary import write_summary
 
 from flocsim.ensembles.claims import FIT_CLAIMS, check_claims
-from flocsim.ensembles.claims.table import claims_table, verdicts_table
-from flocsim.ensembles.config import IntegratorConfig
-from flocsim.ensembles.flips import flips_between, share
-from flocsim.io.intervals import proportion
+from flocsim.ensembles.claims.table import claims_table
+from flocsim.ensembles.flips import flips_between
+from flocsim.ensembles.zone import zone_distance
 from flocsim.io.plots import FIGURES, POPULATION_FIGURES, save
 from flocsim.io.results import CLASSES, read_results
 from flocsim.io.shape_library import read_library
@@ -21,13 +21,12 @@ FLIPPED = {"4": ("zone", (0, 1, 2, 3)), "5": ("aggregation", (0, 1)), "6": ("agg
 """Figure → which flips are its numerical error, and among which classes."""
 
 
-def default_tolerance():
-    """The tolerance [m] of a config that gives none."""
-    return IntegratorConfig().tolerance
+def write(folder, config, library, readings):
+    """Write all of it into the folder.
 
-
-def write(folder, library, readings):
-    """Write all of it into the folder; ``library`` with the errors of fits, or None."""
+    ``config``: the study's; ``library``: with the errors of fits, or None; ``readings``: {name:
+    file}.
+    """
     study, check = (read_results(folder / name) for name in ("study.h5", "check.h5"))
     flips = flips_between(study, check)
     entries = read_library(library) if library else None
@@ -36,9 +35,18 @@ def write(folder, library, readings):
         for name, figure in POPULATION_FIGURES.items():
             save_all(folder, name, figure(entries))
     write_probabilities(folder / "probabilities.csv", study, flips)
-    write_claims(folder / "claims.md", study, entries, flips)
-    if readings:
-        write_readings(folder / "readings.md", readings)
+    held = hold_readings(readings)
+    if held:
+        write_readings(folder / "readings.md", held)
+    write_summary(folder, study, flips, check_claims(study, entries), held, zones_of(config))
+
+
+def zones_of(config):
+    """{type: D_0 [m]}."""
+    return {
+        name: zone_distance(config.zone, config.forces, radius_i, radius_j)
+        for name, radius_i, radius_j in config.scene.conditions
+    }
 
 
 def save_all(folder, name, figure):
@@ -62,9 +70,10 @@ def draw_results(folder, study, check, flips):
 
 
 def flip_text(changed, among):
-    """ "flips 0.09 % of 1092"; nothing where nothing was run again."""
-    count = int(np.count_nonzero(among))
-    return f"flips {share(changed, among):.2g} % of {count}" if count else ""
+    """ "run again: 1 of 1092 flip (0.09 %)"; nothing where nothing was run again."""
+    count, flipped = int(np.count_nonzero(among)), int(np.count_nonzero(changed & among))
+    share = f" ({100.0 * flipped / count:.2g} %)" if flipped else ""
+    return f"run again: {flipped} of {count} flip{share}" if count else ""
 
 
 def write_probabilities(path, study, flips):
@@ -86,48 +95,18 @@ def write_probabilities(path, study, flips):
     print(path)
 
 
-def write_claims(path, study, entries, flips):
-    """The claims table under the totals of the study."""
-    text = f"{totals(study, flips)}\n\n{claims_table(check_claims(study, entries))}\n"
-    path.write_text(text, "utf-8")
-    print(path)
-
-
-def totals(study, flips):
-    """How many replicates there were, what was left open, and what flipped."""
-    kinds = (
-        ("aggregation", flips.both), ("zone", flips.both), ("outcome", np.ones_like(flips.outcome)),
-    )  # fmt: skip
-    lines = [counts_text(study)]
-    for kind, among in kinds:
-        changed, count = np.count_nonzero(getattr(flips, kind)), np.count_nonzero(among)
-        value, low, high = (100.0 * float(each) for each in proportion(changed, count))
-        lines.append(
-            f"{kind} flips at a 100x tighter tolerance: {changed} of {count} "
-            f"({value:.2f} %, 95 % {low:.2f} to {high:.2f} %)"
-        )
-    return "\n\n".join(lines)
-
-
-def counts_text(results):
-    """ "total 25500, collided 21905, missed …"; the classes last."""
-    table = results.probabilities
-    names = ("total", "collided", "missed", "undecided", "failed")
-    counts = [f"{name} {int(table[f'n_{name}'].sum())}" for name in names]
-    classes = table["n_class"].sum(axis=(0, 1, 2))
-    counts += [f"{name} {count}" for name, count in zip(CLASSES, classes, strict=True)]
-    return ", ".join(counts)
-
-
-def write_readings(path, readings):
-    """The claims about collisions against the readings."""
+def hold_readings(readings):
+    """{name: (Results, Findings of the claims about collisions)}."""
     results = {name: read_results(file) for name, file in readings.items()}
-    found = {name: check_claims(each)[len(FIT_CLAIMS) :] for name, each in results.items()}
-    lines = [verdicts_table(found), ""]
-    lines += [f"- {name}: {counts_text(each)}" for name, each in results.items()]
-    for name, findings in found.items():
-        lines += ["", f"## {name}", "", claims_table(findings)]
-    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return {name: (each, check_claims(each)[len(FIT_CLAIMS) :]) for name, each in results.items()}
+
+
+def write_readings(path, held):
+    """Every part of the claims under every reading."""
+    lines = []
+    for name, (_, findings) in held.items():
+        lines += [f"## {name}", "", claims_table(findings), ""]
+    path.write_text("\n".join(lines), "utf-8")
     print(path)
 
 

@@ -9,11 +9,11 @@ again, and what was interrupted goes on, so the same command resumes.
 
 import argparse
 import shlex
-import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
+
+import steps
 
 HERE = Path(__file__).resolve().parent
 STUDY, READINGS = HERE / "study.toml", HERE / "readings.toml"
@@ -22,6 +22,7 @@ CHECKED_SHARE = 0.05
 TIGHTER = 0.01
 """Factor on the tolerance there."""
 READING_VERTICES = (1, 4, 16, 64)
+FORMATS = ("png", "pdf")
 ERROR_RADII = "1,2,4"
 ERROR_VERTICES = "4,8,16,28,40,52,64"
 """Of the fits for Fig. 3."""
@@ -45,19 +46,9 @@ def parse_arguments():
     return parser.parse_args()
 
 
-def call(*words):
-    """Show a command, run it; whatever goes wrong there ends this one with its exit code."""
-    print("$ " + shlex.join(map(str, words)), flush=True)
-    began = time.monotonic()
-    code = subprocess.run([str(word) for word in words]).returncode
-    if code != 0:
-        sys.exit(code)
-    print(f"  {time.monotonic() - began:.0f} s", flush=True)
-
-
-def flocsim(*words):
-    """Run a subcommand of flocsim."""
-    call(sys.executable, "-m", "flocsim", *words)
+def flocsim(folder, name, *words):
+    """Run a subcommand of flocsim as a step."""
+    steps.call(folder, name, sys.executable, "-m", "flocsim", *words)
 
 
 def fit(arguments, output, vertices, radius, *more):
@@ -66,8 +57,9 @@ def fit(arguments, output, vertices, radius, *more):
         return
     masks = ["--masks"] if arguments.masks else []
     flocsim(
-        "fit", *arguments.images, *masks, "--pixel-size", arguments.pixel_size,
-        "--vertices", vertices, "--radius", radius, "--jobs", arguments.jobs, *more, "-o", output,
+        arguments.output, f"fits {output.stem}", "fit", *arguments.images, *masks,
+        "--pixel-size", arguments.pixel_size, "--vertices", vertices, "--radius", radius,
+        "--jobs", arguments.jobs, *more, "-o", output,
     )  # fmt: skip
 
 
@@ -80,6 +72,7 @@ def fit_all(arguments, vertices):
     if arguments.readings:
         few = ",".join(str(n) for n in READING_VERTICES if n > 1)
         fit(arguments, folder / "area.h5", few, "1", "--preserve-area")
+        fit(arguments, folder / "inscribed.h5", few, "1", "--inscribed")
 
 
 def settings(table, prefix=""):
@@ -103,9 +96,10 @@ def ensemble(arguments, output, replicates, changes):
     """Run the study with changes into a results file, or go on with it."""
     launch = shlex.split(arguments.launch) if arguments.launch else []
     jobs = [] if launch else ["--jobs", arguments.jobs]
-    call(
-        *launch, sys.executable, "-m", "flocsim.ensemble", STUDY, *settings(changes), *jobs,
-        "--replicates", replicates, "--output", output, "--resume", "--quiet",
+    steps.call(
+        arguments.output, output.stem, *launch, sys.executable, "-m", "flocsim.ensemble", STUDY,
+        *settings(changes), *jobs, "--replicates", replicates, "--output", output, "--resume",
+        "--quiet",
     )  # fmt: skip
 
 
@@ -139,10 +133,13 @@ def draw_trajectory(path, replicate, changes):
     """Fig. 7 for one replicate of Type I, N = 64, δ = 0: frames, distance, forces, animation."""
     if path.with_suffix(".gif").exists():
         return
+    strip, distance, forces = (
+        [f"{path}{which}.{ending}" for ending in FORMATS] for which in ("", "-distance", "-forces")
+    )
     flocsim(
-        "trajectory", STUDY, *settings(changes), "--scene", "I,64,0", "--replicate", replicate,
-        "-o", path.with_suffix(".png"), "--distance", f"{path}-distance.png",
-        "--forces", f"{path}-forces.png", "--animation", path.with_suffix(".gif"),
+        path.parent, path.stem, "trajectory", STUDY, *settings(changes), "--scene", "I,64,0",
+        "--replicate", replicate, "--output", *strip, "--distance", *distance,
+        "--forces", *forces, "--animation", path.with_suffix(".gif"),
     )  # fmt: skip
 
 
@@ -161,26 +158,46 @@ def main():
     """All steps."""
     arguments = parse_arguments()
     refuse_launchers()
-    sys.path.insert(0, str(HERE))
-    import pages
-
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    study = tomllib.loads(STUDY.read_text("utf-8"))
-    vertices = study["shapes"]["vertices"]
-    if arguments.vertices:
-        vertices = [int(word) for word in arguments.vertices.split(",")]
+    folder = arguments.output
+    folder.mkdir(parents=True, exist_ok=True)
+    vertices = chosen_vertices(arguments)
     if arguments.images:
         fit_all(arguments, vertices)
-    folder, changes = arguments.output, changes_of(arguments, vertices)
-    ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
-    checked = max(1, round(CHECKED_SHARE * arguments.replicates))
-    tolerance = TIGHTER * study.get("integrator", {}).get("tolerance", pages.default_tolerance())
-    tighter = changes | {"integrator": {"tolerance": tolerance}}
-    ensemble(arguments, folder / "check.h5", checked, tighter)
+    changes = changes_of(arguments, vertices)
+    run_study(arguments, changes)
     readings = run_readings(arguments) if arguments.readings else {}
-    pages.write(folder, folder / "errors.h5" if arguments.images else None, readings)
+    write_pages(arguments, changes, readings)
+
+
+def chosen_vertices(arguments):
+    """All N of the study, or those asked for."""
+    if arguments.vertices:
+        return [int(word) for word in arguments.vertices.split(",")]
+    return tomllib.loads(STUDY.read_text("utf-8"))["shapes"]["vertices"]
+
+
+def run_study(arguments, changes):
+    """The study, and a share of it again at a tighter tolerance."""
+    from flocsim.ensembles import load_config
+
+    ensemble(arguments, arguments.output / "study.h5", arguments.replicates, changes)
+    tolerance = float(f"{TIGHTER * load_config(STUDY).integrator.tolerance:.6g}")
+    tighter = changes | {"integrator": {"tolerance": tolerance}}
+    checked = max(1, round(CHECKED_SHARE * arguments.replicates))
+    ensemble(arguments, arguments.output / "check.h5", checked, tighter)
+
+
+def write_pages(arguments, changes, readings):
+    """Fig. 7, then all that the results tell, the times of the steps with it."""
+    import pages
+
+    from flocsim.ensembles import load_config
+
+    folder = arguments.output
     for name, replicate in pages.examples_of_classes(folder / "study.h5").items():
         draw_trajectory(folder / f"figure-7-{name}", replicate, changes)
+    library = folder / "errors.h5" if arguments.images else None
+    pages.write(folder, load_config(STUDY), library, readings)
 
 
 if __name__ == "__main__":

@@ -90,7 +90,8 @@ def work(names, options):
     tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
     with fit_work.workers(options.jobs) as mapped:
         pictures = list(found_pictures(mapped(fit_work.find_flocs, tasks), options))
-        masks = [(region.mask, options) for each in pictures for region in each.regions]
+        regions = [(each.name, region) for each in pictures for region in each.regions]
+        masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
         bar = Bar(len(masks))
         fits = [bar.count(fit) for fit in mapped(fit_work.fit_region, masks)]
     return pictures, fits
@@ -128,7 +129,8 @@ def write(args, summary, pictures, fits, entries, options):
     from flocsim.io.fit_report import format_errors, plural
     from flocsim.io.shape_library import write_library
 
-    settings = {"method": options.method, "preserve_area": options.preserve_area}
+    settings = {"method": options.method, "preserve_area": options.preserve_area,
+                "inscribed": options.inscribed}  # fmt: skip
     write_library(args.output, entries, settings)
     write_summary(summary, pictures, fits, options)
     if args.overlay is not None:

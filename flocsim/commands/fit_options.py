@@ -18,6 +18,7 @@ class Options:
     radii: tuple
     method: str
     preserve_area: bool
+    inscribed: bool
     max_flocs: int | None
     masks: bool
     background: str
@@ -37,6 +38,7 @@ def add_options(add):
         help="pattern: the least error; paper: the paper's damped dynamics; even: points evenly on "
         "the outline, the plain baseline (default: %(default)s)")  # fmt: skip
     add("--preserve-area", action="store_true", help="give every shape exactly its floc's area")
+    add("--inscribed", action="store_true", help="keep every shape inside its floc")
     add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
     add("--masks", action="store_true",
         help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
@@ -85,12 +87,18 @@ def read_options(args):
             "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
             "of its side in metres, for example --pixel-size 0.95e-6"
         )
+    if args.inscribed and (args.preserve_area or args.method != "pattern"):
+        raise UsageError(
+            "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
+            "its floc has less than its area"
+        )
     return Options(
         pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
         vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
         radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
         method=args.method,
         preserve_area=args.preserve_area,
+        inscribed=args.inscribed,
         max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
         masks=args.masks,
         background=args.background,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import attrs
 
-from flocsim.errors import FlocsimError, ImageError, UsageError
+from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 
 
 @attrs.frozen(eq=False)
@@ -87,25 +87,30 @@ def largest(regions, count):
 
 
 def fit_region(task):
-    """{radius: {N: Fit}} of (mask, Options)."""
+    """{radius: {N: Fit}} of (name, mask, Options); ShapeError, with the name, for none."""
     import warnings
 
-    from flocsim.geometry.fit import fit_mask
-
-    mask, options = task
+    name, mask, options = task
     with warnings.catch_warnings():
         # Said once a picture, by warn_of_coarse, not once a floc and N.
         warnings.simplefilter("ignore", UserWarning)
-        return {
-            radius: {
-                count: fit_mask(
-                    mask, vertices=count, radius=radius, method=options.method,
-                    preserve_area=options.preserve_area and is_fine(mask, radius),
-                )
-                for count in options.vertices
+        try:
+            return {
+                radius: {count: fit_one(mask, count, radius, options) for count in options.vertices}
+                for radius in options.radii
             }
-            for radius in options.radii
-        }  # fmt: skip
+        except ShapeError as error:
+            raise ShapeError(f"{name}: {error}, or leave small flocs out by --min-radius") from None
+
+
+def fit_one(mask, count, radius, options):
+    """The Fit of a mask by the Options."""
+    from flocsim.geometry.fit import fit_mask
+
+    return fit_mask(
+        mask, vertices=count, radius=radius, method=options.method, inscribed=options.inscribed,
+        preserve_area=options.preserve_area and is_fine(mask, radius),
+    )  # fmt: skip
 
 
 def is_fine(mask, radius):

@@ -27,12 +27,20 @@ def add_parser(subparsers):
     parser.add_argument("--seed", type=int, help="seed, instead of the config's")
     parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help="strip of frames: .png, .pdf or .svg"
+        "-o",
+        "--output",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="strip of frames: .png, .pdf or .svg, or several of them",
     )
     parser.add_argument(
-        "--distance", metavar="FILE", help="also draw the centre distance against time"
+        "--distance", nargs="+", default=[], metavar="FILE",
+        help="also draw the centre distance against time",
+    )  # fmt: skip
+    parser.add_argument(
+        "--forces", nargs="+", default=[], metavar="FILE", help="also draw the forces against time"
     )
-    parser.add_argument("--forces", metavar="FILE", help="also draw the forces against time")
     parser.add_argument("--animation", metavar="FILE.gif", help="also write an animation")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -117,9 +125,9 @@ def describe(config, place, replicate, row):
     )
 
 
-def strip_path(args):
+def strip_paths(args):
     """Where the strip of frames goes."""
-    return Path(args.output or f"trajectory-{args.replicate}.png")
+    return args.output or [f"trajectory-{args.replicate}.png"]
 
 
 def overrides(args):
@@ -140,17 +148,29 @@ def draw_more(args, encounter, arrays, row, title):
     """Draw the forces and the animation where asked for; the paths written."""
     from flocsim.ensembles.frames import frames_of
     from flocsim.ensembles.loads import loads_of
-    from flocsim.io.plots import draw_forces, save, write_animation
+    from flocsim.io.plots import draw_forces, write_animation
 
     times, position, _ = arrays
+    written = []
     if args.forces:
         instants, loads = loads_of(encounter, *arrays)
-        save(draw_forces(instants, loads, row["t_collision"], title), Path(args.forces))
+        written += save_all(draw_forces(instants, loads, row["t_collision"], title), args.forces)
     if args.animation:
         frames = frames_of(encounter.shapes, times, position, row["t_collision"], ANIMATION_FRAMES)
         distance = centre_distance(position)
         write_animation(args.animation, frames, (times, distance), encounter.zone_distance, title)
-    return [Path(path) for path in (args.forces, args.animation) if path]
+        written.append(Path(args.animation))
+    return written
+
+
+def save_all(figure, names):
+    """Save a figure under every name; the paths."""
+    from flocsim.io.plots import save
+
+    paths = [Path(name) for name in names]
+    for path in paths:
+        save(figure, path)
+    return paths
 
 
 def centre_distance(position):
@@ -162,19 +182,15 @@ def centre_distance(position):
 
 def draw(args, frames, motion, zone, title):
     """Draw and save what was asked for; the paths written."""
-    from flocsim.io.plots import draw_distance, draw_strip, save
+    from flocsim.io.plots import draw_distance, draw_strip
 
-    output = strip_path(args)
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
         centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
     )  # fmt: skip
-    save(strip, output)
-    written = [output]
+    written = save_all(strip, strip_paths(args))
     if args.distance:
-        times, distance = motion
-        save(draw_distance(times, distance, zone, title), Path(args.distance))
-        written.append(Path(args.distance))
+        written += save_all(draw_distance(*motion, zone, title), args.distance)
     return written
 
 
@@ -192,7 +208,7 @@ def run(args):
     take_scene(args)
     place = select(config, args)
     check_study(config)
-    figures = [path for path in (strip_path(args), args.distance, args.forces) if path]
+    figures = [*strip_paths(args), *args.distance, *args.forces]
     check_animation(args.animation)
     check_outputs(args.config, figures, [path for path in (args.animation, args.save) if path])
     study = Study(with_one_count(config, place[1]))

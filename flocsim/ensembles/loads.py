@@ -10,6 +10,10 @@ from flocsim.integrators.views import pair_view
 OUTLINES = "contact"
 """Name of what acts at the outlines: contact, and forces of the surface gap if there are any."""
 SETTLING = "weight and drag"
+NAMES = {"VanDerWaals": "van der Waals", "DoubleLayer": "double layer"}
+TRUSTED = 1e-2
+"""What the balance leaves below this share of all other forces, and below half of their change in
+a step, is its own error."""
 
 
 def geometry(position, velocity, shapes):
@@ -33,7 +37,8 @@ def centre_forces(encounter, times, geometry):
                 pair_view(encounter.scene, *now[:1], 1, 0, *now[1:])
                 for now in zip(times, gap, rate, distance, strict=True)
             )
-            found[type(force).__name__] = np.array([kernel(v, pieces.parameters) for v in views])
+            name = type(force).__name__
+            found[NAMES.get(name, name)] = np.array([kernel(v, pieces.parameters) for v in views])
     return found
 
 
@@ -53,7 +58,7 @@ def loads_of(encounter, times, position, velocity):
 
     Along the line of centres, above 0 where it pushes apart. What acts at the outlines follows
     from the balance of momentum, m_j Δv_j/Δt less all other forces: exact for a step's mean up to
-    the curvature of those others within a step.
+    the curvature of those others within a step; NaN where no more than that error is left.
     """
     around = geometry(position, velocity, encounter.shapes)
     named = centre_forces(encounter, times, around)
@@ -63,5 +68,8 @@ def loads_of(encounter, times, position, velocity):
     change = np.sum(direction * np.diff(velocity[:, 1, :2], axis=0), axis=1)
     lasting = np.diff(times)
     inertia = encounter.system.bodies[1].mass * change / np.where(lasting > 0.0, lasting, np.nan)
-    means[OUTLINES] = inertia - sum(means.values())
+    left = inertia - sum(means.values())
+    error = TRUSTED * sum(np.abs(each) for each in means.values())
+    error += sum(0.5 * np.abs(np.diff(force)) for force in named.values())
+    means[OUTLINES] = np.where(np.abs(left) > error, left, np.nan)
     return 0.5 * (times[1:] + times[:-1]), means

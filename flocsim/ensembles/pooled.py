@@ -8,7 +8,7 @@ replicates shows (a ratio of cluster totals; W. G. Cochran, Sampling Techniques,
 import numpy as np
 
 from flocsim.ensembles.paired import AGGREGATED, DECIDED
-from flocsim.io.intervals import score_interval
+from flocsim.io.intervals import clustered_proportion
 from flocsim.io.results_schema import NOT_APPLICABLE
 
 INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
@@ -46,26 +46,7 @@ def pooled_probabilities(sums):
     """The arrays of POOLED; NaN where there was no event."""
     table = {}
     for name, each in sums.items():
-        share, effective = effective_number(*each.astype(float))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            low, high = score_interval(share, effective)
-        # At the ends the formula gives 0 and 1, but only up to rounding.
-        low = np.where(share == 0.0, 0.0, low)
-        high = np.where(share == 1.0, 1.0, high)
+        share, low, high, effective = clustered_proportion(*each.astype(float))
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}
         table[f"n_effective_{name}"] = effective
     return table
-
-
-def effective_number(s, m, ss, sm, mm, clusters):
-    """(p, n): p = Σ S/Σ M, and the n at which p (1 − p)/n is the variance between replicates.
-
-    No more than the trials there were; the number of replicates where all agree.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = s / m
-        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, 0.0)
-        variance = clusters / (clusters - 1.0) * spread / (m * m)
-        number = np.minimum(p * (1.0 - p) / variance, m)
-    number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
-    return p, np.where(m > 0, number, np.nan)

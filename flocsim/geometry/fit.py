@@ -5,7 +5,7 @@ import warnings
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
+from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
 from flocsim.geometry.fit_outline import require_one_region
 from flocsim.geometry.resize import core_factor
@@ -43,7 +43,7 @@ class Fit:
         return self.shape.scaled(pixel_size)
 
 
-def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=False):
+def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=False, inscribed=False):
     """Fit a spheropolygon to a floc's mask: minimise the pixels where the two differ.
 
     A pixel belongs to the spheropolygon if its centre lies in the core polygon or within the
@@ -56,22 +56,25 @@ def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=Fals
     particles down the gradient of V (paper, section 2.3), from even spacing; "even" spaces N points
     evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
     preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the
-    difference of the pixel counts.  N = 1 is the circle of the mask's area about its centroid;
-    radius, method and preserve_area are then ignored.
+    difference of the pixel counts.  inscribed: no pixel outside of the mask is covered ("pattern"
+    only); the shape is then smaller than the floc.  N = 1 is the circle of the mask's area about
+    its centroid; all other options are then ignored.
 
-    Returns a Fit, the same for the same input; its polygon is simple.  Without preserve_area,
+    Returns a Fit, the same for the same input; its polygon is simple.  By plain V,
     "pattern" and "paper" never end above "even".  Warns if radius ≥ r_eq (paper, section 3.2:
-    "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region,
-    UsageError for a wrong option.
+    "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region
+    or too thin to inscribe a shape in, UsageError for a wrong option.
     """
     mask = require_one_region(mask)
     _check_options(vertices, radius, method)
     if vertices == 1:
         return _equal_area_circle(mask)
-    if preserve_area:
+    if inscribed:
+        _require_pattern_alone(method, preserve_area)
+    elif preserve_area:
         _require_room(mask, radius)
     _warn_if_coarse(mask, radius)
-    return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area)
+    return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area, inscribed)
 
 
 def _check_options(vertices, radius, method):
@@ -81,6 +84,14 @@ def _check_options(vertices, radius, method):
         raise UsageError(f"the spheroradius must be a number of pixels above 0, found {radius!r}")
     if method not in METHODS:
         raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
+
+
+def _require_pattern_alone(method, preserve_area):
+    if method != "pattern" or preserve_area:
+        raise UsageError(
+            "an inscribed fit goes with the method 'pattern' and without preserving the area, "
+            f"found the method {method!r}, preserve_area {preserve_area}"
+        )
 
 
 def _require_room(mask, radius):
@@ -115,10 +126,12 @@ def _equal_area_circle(mask):
     return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, _percent(wrong, mask))
 
 
-def _fit_polygon(mask, count, radius, method, preserve_area):
-    points = _find(mask, count, radius, method, preserve_area)
+def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
+    points = _find(mask, count, radius, method, preserve_area, inscribed)
     shape = SpheroPolygon(points * (1.0, -1.0), radius)
-    if preserve_area:
+    if inscribed:
+        _require_inside(mask, points, radius)
+    elif preserve_area:
         factor = core_factor(shape.vertices, radius, float(mask.sum()))
         points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
     elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
@@ -146,15 +159,17 @@ def _settled(mask, points, radius, area):
     return points
 
 
-def _find(mask, count, radius, method, preserve_area):
+def _find(mask, count, radius, method, preserve_area, inscribed):
     """The vertices (N, 2) as x, y-down [px] that a method leads to."""
     from flocsim.geometry.fit_kernels import padded
     from flocsim.geometry.fit_paper import paper_fit
+    from flocsim.geometry.fit_pattern import AREA, INSCRIBED, PLAIN
     from flocsim.geometry.fit_search import even_start, pattern_fit
 
     room, margin = padded(mask, count, radius)
     if method == "pattern":
-        return pattern_fit(room, count, radius, balance=int(preserve_area)) - margin
+        weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
+        return pattern_fit(room, count, radius, weights) - margin
     start = even_start(room, count, radius)
     return (paper_fit(room, start, radius) if method == "paper" else start) - margin
 
@@ -163,9 +178,27 @@ def _wrong_pixels(mask, points, radius):
     """V, counted on an array that the whole shape fits in."""
     from flocsim.geometry.fit_kernels import count_errors
 
-    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
-    margin = max(0, int(np.ceil(beyond.max() + radius))) + 2
+    margin = _margin(mask, points, radius)
     return count_errors(np.pad(mask, margin), points + margin, radius)
+
+
+def _margin(mask, points, radius):
+    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
+    return max(0, int(np.ceil(beyond.max() + radius))) + 2
+
+
+def _require_inside(mask, points, radius):
+    """ShapeError if the shape covers pixels that are not the mask's."""
+    from flocsim.geometry.fit_kernels import covered
+
+    margin = _margin(mask, points, radius)
+    cover = covered(np.pad(mask, margin).shape, points + margin, radius)
+    outside = np.count_nonzero(cover & ~np.pad(mask, margin))
+    if outside:
+        raise ShapeError(
+            f"no shape of {len(points)} vertices and spheroradius {radius:g} px was found that "
+            f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
+        )
 
 
 def _percent(wrong, mask):

@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 
 from flocsim.composer import compose
+from flocsim.geometry.fit_cover import cover
 from flocsim.geometry.fit_outline import ring_inside
-from flocsim.geometry.fit_pattern import pattern_search
+from flocsim.geometry.fit_pattern import PLAIN, pattern_search
 from flocsim.geometry.fit_simple import simple_inset
 
 ANGLES = np.pi / 4.0 * np.arange(8)
@@ -20,17 +21,23 @@ def compiled(kernel):
     return compose(kernel, {}, allocates=True)
 
 
-def searched(mask, start, radius, steps, balance=0, active=None):
+def searched(mask, start, radius, steps, weights=PLAIN, active=None):
     """pattern_search of a start, which is left as it is: (vertices, objective)."""
     vertices = np.array(start)
     active = np.ones(len(vertices), bool) if active is None else active
     search = compiled(pattern_search)
-    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active, balance))
+    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active, weights))
 
 
 def count_errors(mask, vertices, radius):
     """V of the swept polygon against the mask: a search without steps."""
     return searched(mask, vertices, radius, NO_STEPS)[1]
+
+
+def covered(shape, vertices, radius):
+    """The pixels (h, w) bool whose centres the swept polygon covers."""
+    odd, near = compiled(cover)(np.array(vertices), radius, shape)
+    return odd | (near > 0)
 
 
 def is_simple(vertices):

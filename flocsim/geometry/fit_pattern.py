@@ -1,13 +1,31 @@
 """The pattern search of a fit: plain Python, compiled by fit_search.
 
-It lowers V + balance·|excess|: V the wrong pixels, excess those covered less those of the mask.
-With balance 0 that is the paper's V; with 1 it keeps the floc's area.
+It lowers V + balance·|excess| + outside·(V + excess): V the wrong pixels, excess those covered less
+those of the mask, so that V + excess is twice the pixels covered outside of the mask.
 """
 
 import numpy as np
 
 from flocsim.geometry.fit_cover import count_wrong, cover, move_vertex
 from flocsim.geometry.fit_simple import stays_simple
+
+PLAIN = (0, 0)
+"""(balance, outside) for the paper's V."""
+
+AREA = (1, 0)
+"""Keeps the floc's area."""
+
+INSCRIBED = (0, 25)
+"""A pixel outside of the mask weighs as fifty that are missed: more, and the search gives up large
+parts of the floc for the first few pixels."""
+
+INSIDE = (0, 10**6)
+"""No number of missed pixels makes up for one outside: the end of an inscribed fit."""
+
+
+def weighed(wrong, excess, weights):
+    """The objective of a fit."""
+    return wrong + weights[0] * abs(excess) + weights[1] * (wrong + excess)
 
 
 def stepped(vertices, k, directions, direction, step):
@@ -25,7 +43,7 @@ def leaves_room(shape, new, margin):
     )
 
 
-def best_step(mask, odd, near, vertices, k, radius, directions, step, excess, balance):
+def best_step(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
     """The direction in which a step of vertex k lowers the objective the most.
 
     Returns (direction or −1, change of the objective, growth of the cover).
@@ -40,16 +58,16 @@ def best_step(mask, odd, near, vertices, k, radius, directions, step, excess, ba
         if not leaves_room(mask.shape, new, radius + 1.0):
             continue
         change, growth = move_vertex(mask, odd, near, before, here, after, new, radius, False)
-        change += balance * (abs(excess + growth) - abs(excess))
+        change = weighed(change, excess + growth, weights) - weighed(0, excess, weights)
         if change < least and stays_simple(vertices, k, new[0], new[1]):
             best, least, grown = direction, change, growth
     return best, least, grown
 
 
-def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, balance):
+def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
     """Take the best step of vertex k, if any: (change of the objective, growth of the cover)."""
     direction, change, growth = best_step(
-        mask, odd, near, vertices, k, radius, directions, step, excess, balance
+        mask, odd, near, vertices, k, radius, directions, step, excess, weights
     )
     if direction >= 0:
         count = len(vertices)
@@ -62,16 +80,16 @@ def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, 
     return change, growth
 
 
-def pattern_search(mask, vertices, radius, directions, steps, active, balance):
+def pattern_search(mask, vertices, radius, directions, steps, active, weights):
     """Move vertices along `directions` (k, 2) by shrinking `steps` [px] while that lowers.
 
     mask: (h, w) bool; vertices: (N, 2), simple, changed in place; active: (N,) bool, the vertices
     to begin with, and those that came in reach at the end.  A vertex whose steps all failed rests
-    until one nearby moves.  Returns the objective, V for balance 0.
+    until one nearby moves.  Returns the objective, V for PLAIN weights.
     """
     odd, near = cover(vertices, radius, mask.shape)
     wrong, excess = count_wrong(mask, odd, near)
-    objective = wrong + balance * abs(excess)
+    objective = weighed(wrong, excess, weights)
     count = len(vertices)
     waiting = np.empty(count, np.bool_)
     for step in steps:
@@ -82,7 +100,7 @@ def pattern_search(mask, vertices, radius, directions, steps, active, balance):
             change = 0
             if waiting[k]:
                 change, growth = step_vertex(
-                    mask, odd, near, vertices, k, radius, directions, step, excess, balance
+                    mask, odd, near, vertices, k, radius, directions, step, excess, weights
                 )
                 waiting[k] = False
             if change < 0:

@@ -75,22 +75,22 @@ def moved(vertices, removed, edge):
     return trial, nearby
 
 
-def improvement(mask, vertices, objective, radius, balance):
+def improvement(mask, vertices, objective, radius, weights):
     """The first promising move that lowers the objective: (vertices, objective), or None."""
     costs, gains = compiled(estimates)(mask, vertices, radius, STEPS).T
     for removed, edge in promising_pairs(costs, gains):
         start, nearby = moved(vertices, removed, edge)
         if is_simple(start):
-            trial, found = searched(mask, start, radius, STEPS, balance, nearby)
+            trial, found = searched(mask, start, radius, STEPS, weights, nearby)
             if found < objective:
                 return trial, found
     return None
 
 
-def relocate(mask, vertices, objective, radius, balance):
+def relocate(mask, vertices, objective, radius, weights):
     """Move vertices to where that lowers the objective of the search, as long as it does."""
     while len(vertices) > 2 and objective > 0:
-        better = improvement(mask, vertices, objective, radius, balance)
+        better = improvement(mask, vertices, objective, radius, weights)
         if better is None:
             break
         vertices, objective = better

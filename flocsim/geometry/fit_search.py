@@ -12,6 +12,7 @@ import numpy as np
 
 from flocsim.geometry.fit_kernels import compiled, inset, is_simple, searched
 from flocsim.geometry.fit_outline import even_points, ring_inside, trace_outline
+from flocsim.geometry.fit_pattern import INSCRIBED, INSIDE, PLAIN
 from flocsim.geometry.fit_relocate import relocate
 from flocsim.geometry.fit_segments import split_corners
 from flocsim.geometry.fit_telling import telling_points
@@ -43,17 +44,22 @@ def even_start(mask, count, radius):
     return inset(even_points(trace_outline(mask), count), mask, radius)
 
 
-def pattern_fit(mask, count, radius, balance=0):
+def pattern_fit(mask, count, radius, weights=PLAIN):
     """The best of several pattern searches, refined: (N, 2) as x, y-down [px].
 
-    mask: with room around it (fit_kernels.padded); balance: weight of the difference in area
-    beside V (fit_pattern).
+    mask: with room around it (fit_kernels.padded); weights: what counts beside V (fit_pattern).
     """
-    coarse = [searched(mask, s, radius, COARSE, balance) for s in _starts(mask, count, radius)]
+    starts = _starts(mask, count, radius)
+    if weights == INSCRIBED:
+        starts.append(ring_inside(mask, count))
+    coarse = [searched(mask, start, radius, COARSE, weights) for start in starts]
     coarse.sort(key=lambda found: found[1])
-    fine = [searched(mask, s, radius, FINE, balance) for s, _ in coarse[:FINALISTS]]
+    fine = [searched(mask, s, radius, FINE, weights) for s, _ in coarse[:FINALISTS]]
     best, objective = min(fine, key=lambda found: found[1])
-    return relocate(mask, best, objective, radius, balance)
+    vertices = relocate(mask, best, objective, radius, weights)
+    if weights == INSCRIBED:
+        vertices = searched(mask, vertices, radius, np.append(COARSE, FINE[1:]), INSIDE)[0]
+    return vertices
 
 
 def _starts(mask, count, radius):

@@ -62,3 +62,30 @@ def checked_counts(successes, trials):
     if not np.all(possible & whole):
         raise UsageError("successes and trials must be whole with 0 <= successes <= trials")
     return successes, trials
+
+
+def clustered_proportion(s, m, ss, sm, mm, clusters):
+    """(Σ S/Σ M, low, high, n): Wilson's interval at the n independent events that it is worth.
+
+    S successes of M trials in each cluster; arguments: Σ S, Σ M, Σ S², Σ S M, Σ M² and the number
+    of clusters with trials, as floats (W. G. Cochran, Sampling Techniques, 1977, ch. 6).
+    """
+    share, effective = effective_number(s, m, ss, sm, mm, clusters)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = score_interval(share, effective)
+    # At the ends the formula gives 0 and 1, but only up to rounding.
+    return share, np.where(share == 0.0, 0.0, low), np.where(share == 1.0, 1.0, high), effective
+
+
+def effective_number(s, m, ss, sm, mm, clusters):
+    """(p, n): p = Σ S/Σ M, and the n at which p (1 − p)/n is the variance between replicates.
+
+    No more than the trials there were; the number of replicates where all agree.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = s / m
+        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, 0.0)
+        variance = clusters / (clusters - 1.0) * spread / (m * m)
+        number = np.minimum(p * (1.0 - p) / variance, m)
+    number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
+    return p, np.where(m > 0, number, np.nan)

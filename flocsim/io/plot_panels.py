@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.io.intervals import proportion
+from flocsim.io.intervals import clustered_proportion, proportion
 from flocsim.io.plot_style import (
     CLASS_COLOURS,
     CROWDED,
@@ -23,6 +23,7 @@ PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
+BARS = "\n(bars: 95 %)"
 CLASS_WORDS = {
     "A": "A  inside, aggregated",
     "B": "B  inside, departed",
@@ -73,7 +74,10 @@ def probability_figure(results, name):
 
 
 def figure_8(results):
-    """Fig. 8: probability of the classes A–D, the counts of all delta pooled, against N."""
+    """Fig. 8: probability of the classes A–D, the counts of all delta pooled, against N.
+
+    A replicate has the same flocs and orientations at all delta: a cluster, for the intervals.
+    """
     with house_style():
         figure, panels = panel_grid(len(results.types), legend_width=1.75)
         for number, axes in enumerate(panels):
@@ -144,8 +148,7 @@ def draw_probability(axes, results, number, name):
 
 def draw_classes(axes, results, number):
     """The four classes of one type, counts pooled over delta."""
-    counts = results.probabilities["n_class"][number].sum(axis=1)
-    bands = proportion(counts, counts.sum(axis=1, keepdims=True))
+    bands = class_bands(results, number)
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     for index, name in enumerate(CLASSES):
@@ -153,6 +156,18 @@ def draw_classes(axes, results, number):
         shift = dodge(index, len(CLASSES))
         draw_line(axes, results.vertices, [band[:, index] for band in bands], shift, style)
     note_if_empty(axes, bands[0], NO_EVENTS["classes"])
+
+
+def class_bands(results, number):
+    """(share, low, high) (vertices, class) of one type; Wilson's without the replicates."""
+    if results.replicates is None:
+        counts = results.probabilities["n_class"][number].sum(axis=1)
+        return proportion(counts, counts.sum(axis=1, keepdims=True))
+    outcome = results.replicates["outcome"][number]
+    m = (outcome < len(CLASSES)).sum(axis=1, dtype=float)[:, None]
+    s = np.stack([(outcome == code).sum(axis=1) for code in range(len(CLASSES))], axis=1)
+    terms = np.broadcast_arrays(s, m, s * s, s * m, m * m, m > 0.0)
+    return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
 
 
 def line_style(colour, index, points):
@@ -188,7 +203,7 @@ def add_delta_legend(axes, delta):
             zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
         )
     ]
-    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$")
+    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS)
 
 
 def add_class_legend(axes):
@@ -199,7 +214,7 @@ def add_class_legend(axes):
         Line2D([], [], color=CLASS_COLOURS[name], marker=MARKERS[index], label=plain(words))
         for index, (name, words) in enumerate(CLASS_WORDS.items())
     ]
-    place_legend(axes, handles, "class")
+    place_legend(axes, handles, "class" + BARS)
 
 
 def place_legend(axes, handles, title):

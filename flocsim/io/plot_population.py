@@ -61,7 +61,8 @@ def figure_3(entries):
             axes.set_xlabel("vertices N")
         panels[0].set_ylabel("relative error RE [%]")
         panels[0].set_ylim(bottom=0.0)
-        panels[-1].legend()
+        title = "mean ± standard deviation\ndashed: circle of equal area"
+        panels[0].legend(title=title, alignment="left", loc="upper left")
         return figure
 
 

@@ -9,6 +9,8 @@ from flocsim.io.plot_style import BODY_COLOURS, CONTACT_COLOUR, house_style, new
 
 MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
+PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+"""Behind text that lines may cross."""
 
 
 def draw_strip(
@@ -81,15 +83,24 @@ def draw_zone(axes, zone_distance):
     axes.set_ylim(low, high)
     axes.axhspan(low, level, color=INSIDE_COLOUR, zorder=0)
     axes.axhline(level, color="0.35", linestyle=(0, (4, 2)), linewidth=0.9)
+    side = free_side(axes, level, level + margin)
     axes.annotate(
         f"$D_0$ = {level:.4g} µm",
-        (1.0, level),
+        (0.0 if side == "left" else 1.0, level),
         xycoords=("axes fraction", "data"),
-        xytext=(-2, 2),
+        xytext=(2 if side == "left" else -2, 2),
         textcoords="offset points",
-        ha="right",
+        ha=side,
         color="0.25",
+        bbox=PALE,
     )
+
+
+def free_side(axes, low, high):
+    """ "left" or "right": where fewer points of the panel's first line lie between two heights."""
+    x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
+    crowded = x[(y >= low) & (y <= high)]
+    return "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
 
 
 def check_lengths(count, *sequences):
@@ -172,7 +183,7 @@ def draw_scale_bar(axes, centre, half):
     left, level = centre[0] - 0.92 * half, centre[1] - 0.92 * half
     axes.plot([left, left + length], [level, level], color="0.1", linewidth=2.0, zorder=6)
     text = f"{length * MICRO:g} µm"
-    axes.text(left, level + 0.04 * half, text, va="bottom", fontsize=7, zorder=6)
+    axes.text(left, level + 0.04 * half, text, va="bottom", fontsize=7, zorder=6, bbox=PALE)
 
 
 def rounded_length(length):

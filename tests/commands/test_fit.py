@@ -9,7 +9,7 @@ from PIL import Image
 from real_images import real_image
 
 from flocsim.commands import fit, info, plot
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shape_library import read_library
 
 
@@ -156,6 +156,29 @@ def test_areas_are_kept_on_request(tmp_path, frame):
     assert run(frame, *options, "-o", tmp_path / "s.h5") == 0
     for entry in read_library(tmp_path / "s.h5"):
         assert entry.fits[4].shape.area == pytest.approx(entry.area * 1e-12, rel=1e-8)
+
+
+def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):
+    options = ("--pixel-size", "1e-6", "--vertices", "4")
+    areas = []
+    for more in ([], ["--inscribed"]):
+        assert run(frame, *options, *more, "-o", tmp_path / "s.h5") == 0
+        areas.append([entry.fits[4].shape.area for entry in read_library(tmp_path / "s.h5")])
+    assert all(inside <= free for free, inside in zip(*areas, strict=True))
+    assert sum(areas[1]) < sum(areas[0])
+    for more in (["--preserve-area"], ["--method", "paper"]):
+        with pytest.raises(UsageError, match="--inscribed goes with"):
+            run(frame, *options, "--inscribed", *more)
+
+
+def test_a_floc_too_thin_to_inscribe_a_shape_in_is_named(tmp_path, capsys):
+    mask = np.zeros((40, 50), np.uint8)
+    mask[10, 5:40] = 255
+    np.savez(tmp_path / "thin.npz", one=mask)
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "--masks", "--min-radius", "1")
+    with pytest.raises(ShapeError, match=r"thin.npz:one#1: .* inside the floc .* --min-radius"):
+        run(tmp_path / "thin.npz", *options, "--inscribed", "-o", tmp_path / "s.h5")
+    assert not (tmp_path / "s.h5").exists()
 
 
 def test_the_median_of_frames_stands_for_the_light(tmp_path, capsys):

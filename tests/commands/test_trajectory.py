@@ -40,6 +40,13 @@ def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
     assert seal(sealed) == (folder / "motion.h5").read_bytes()
 
 
+def test_a_figure_can_be_written_in_several_formats(folder, capsys):
+    words = ["--type", "III", "--vertices", 1, "--forces", "f.png", "f.pdf", "-o", "a.png", "a.svg"]
+    code, output, errors = call(capsys, "small.toml", *words)
+    assert (code, errors, output[1:]) == (0, [], ["a.png", "a.svg", "f.png", "f.pdf"])
+    assert (folder / "f.pdf").read_bytes().startswith(b"%PDF")
+
+
 def test_forces_and_an_animation(folder, capsys):
     from PIL import Image
 

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -47,7 +48,7 @@ def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     assert (done.returncode, done.stderr) == (0, "")
     out = tmp_path / "out"
     names = {f"figure-{name}.{end}" for name in "4568" for end in ("png", "pdf")}
-    assert {"study.h5", "check.h5", "probabilities.csv", "claims.md"} | names <= {
+    assert {"study.h5", "check.h5", "probabilities.csv", "summary.md", "steps.csv"} | names <= {
         path.name for path in out.iterdir()
     }
     assert len(list(out.glob("figure-7-*.gif"))) >= animations
@@ -56,7 +57,10 @@ def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     table = read_results(out / "study.h5").probabilities
     assert len(rows) == table["n_total"].size
     assert {row["run_again"] for row in rows} == {"1"}
-    assert (out / "claims.md").read_text().startswith("total 120, collided ")
+    summary = (out / "summary.md").read_text()
+    parts = re.findall(r"<!-- ([a-z-]+) -->\n\n.+?\n\n<!-- end -->", summary, re.DOTALL)
+    assert parts == ["times", "totals", "flips", "claims", "against", "beside"]
+    assert "| all | 120 |" in summary
     before = (out / "study.h5").read_bytes()
     again = reproduce(tmp_path, *words)
     assert (again.returncode, again.stderr) == (0, "")

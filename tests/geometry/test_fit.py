@@ -233,3 +233,39 @@ def test_turned_and_mirrored_masks_fit_as_well():
         masks = [blob(seed), np.rot90(blob(seed)), blob(seed)[::-1]]
         errors = [fit_mask(mask, vertices=12).relative_error for mask in masks]
         assert np.ptp(errors) < 1.0
+
+
+def plain_outside(mask, fit):
+    """Pixels that the shape covers and that are not the mask's, by the definition."""
+    padded = np.pad(mask, 20)
+    row, column = np.mgrid[: padded.shape[0], : padded.shape[1]] - 20
+    return np.count_nonzero(plain_cover(fit.vertices, fit.radius, column, -row) & ~padded)
+
+
+@pytest.mark.parametrize("vertices", [2, 3, 4, 9, 32])
+@pytest.mark.parametrize("radius", [1.0, 2.3])
+def test_an_inscribed_shape_covers_nothing_outside_of_its_mask(vertices, radius):
+    for seed in range(4):
+        mask = blob(seed)
+        fit = fit_mask(mask, vertices=vertices, radius=radius, inscribed=True)
+        assert plain_outside(mask, fit) == 0
+        assert fit.relative_error == pytest.approx(plain_error(mask, fit), abs=1e-9)
+        assert vertices == 2 or simplicity_fault(fit.vertices) is None
+
+
+def test_inscribed_shapes_fill_their_mask_better_with_more_vertices():
+    means = [
+        np.mean([fit_mask(blob(seed), vertices=n, inscribed=True).relative_error
+                 for seed in range(4)])
+        for n in (3, 6, 12, 24)
+    ]  # fmt: skip
+    assert means == sorted(means, reverse=True)
+    assert means[-1] < 5.0
+
+
+def test_what_cannot_be_inscribed_is_said():
+    with pytest.raises(ShapeError, match="lies inside the floc"):
+        fit_mask(np.ones((1, 30), bool), vertices=4, inscribed=True)
+    for options in ({"method": "even"}, {"preserve_area": True}):
+        with pytest.raises(UsageError, match="inscribed fit goes with"):
+            fit_mask(blob(0), vertices=4, inscribed=True, **options)

@@ -48,8 +48,9 @@ def bars(axes):
 def with_outcomes(results, outcome, inside):
     """The same conditions with one outcome everywhere."""
     shape = results.replicates["outcome"].shape
-    table = tabulate(np.full(shape, outcome), np.full(shape, inside))
-    return attrs.evolve(results, probabilities=table)
+    codes = {"outcome": np.full(shape, outcome, "u1"), "inside": np.full(shape, inside, "u1")}
+    table = tabulate(**codes)
+    return attrs.evolve(results, probabilities=table, replicates=results.replicates | codes)
 
 
 def test_figure_4_shows_every_probability_and_interval():
@@ -76,13 +77,31 @@ def test_figure_8_pools_the_counts_of_all_displacements():
         for index, (value, low, high) in enumerate(bars(axes)):
             successes, trials = counts[number, :, index], counts[number].sum(axis=-1)
             np.testing.assert_allclose(value, successes / trials)
-            np.testing.assert_allclose((low, high), wilson(successes, trials), atol=1e-12)
+            assert (low <= value).all() and (value <= high).all()
+
+
+def test_replicates_that_agree_at_all_displacements_count_once():
+    results = make_results()
+    outcome = results.replicates["outcome"].copy()
+    outcome[:] = np.arange(outcome.shape[-1]) % 4
+    inside = np.where(outcome < 2, 1, 0)
+    same = attrs.evolve(
+        results, probabilities=tabulate(outcome, inside),
+        replicates=results.replicates | {"outcome": outcome, "inside": inside.astype("u1")},
+    )  # fmt: skip
+    count = outcome.shape[-1]
+    for index, (_, low, high) in enumerate(bars(figure_8(same).axes[0])):
+        once = wilson(np.sum(np.arange(count) % 4 == index), count)
+        np.testing.assert_allclose((low[0], high[0]), once, rtol=0.02)
 
 
 def test_order_of_vertex_counts_does_not_matter():
     results = make_results(vertices=(1, 4, 16))
     turned = {name: array[:, ::-1] for name, array in results.probabilities.items()}
-    backwards = attrs.evolve(results, vertices=results.vertices[::-1], probabilities=turned)
+    rows = {name: array[:, ::-1] for name, array in results.replicates.items()}
+    backwards = attrs.evolve(
+        results, vertices=results.vertices[::-1], probabilities=turned, replicates=rows
+    )
     for one, other in zip(figure_8(results).axes, figure_8(backwards).axes, strict=True):
         for a, b in zip(one.containers, other.containers, strict=True):
             np.testing.assert_array_equal(a.lines[0].get_xydata(), b.lines[0].get_xydata())
@@ -274,3 +293,10 @@ def test_a_floc_counts_once_whatever_its_spheroradii():
     assert [panel.get_title(loc="left") for panel in figure_3(entries).axes] == [
         "spheroradius r = 1 px", "spheroradius r = 2 px"
     ]  # fmt: skip
+
+
+def test_the_name_of_the_zone_keeps_clear_of_the_curve():
+    times = np.linspace(0.0, 1.0, 50)
+    for distance, side in ((times, "left"), (1.0 - times, "right")):
+        label = draw_distance(times, 50e-6 - 9e-6 * distance**4, 45e-6).axes[0].texts[0]
+        assert label.get_ha() == side

@@ -19,11 +19,11 @@ FIT_CLAIMS = {
 """Number → (words, function of a shape library's entries that yields Parts)."""
 
 COLLISION_CLAIMS = {
-    6: ("spheres: Pr[C inside] = 1 and Pr[A] = 1", robust.spheres),
-    7: ("Type III: Pr[C inside] = 1", robust.small_inside),
+    6: ("spheres: Pr[C inside] = 1 and Pr[A] = 1", robust.always_so(6)),
+    7: ("Type III: Pr[C inside] = 1", robust.always_so(7)),
     8: ("Pr[C inside]: I ≤ II ≤ III", robust.type_order),
-    9: ("A + B = Pr[C inside]; A + B + C + D = 1", robust.identities),
-    10: ("Type III has only A and B", robust.small_classes),
+    9: ("A + B = Pr[C inside]; A + B + C + D = 1", robust.always_so(9)),
+    10: ("Type III has only A and B", robust.always_so(10)),
     11: ("all classes occur: Type I, N = 64, δ = 0", robust.all_classes),
     12: ("Pr[C inside] of I, II falls with N and δ", soft.inside_falls),
     13: ("Pr[A|inside] < 1, falls with N and δ", soft.aggregation_inside),

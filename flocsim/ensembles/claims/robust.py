@@ -53,19 +53,18 @@ def all_of(results, what, trials, good):
     return always(what, happened, count, named(results, trials & ~good))
 
 
-def spheres(results, counts):
+def spheres(results):
     """(6) Equivalent spheres: always inside, always aggregated."""
     chosen = only(results, vertices=[1])
     outcome, inside = results.replicates["outcome"], results.replicates["inside"]
-    yield all_of(results, "Pr[C inside], spheres", chosen & (inside <= 1), inside == 1)
-    yield all_of(results, "Pr[A], spheres", chosen & (outcome < len(CLASSES)), outcome % 2 == 0)
+    yield "Pr[C inside], spheres", chosen & (inside <= 1), inside == 1
+    yield "Pr[A], spheres", chosen & (outcome < len(CLASSES)), outcome % 2 == 0
 
 
-def small_inside(results, counts):
+def small_inside(results):
     """(7) Type III: always inside."""
     inside = results.replicates["inside"]
-    chosen = only(results, types=["III"]) & (inside <= 1)
-    yield all_of(results, "Pr[C inside], Type III", chosen, inside == 1)
+    yield "Pr[C inside], Type III", only(results, types=["III"]) & (inside <= 1), inside == 1
 
 
 def type_order(results, counts):
@@ -96,21 +95,36 @@ def least_difference(what, differences):
     return Part(what, value, value - spread, value + spread, FAILS if clear else HOLDS, note)
 
 
-def identities(results, counts):
+def identities(results):
     """(9) A + B = Pr[C inside] and A + B + C + D = 1, over decided collisions."""
     outcome, inside = results.replicates["outcome"], results.replicates["inside"]
     decided = outcome < len(CLASSES)
     agrees = np.where(outcome <= 1, inside == 1, inside == 0)
-    yield all_of(results, "decided collisions whose class agrees with their side", decided, agrees)
+    yield "decided collisions whose class agrees with their side", decided, agrees
     ended = (inside <= 1) & (outcome != FAILED) & (outcome != MISSED)
-    yield all_of(results, "collisions that are of a class", ended, decided)
+    yield "collisions that are of a class", ended, decided
 
 
-def small_classes(results, counts):
+def small_classes(results):
     """(10) Type III: only A and B."""
     outcome = results.replicates["outcome"]
     chosen = only(results, types=["III"]) & (outcome < len(CLASSES))
-    yield all_of(results, "Pr[A or B], Type III", chosen, outcome <= 1)
+    yield "Pr[A or B], Type III", chosen, outcome <= 1
+
+
+ALWAYS = {6: spheres, 7: small_inside, 9: identities, 10: small_classes}
+"""Number → function of Results that yields (words, trials, good): good in all trials."""
+
+
+def always_so(number):
+    """The claim that an event of ALWAYS always happens, as a function that yields Parts."""
+    return lambda results, counts: (all_of(results, *rule) for rule in ALWAYS[number](results))
+
+
+def contradicting(results, number):
+    """Flags (type, vertices, delta, replicate) of what contradicts a claim of ALWAYS."""
+    exceptions = [trials & ~good for _, trials, good in ALWAYS[number](results)]
+    return np.any(exceptions, axis=0)
 
 
 def all_classes(results, counts):

@@ -5,6 +5,7 @@ import pytest
 from paper_like import DELTA, TYPES, VERTICES, paper_fits, paper_results, relabelled
 
 from flocsim.ensembles.claims import check_claims
+from flocsim.ensembles.claims.robust import contradicting
 from flocsim.ensembles.claims.table import claims_table, verdicts_table
 
 
@@ -66,6 +67,12 @@ def all_depart_outside(outcome, inside):
 )
 def test_a_claim_fails_where_it_is_broken(change, broken):
     assert failing(paper_results(change)) == broken
+
+
+def test_the_replicates_that_contradict_are_found():
+    results = paper_results(small_outside)
+    for number, places in ((6, []), (7, [[2, 1, 4, 7]]), (9, []), (10, [[2, 1, 4, 7]])):
+        assert np.argwhere(contradicting(results, number)).tolist() == places
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,55 @@
+"""Put the numbers and figures of a finished study into docs/reproduction.md.
+
+    python examples/tang2014/fill_page.py DIR
+
+Every part ``<!-- name -->`` … ``<!-- end -->`` of the page is replaced by that of the same name in
+DIR's summary.md, sensitivity.md or plateau.md; parts without one stay. Figures that the page shows,
+figures/tang2014-NAME, are copied from DIR/NAME. The words around them are for a person to check.
+"""
+
+import argparse
+import re
+import shutil
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
+SOURCES = ("summary.md", "sensitivity.md", "plateau.md")
+PART = re.compile(r"<!-- ([a-z-]+) -->\n.*?<!-- end -->", re.DOTALL)
+FIGURE = re.compile(r"\(figures/tang2014-([\w.-]+)\)")
+
+
+def parts_of(folder):
+    """{name: part with its marks} of the files in a folder."""
+    texts = [(folder / name).read_text("utf-8") for name in SOURCES if (folder / name).exists()]
+    return {match[1]: match[0] for text in texts for match in PART.finditer(text)}
+
+
+def filled(text, parts):
+    """The page's text with the known parts replaced."""
+    return PART.sub(lambda match: parts.get(match[1], match[0]), text)
+
+
+def copy_figures(text, folder, target):
+    """Copy the figures of the page that the folder has; their names."""
+    names = [name for name in FIGURE.findall(text) if (folder / name).exists()]
+    for name in names:
+        shutil.copyfile(folder / name, target / f"tang2014-{name}")
+    return names
+
+
+def main():
+    """Fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, metavar="DIR")
+    folder = parser.parse_args().folder
+    parts = parts_of(folder)
+    text = PAGE.read_text("utf-8")
+    PAGE.write_text(filled(text, parts), "utf-8")
+    wanted = [match[1] for match in PART.finditer(text)]
+    print("filled:", ", ".join(name for name in wanted if name in parts))
+    print("as before:", ", ".join(name for name in wanted if name not in parts))
+    print("copied:", ", ".join(copy_figures(text, folder, PAGE.parent / "figures")))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+"""summary.md: all the numbers of a finished study that docs/reproduction.md shows."""
+
+import numpy as np
+import steps
+from beside import beside_table
+
+from flocsim.ensembles.claims.robust import ALWAYS, contradicting
+from flocsim.ensembles.claims.table import claims_table, markdown, verdicts_table
+from flocsim.io.intervals import proportion
+from flocsim.io.results import CLASSES
+
+FLIP_KINDS = ("outcome", "aggregation", "zone")
+MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1
+"""Goals [%]: outcome flips among the replicates run again, undecided among all."""
+MOST_OPEN = 1.0
+"""Share [%] of a reading's collisions without an outcome that needs a word of caution."""
+
+
+def write_summary(folder, study, flips, findings, readings, zones):
+    """Write the page: each part stands between marks, as in docs/reproduction.md.
+
+    ``findings``: of all claims; ``readings``: {name: (Results, Findings of claims 6 to 18)};
+    ``zones``: {type: D_0 [m]}.
+    """
+    parts = {
+        "times": times(folder, study),
+        "totals": totals(study),
+        "flips": flips_table(flips),
+        "claims": claims_table(findings),
+        "against": against(study, zones),
+        "beside": beside_table(study),
+    }
+    if readings:
+        parts["readings"] = verdicts_table({name: found for name, (_, found) in readings.items()})
+        parts["reading-totals"] = readings_totals(readings)
+    path = folder / "summary.md"
+    path.write_text("\n\n".join(marked(*part) for part in parts.items()) + "\n", "utf-8")
+    print(path)
+
+
+def marked(name, text):
+    """A part between its marks."""
+    return f"<!-- {name} -->\n\n{text}\n\n<!-- end -->"
+
+
+def times(folder, study):
+    """Wall time of every step, and where and on what the study ran."""
+    run = study.run
+    goes = steps.taken(folder / "steps.csv")
+    rows = [(name, f"{sum(each):.0f}", len(each)) for name, each in goes.items()]
+    rows.append(("all", f"{sum(sum(each) for each in goes.values()):.0f}", ""))
+    where = (
+        f"flocsim {run['flocsim_version']}, {run['date']}, {run['processor']}, Python "
+        f"{run['python_version']}, numpy {run['numpy_version']}, numba {run['numba_version']}. The "
+        f"study on {run['ranks']} rank{'s' if run['ranks'] > 1 else ''}: {run['computed']} "
+        f"replicates in {run['wall_time']:.0f} s, "
+        f"{run['computed'] / max(run['wall_time'], 1e-9):.0f} a second."
+    )
+    return f"{where}\n\n{markdown(('step', 'wall time [s]', 'goes'), rows)}"
+
+
+def totals(study):
+    """What became of the replicates, by type and in all."""
+    table = study.probabilities
+    names = ("total", "missed", "undecided", "failed", "collided")
+    counts = [table[f"n_{name}"].sum(axis=(1, 2)) for name in names]
+    rows = np.column_stack([*counts, table["n_class"].sum(axis=(1, 2))])
+    lines = [(name, *row) for name, row in zip(study.types, rows, strict=True)]
+    all_of_them = markdown(("type", *names, *CLASSES), [*lines, ("all", *rows.sum(axis=0))])
+    total, _, undecided, failed = rows.sum(axis=0)[:4]
+    share = 100.0 * undecided / total
+    return (
+        f"{all_of_them}\n\nUndecided {share:.3f} % (goal: at most {MOST_UNDECIDED} %: "
+        f"{reached(share <= MOST_UNDECIDED)}), failed {failed} (goal: 0: {reached(failed == 0)})."
+    )
+
+
+def reached(flag):
+    """Whether a goal was."""
+    return "reached" if flag else "**not reached**"
+
+
+def flips_table(flips):
+    """How many of the replicates that were run again changed."""
+    rows = []
+    for kind in FLIP_KINDS:
+        among = np.ones_like(flips.outcome) if kind == "outcome" else flips.both
+        changed, count = np.count_nonzero(getattr(flips, kind)), np.count_nonzero(among)
+        value, low, high = (100.0 * float(each) for each in proportion(changed, count))
+        rows.append((kind, changed, count, f"{value:.2f}", f"[{low:.2f}, {high:.2f}]"))
+    heads = ("flips of", "replicates", "among", "share [%]", "95 %")
+    flag = reached(float(rows[0][3]) <= MOST_FLIPS)
+    return f"{markdown(heads, rows)}\n\nOutcome flips (goal: at most {MOST_FLIPS} %): {flag}."
+
+
+def against(study, zones):
+    """The replicates that contradict a claim about every collision, one row each."""
+    heads = ("claim", "type", "replicate", "flocs i, j", "conditions", "N", "δ", "d_c / D_0")
+    rows = [row for number in ALWAYS for row in rows_against(study, zones, number)]
+    return markdown(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
+
+
+def rows_against(study, zones, number):
+    """The rows of one claim."""
+    flags = contradicting(study, number)
+    for kind, name in enumerate(study.types):
+        for k in np.flatnonzero(flags[kind].any(axis=(0, 1))):
+            place = kind, *np.nonzero(flags[kind][..., k]), k
+            ratios = study.replicates["d_c_collision"][place] / zones[name]
+            where = listed(study.vertices[place[1]]), listed(study.delta[place[2]])
+            reach = f"{ratios.min():.3f} to {ratios.max():.3f}"
+            flocs = " and ".join(floc_names(study, place))
+            yield number, name, k, flocs, len(ratios), *where, reach
+
+
+def floc_names(study, place):
+    """The names of the flocs of i and j; the first, where conditions differ."""
+    for body in ("floc_i", "floc_j"):
+        number = int(study.replicates[body][place][0])
+        yield study.flocs[number] if number >= 0 else "sphere"
+
+
+def listed(values):
+    """Distinct values, the first and last of many."""
+    shown = [f"{value:g}" for value in np.unique(values)]
+    return ", ".join(shown) if len(shown) <= 5 else f"{shown[0]} … {shown[-1]}"
+
+
+def readings_totals(readings):
+    """What became of the replicates under every reading."""
+    names = ("total", "missed", "undecided", "failed")
+    rows = []
+    for name, (results, _) in readings.items():
+        table = results.probabilities
+        counts = [table[f"n_{each}"].sum() for each in names]
+        seconds = results.run["wall_time"]
+        rows.append((name, *counts, *table["n_class"].sum(axis=(0, 1, 2)), f"{seconds:.0f}"))
+    table = markdown(("reading", *names, *CLASSES, "wall time [s]"), rows)
+    return "\n\n".join([table, *(text for row in rows if (text := caution(row)))])
+
+
+def caution(row):
+    """A sentence on a reading of which too much stayed open to judge it; "" otherwise."""
+    name, total, missed, undecided, failed = row[:5]
+    share = 100.0 * (undecided + failed) / max(total - missed, 1)
+    if share <= MOST_OPEN:
+        return ""
+    return (
+        f"**{name}**: {share:.0f} % of the collisions are undecided or failed; its verdicts are "
+        "about the others only."
+    )
