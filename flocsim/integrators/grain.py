@@ -7,6 +7,7 @@ from flocsim.geometry.contacts import locate_contacts
 from flocsim.integrators.accuracy import step_tolerance
 from flocsim.integrators.kinks import kink_share
 from flocsim.integrators.switches import first_switch
+from flocsim.integrators.touches import furthest_place
 from flocsim.layout import CANDIDATES, NEW, NOW, TOLERANCE
 from flocsim.slots import awaits_touch
 
@@ -34,11 +35,7 @@ def grain_of(work, clock):
     deepest = deepest_overlap(work)
     if deepest > 0.0:
         grain = min(grain, GRAIN_OF_OVERLAP * deepest)
-    furthest = 0.0
-    for body in range(work.motion.shape[1]):
-        for axis in range(2):
-            furthest = max(furthest, abs(work.motion[NEW, body, axis]))
-    return max(grain, ROUNDING * furthest)
+    return max(grain, ROUNDING * furthest_place(work, NEW))
 
 
 def switch_share(scene, work, memo, clock, step):

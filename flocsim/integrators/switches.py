@@ -4,7 +4,7 @@ The motion in the step is interpolated; the integrator then takes a shorter step
 """
 
 from flocsim.geometry.contacts import locate_polygons, turn_bodies
-from flocsim.integrators.touches import touch_grain
+from flocsim.integrators.touches import memory_of, release_grain, touch_grain
 from flocsim.integrators.views import normal_rate
 from flocsim.layout import CANDIDATES, CLOSEST, NEW, NOW, SCRATCH
 from flocsim.slots import surface_reach
@@ -128,20 +128,32 @@ def crossing(scene, work, step, row, rival, high, grain):
     return share
 
 
-def least_depth(scene, work, step, row, grain, depth):
-    """The overlap at the end of a step below which an open pair has not touched yet [m].
+def collides(work, step, row, depth):
+    """Whether an open pair that overlaps at the end of the step goes on approaching: a graze turns
+    around by itself, speed²/(2 slowing) deeper."""
+    speed = -normal_rate(work, NEW, row)
+    if speed * step > depth:
+        return True
+    slowing = (-normal_rate(work, NOW, row) - speed) / step
+    lasting = speed * memory_of(work, row) > depth
+    return lasting and speed * speed > 2.0 * slowing * depth
 
-    One that goes on approaching has, however little it overlaps by now.
-    """
-    approach = -step * normal_rate(work, NEW, row)
-    return touch_grain(scene, work, NEW, row, grain) if approach > depth else depth
+
+def unnoticed(scene, work, step, row, grain, depth):
+    """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
+    before, after = work.geometry[NOW, row, 2], work.geometry[NEW, row, 2]
+    if before < 0.0 <= after:
+        return release_grain(scene, work, NEW, row, grain)
+    if before >= 0.0 > after and collides(work, step, row, depth):
+        return touch_grain(scene, work, NEW, row, grain)
+    return depth
 
 
 def switch_of(scene, work, step, row, rival, earliest, grain, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
     high, limit = min(earliest, 1.0), depth
-    if rival < 0 and work.geometry[NOW, row, 2] >= 0.0 > work.geometry[NEW, row, 2]:
-        limit = least_depth(scene, work, step, row, grain, depth)
+    if rival < 0:
+        limit = unnoticed(scene, work, step, row, grain, depth)
         grain = min(grain, limit)
     if margin(work, NEW, row, rival) >= -limit:
         if rival < 0 and work.geometry[NOW, row, 2] < 0.0:

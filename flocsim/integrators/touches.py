@@ -1,6 +1,7 @@
 """How finely the instant of a touch must be known: what follows from a contact hangs on it.
 
-A contact that is noticed g too deep gives back a velocity that is off by about ω0 g.
+A contact that is noticed g too deep gives back a velocity that is off by about ω0 g; one that goes
+on damping until g behind its end, by that force's acceleration times g/speed.
 """
 
 import math
@@ -16,6 +17,9 @@ SHARE_OF_DEPTH = 0.02
 GRAINS_LATER = 100.0
 """… and so finely that the error of velocity leads to so many grains at most."""
 
+GRAINS_AFTER_RELEASE = 1e3
+"""As many where a contact ends: a step that has to be cut there costs more than that is worth."""
+
 NEARLY = 0.99
 """Critical damping is told from less in spite of rounding."""
 
@@ -29,6 +33,9 @@ def pressed(view, overlap, overlap_rate, parameters):
     return force
 
 
+COARSEST_ROUNDING = 2e-15
+"""Not finer than this share of the places, in which ten neighbouring numbers lie."""
+
 TINY = 1e-300
 """Keeps a quotient finite."""
 
@@ -41,6 +48,21 @@ def bounces(view, speed, frequency, parameters):
     )
 
 
+def memory_of(work, row):
+    """How long a velocity of either body of a pair is remembered [s]."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
+
+
+def furthest_place(work, state):
+    """The largest coordinate of a body [m]."""
+    furthest = 0.0
+    for body in range(work.motion.shape[1]):
+        for axis in range(2):
+            furthest = max(furthest, abs(work.motion[state, body, axis]))
+    return furthest
+
+
 def touch_grain(scene, work, state, row, grain):
     """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
     speed = -normal_rate(work, state, row)
@@ -51,7 +73,17 @@ def touch_grain(scene, work, state, row, grain):
     frequency = math.sqrt(stiffness / view.effective_mass)
     if not bounces(view, speed, frequency, scene.parameters):
         return grain
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
-    memory = max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
-    later = GRAINS_LATER * grain / max(frequency * memory, TINY)
-    return min(grain, SHARE_OF_DEPTH * speed / frequency, later)
+    later = GRAINS_LATER * grain / max(frequency * memory_of(work, row), TINY)
+    fine = min(grain, SHARE_OF_DEPTH * speed / frequency, later)
+    return max(fine, COARSEST_ROUNDING * furthest_place(work, state))
+
+
+def release_grain(scene, work, state, row, grain):
+    """How far a contact may have opened unnoticed [m], while its damping still pulls."""
+    speed = normal_rate(work, state, row)
+    if not speed > 0.0:
+        return grain
+    view = contact_view(scene, work, state, row)
+    pull = abs(pressed(view, 0.0, -speed, scene.parameters)) / view.effective_mass
+    later = GRAINS_AFTER_RELEASE * grain * speed / max(pull * memory_of(work, row), TINY)
+    return max(min(grain, later), COARSEST_ROUNDING * furthest_place(work, state))

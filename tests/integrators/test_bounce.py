@@ -53,6 +53,22 @@ def test_errors_stay_near_the_tolerance_through_a_bounce(integrator, z):
         assert error < 10.0 * end.error
 
 
+@pytest.mark.parametrize("tension", [True, False])
+@pytest.mark.parametrize("gap", [1e-14, 1e-12])
+@by_adaptive
+def test_a_bounce_shallower_than_the_tolerance_gives_back_the_right_speed(integrator, gap, tension):
+    """Spheres that all but touch at the start, and sink in by a tenth of the tolerance."""
+    bodies = head_on(speed := 1e-7, gap)
+    omega = math.sqrt(2.0 * K_N / bodies[0].mass)
+    law = Contact(K_N, 0.0, damping_n=0.6 * omega, tension=tension)
+    depth = speed / omega
+    method = attrs.evolve(integrator, tolerance=10.0 * depth)
+    end = watched(PolygonSystem(bodies, [law, Spring()], method), until := 1e9 * depth / speed)
+    restitution, _, _ = impact(0.3, tension)
+    parted = end.position[1, 0] - end.position[0, 0] - 1e-5
+    assert parted == pytest.approx(restitution * speed * until, rel=1e-6)
+
+
 @by_adaptive
 def test_steps_go_with_a_high_root_of_the_tolerance(integrator):
     """Order 5: a hundredth of the tolerance costs hardly three times the steps, not ten times."""
