@@ -7,18 +7,33 @@ of that little alone.
 from flocsim.integrators.views import contact_view
 from flocsim.layout import CANDIDATES, CLOSED, NEW, NOW
 from flocsim.slots import kink
+from flocsim.state import ContactView
 
 FINENESS = 1e-4
-"""A kink is located to this share of how far the step began from it."""
+"""A kink is located to this share of how far the step began from it, …"""
+
+ROUNDING = 1e-6
+"""… and what lies within this share of the value for the same overlap at rest is as good as there:
+its sign may be rounding, and steps would end there for ever, and no time would go by."""
+
+
+def rounding(view, parameters):
+    """The value of a kink that cannot be told from none."""
+    resting = ContactView(
+        view.overlap, 0.0, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
+    )
+    return ROUNDING * abs(kink(resting, parameters))
 
 
 def row_share(scene, work, row):
     """The share of the step at which one contact passes its kink, by linear interpolation; 2.0
     where it does not, or is as good as there at either end."""
-    before = kink(contact_view(scene, work, NOW, row), scene.parameters)
+    view = contact_view(scene, work, NOW, row)
+    before = kink(view, scene.parameters)
     after = kink(contact_view(scene, work, NEW, row), scene.parameters)
-    nearer = min(abs(before), abs(after))
-    if before * after >= 0.0 or nearer <= FINENESS * max(abs(before), abs(after)):
+    nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
+    least = max(FINENESS * further, rounding(view, scene.parameters))
+    if before * after >= 0.0 or nearer <= least:
         return 2.0
     # A little further than the kink, so that the next step begins behind it.
     return (1.0 + 0.5 * FINENESS) * before / (before - after)

@@ -9,6 +9,7 @@ from small_study import small_study
 from flocsim.ensembles import memo as memo_at
 from flocsim.ensembles.sampling import draws, orientations
 from flocsim.ensembles.scene import LIMIT_TURNS, REST_TURNS, Record, run_encounter
+from flocsim.io.results_schema import OUTCOMES
 from flocsim.layout import NOW
 
 
@@ -127,3 +128,11 @@ def test_the_run_starts_anew_from_the_encounter_every_time(study):
         for _ in range(2)
     ]
     assert same_row(*rows)
+
+
+def test_contacts_that_never_pull_come_to_an_end(tmp_path):
+    """Resting contacts hang at the kink of such a law, where steps could end for ever."""
+    study = small_study(tmp_path, {"forces": {"contact": {"tension": False}}})
+    rows = [study.run(0, 16, 0.0, replicate) for replicate in range(10)]
+    assert max(row["steps"] for row in rows) < 20_000
+    assert not any(OUTCOMES[row["outcome"]] == "undecided" for row in rows)
