@@ -70,10 +70,10 @@ def draw_results(folder, study, check, flips):
 
 
 def flip_text(changed, among):
-    """ "run again: 1 of 1092 flip (0.09 %)"; nothing where nothing was run again."""
+    """ "flips 1 of 1092 (0.09 %)"; nothing where nothing was run again."""
     count, flipped = int(np.count_nonzero(among)), int(np.count_nonzero(changed & among))
     share = f" ({100.0 * flipped / count:.2g} %)" if flipped else ""
-    return f"run again: {flipped} of {count} flip{share}" if count else ""
+    return f"flips {flipped} of {count}{share}" if count else ""
 
 
 def write_probabilities(path, study, flips):

@@ -164,7 +164,6 @@ def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):
     for more in ([], ["--inscribed"]):
         assert run(frame, *options, *more, "-o", tmp_path / "s.h5") == 0
         areas.append([entry.fits[4].shape.area for entry in read_library(tmp_path / "s.h5")])
-    assert all(inside <= free for free, inside in zip(*areas, strict=True))
     assert sum(areas[1]) < sum(areas[0])
     for more in (["--preserve-area"], ["--method", "paper"]):
         with pytest.raises(UsageError, match="--inscribed goes with"):
