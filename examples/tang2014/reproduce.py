@@ -1,16 +1,18 @@
 """The study of Tang, Alonso-Marroquín & Maggi (2014): shapes, collisions, figures, claims.
 
     python examples/tang2014/reproduce.py --images DIR… --launch "mpirun -n 2"
-    python examples/tang2014/reproduce.py --replicates 100 --jobs 2      # synthetic flocs, reduced
+    python examples/tang2014/reproduce.py --replicates 100               # synthetic flocs, reduced
 
 Each step shows its command and leaves its files in the output folder; what is finished is not done
 again, and what was interrupted goes on, so the same command resumes.
 """
 
 import argparse
+import os
 import shlex
 import sys
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import steps
@@ -38,12 +40,19 @@ def parse_arguments():
     parser.add_argument("--pixel-size", default="0.95e-6", metavar="METRES")
     parser.add_argument("--replicates", type=int, default=1000, help="default: %(default)s")
     parser.add_argument("--vertices", metavar="LIST", help="instead of the study's, e.g. 1,4,16,64")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes, without MPI")
+    parser.add_argument(
+        "--jobs", type=int, default=cores(), metavar="N", help="processes, default: %(default)s"
+    )
     parser.add_argument("--launch", metavar="COMMAND", help='e.g. "mpirun -n 2" or "srun"')
     parser.add_argument("--readings", action="store_true", help="run the other readings too")
     parser.add_argument("--reading-replicates", type=int, default=100, metavar="N")
     parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
     return parser.parse_args()
+
+
+def cores():
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 def flocsim(folder, name, *words):
@@ -199,8 +208,10 @@ def write_pages(arguments, changes, readings):
     from flocsim.ensembles import load_config
 
     folder = arguments.output
-    for name, replicate in pages.examples_of_classes(folder / "study.h5").items():
-        draw_trajectory(folder / f"figure-7-{name}", replicate, changes)
+    examples = pages.examples_of_classes(folder / "study.h5")
+    paths = [folder / f"figure-7-{name}" for name in examples]
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        list(pool.map(draw_trajectory, paths, examples.values(), [changes] * len(paths)))
     library = folder / "errors.h5" if arguments.images else None
     pages.write(folder, load_config(STUDY), library, readings)
 
