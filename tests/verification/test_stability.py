@@ -58,7 +58,7 @@ def long_cases():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("index", long_cases())
+@pytest.mark.parametrize("index", list(long_cases()))
 def test_more_cases(index):
     assert_right_or_typed(index)
 
