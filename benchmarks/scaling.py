@@ -137,7 +137,9 @@ def main():
         tables = []
         if "ranks" in arguments.only:
             columns = ("run", "replicates", "s", "efficiency", "least", "most")
-            tables.append(Table("Two ranks against two independent serial halves", columns))
+            tables.append(
+                Table("Two ranks against two serial runs of the study at once, halved", columns)
+            )
             compare_ranks(folder, 300 if quick else 6000, 2 if quick else 3, tables[-1])
         if "memory" in arguments.only:
             columns = ("ranks", "replicates", "peak memory of each rank [MB]", "ratio")

@@ -3,17 +3,17 @@
 import csv
 
 import numpy as np
+from output import save_all
 from summary import write_summary
 
 from flocsim.ensembles.claims import FIT_CLAIMS, check_claims
 from flocsim.ensembles.claims.table import claims_table
 from flocsim.ensembles.flips import flips_between
 from flocsim.ensembles.zone import zone_distance
-from flocsim.io.plots import FIGURES, POPULATION_FIGURES, save
+from flocsim.io.plots import FIGURES, POPULATION_FIGURES
 from flocsim.io.results import CLASSES, read_results
 from flocsim.io.shape_library import read_library
 
-FORMATS = ("png", "pdf")
 MOST_VERTICES = 64
 ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
 FLIPPED = {"4": ("zone", (0, 1, 2, 3)), "5": ("aggregation", (0, 1)), "6": ("aggregation", (2, 3)),
@@ -33,7 +33,7 @@ def write(folder, config, library, readings):
     draw_results(folder, study, check, flips)
     if entries:
         for name, figure in POPULATION_FIGURES.items():
-            save_all(folder, name, figure(entries))
+            write_figure(folder, name, figure(entries))
     write_probabilities(folder / "probabilities.csv", study, flips)
     held = hold_readings(readings)
     if held:
@@ -49,11 +49,9 @@ def zones_of(config):
     }
 
 
-def save_all(folder, name, figure):
-    """Save a figure in every format."""
-    for ending in FORMATS:
-        path = folder / f"figure-{name}.{ending}"
-        save(figure, path)
+def write_figure(folder, name, figure):
+    """Save a figure in every format, and say where."""
+    for path in save_all(figure, folder / f"figure-{name}"):
         print(path)
 
 
@@ -66,7 +64,7 @@ def draw_results(folder, study, check, flips):
         for place, axes in enumerate(figure.axes[: len(study.types)]):
             text = flip_text(changed[place] & among[place], among[place])
             axes.set_title(text, loc="right", fontsize=6, color="0.35")
-        save_all(folder, name, figure)
+        write_figure(folder, name, figure)
 
 
 def flip_text(changed, among):

@@ -15,11 +15,9 @@ turning, brings its centres to where the attraction exceeds L, which is geometry
 Writes plateau.png, .pdf and plateau.md.
 """
 
-import argparse
-from pathlib import Path
-
 import numpy as np
-from sweeps import TYPES, config_of, sweep, transition
+from output import marked, save_all
+from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.claims.table import markdown
 from flocsim.ensembles.scene import Record
@@ -29,7 +27,6 @@ from flocsim.ensembles.zone import only_one
 from flocsim.forces import VanDerWaals
 from flocsim.io.intervals import proportion
 from flocsim.io.plot_style import graded_colours, house_style, new_figure, set_probability_axis
-from flocsim.io.plots import save
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)
@@ -182,12 +179,7 @@ def draw_approach(axes, bound, gap, reach):
 
 def main():
     """Run both tests."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--library", type=Path, metavar="FILE")
-    parser.add_argument("--replicates", type=int, default=200)
-    parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
-    arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
+    arguments = parse_arguments(__doc__)
 
     def make(*changes):
         return config_of(arguments.library, arguments.replicates, *changes)
@@ -197,11 +189,13 @@ def main():
     found = [approaches(study, kind) for kind in range(len(TYPES))]
     table, reaches = approach_table(study, pairs, found)
     swept = cut_off_sweeps(make, pairs)
-    for ending in ("png", "pdf"):
-        save(figure(swept, found[SHOWN], reaches[SHOWN]), arguments.output / f"plateau.{ending}")
-    text = f"<!-- spheres -->\n\n{spheres_table(make, pairs)}\n\n<!-- end -->\n\n"
-    text += f"<!-- cut-offs -->\n\n{sweeps_table(swept)}\n\n<!-- end -->\n\n"
-    text += f"<!-- approaches -->\n\n{table}\n\n<!-- end -->\n"
+    save_all(figure(swept, found[SHOWN], reaches[SHOWN]), arguments.output / "plateau")
+    parts = {
+        "spheres": spheres_table(make, pairs),
+        "cut-offs": sweeps_table(swept),
+        "approaches": table,
+    }
+    text = "\n\n".join(marked(*part) for part in parts.items()) + "\n"
     (arguments.output / "plateau.md").write_text(text, "utf-8")
     print(text)
 

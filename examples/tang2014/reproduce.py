@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import steps
+from output import paths_of
 
 HERE = Path(__file__).resolve().parent
 STUDY, READINGS = HERE / "study.toml", HERE / "readings.toml"
@@ -24,7 +25,6 @@ CHECKED_SHARE = 0.05
 TIGHTER = 0.01
 """Factor on the tolerance there."""
 READING_VERTICES = (1, 4, 16, 64)
-FORMATS = ("png", "pdf")
 ERROR_RADII = "1,2,4"
 ERROR_VERTICES = "4,8,16,28,40,52,64"
 """Of the fits for Fig. 3."""
@@ -147,9 +147,7 @@ def draw_trajectory(path, replicate, changes):
     """Fig. 7 for one replicate of Type I, N = 64, δ = 0: frames, distance, forces, animation."""
     if path.with_suffix(".gif").exists():
         return
-    strip, distance, forces = (
-        [f"{path}{which}.{ending}" for ending in FORMATS] for which in ("", "-distance", "-forces")
-    )
+    strip, distance, forces = (paths_of(f"{path}{which}") for which in ("", "-distance", "-forces"))
     flocsim(
         path.parent, path.stem, "trajectory", STUDY, *settings(changes), "--scene", "I,64,0",
         "--replicate", replicate, "--output", *strip, "--distance", *distance,

@@ -7,17 +7,16 @@ One process; orientations and flocs are the same for every value. Writes sensiti
 and the transitions into sensitivity.md.
 """
 
-import argparse
 import csv
 import time
-from pathlib import Path
 
 import numpy as np
-from sweeps import TYPES, Sweep, config_of, nested, sweep, transition
+from output import marked, save_all
+from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.claims.table import markdown, number_text
+from flocsim.ensembles.settings import nested
 from flocsim.io.plot_style import house_style, new_figure, set_probability_axis
-from flocsim.io.plots import save
 
 COLOURS, MARKERS = ("#0072B2", "#D55E00", "#009E73"), "osD"
 MOST_OPEN = 0.05
@@ -50,7 +49,7 @@ def run_all(library, replicates):
     found = {}
     for name, (keys, _, _, values) in QUANTITIES.items():
         found[name] = sweep(
-            name, values, lambda v, k=keys: config_of(library, replicates, nested(k, float(v)))
+            name, values, lambda v, k=keys: config_of(library, replicates, nested([(k, float(v))]))
         )
     found[DELTA] = sweep(
         DELTA, SHARES, lambda f: config_of(library, replicates, {"scene": {"delta": [f]}})
@@ -152,19 +151,13 @@ def solid(found):
 
 def main():
     """Run all values, draw all panels."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--library", type=Path, metavar="FILE")
-    parser.add_argument("--replicates", type=int, default=200)
-    parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
-    arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
+    arguments = parse_arguments(__doc__)
     began = time.process_time()
     sweeps = run_all(arguments.library, arguments.replicates)
     spent = f"{(time.process_time() - began) / 60.0:.1f} minutes of one core"
-    for ending in ("png", "pdf"):
-        save(figure(sweeps), arguments.output / f"sensitivity.{ending}")
+    save_all(figure(sweeps), arguments.output / "sensitivity")
     write_points(arguments.output / "sensitivity.csv", sweeps)
-    text = f"<!-- transitions -->\n\n{transitions(sweeps)}\n\n<!-- end -->\n\n{spent}\n"
+    text = marked("transitions", transitions(sweeps)) + f"\n\n{spent}\n"
     (arguments.output / "sensitivity.md").write_text(text, "utf-8")
     print(text)
 

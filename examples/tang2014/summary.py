@@ -3,6 +3,7 @@
 import numpy as np
 import steps
 from beside import beside_table
+from output import marked
 
 from flocsim.ensembles.claims.robust import ALWAYS, contradicting
 from flocsim.ensembles.claims.table import claims_table, markdown, verdicts_table
@@ -36,11 +37,6 @@ def write_summary(folder, study, flips, findings, readings, zones):
     path = folder / "summary.md"
     path.write_text("\n\n".join(marked(*part) for part in parts.items()) + "\n", "utf-8")
     print(path)
-
-
-def marked(name, text):
-    """A part between its marks."""
-    return f"<!-- {name} -->\n\n{text}\n\n<!-- end -->"
 
 
 def times(folder, study):

@@ -1,5 +1,6 @@
 """Pr[A] along one parameter around the preset: runs, intervals, and where it changes over."""
 
+import argparse
 from functools import reduce
 from pathlib import Path
 
@@ -46,11 +47,15 @@ class Sweep:
         return self.open.sum(axis=-1) / np.maximum((self.open | self.decided).sum(axis=-1), 1)
 
 
-def nested(keys, value):
-    """{"a": {"b": value}} of ("a", "b")."""
-    for key in reversed(keys):
-        value = {key: value}
-    return value
+def parse_arguments(description):
+    """The command line of a script that sweeps; the output folder is there afterwards."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("--library", type=Path, metavar="FILE")
+    parser.add_argument("--replicates", type=int, default=200)
+    parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    return arguments
 
 
 def config_of(library, replicates, *changes):

@@ -4,10 +4,9 @@ The force is continuous there, so that a step that ends a little behind the kink
 of that little alone.
 """
 
-from flocsim.integrators.views import contact_view
+from flocsim.integrators.views import contact_view, pressed_view
 from flocsim.layout import CANDIDATES, CLOSED, NEW, NOW
 from flocsim.slots import kink
-from flocsim.state import ContactView
 
 FINENESS = 1e-4
 """A kink is located to this share of how far the step began from it, …"""
@@ -19,10 +18,7 @@ its sign may be rounding, and steps would end there for ever, and no time would 
 
 def rounding(view, parameters):
     """The value of a kink that cannot be told from none."""
-    resting = ContactView(
-        view.overlap, 0.0, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
-    )
-    return ROUNDING * abs(kink(resting, parameters))
+    return ROUNDING * abs(kink(pressed_view(view, view.overlap, 0.0), parameters))
 
 
 def row_share(scene, work, row):

@@ -6,10 +6,9 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 
 import math
 
-from flocsim.integrators.views import contact_view, normal_rate
+from flocsim.integrators.views import contact_view, normal_rate, pressed_view
 from flocsim.layout import MEMORY
 from flocsim.slots import contact_force
-from flocsim.state import ContactView
 
 SHARE_OF_DEPTH = 0.02
 """Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
@@ -23,21 +22,17 @@ GRAINS_AFTER_RELEASE = 1e3
 NEARLY = 0.99
 """Critical damping is told from less in spite of rounding."""
 
-
-def pressed(view, overlap, overlap_rate, parameters):
-    """The normal force of a contact with such an overlap [N]."""
-    changed = ContactView(
-        overlap, overlap_rate, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
-    )
-    force, _ = contact_force(changed, parameters)
-    return force
-
-
 COARSEST_ROUNDING = 2e-15
 """Not finer than this share of the places, in which ten neighbouring numbers lie."""
 
 TINY = 1e-300
 """Keeps a quotient finite."""
+
+
+def pressed(view, overlap, overlap_rate, parameters):
+    """The normal force of a contact with such an overlap [N]."""
+    force, _ = contact_force(pressed_view(view, overlap, overlap_rate), parameters)
+    return force
 
 
 def bounces(view, speed, frequency, parameters):
@@ -63,6 +58,11 @@ def furthest_place(work, state):
     return furthest
 
 
+def above_rounding(work, state, length):
+    """The length [m], not finer than places can be told apart."""
+    return max(length, COARSEST_ROUNDING * furthest_place(work, state))
+
+
 def touch_grain(scene, work, state, row, grain):
     """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
     speed = -normal_rate(work, state, row)
@@ -74,8 +74,7 @@ def touch_grain(scene, work, state, row, grain):
     if not bounces(view, speed, frequency, scene.parameters):
         return grain
     later = GRAINS_LATER * grain / max(frequency * memory_of(work, row), TINY)
-    fine = min(grain, SHARE_OF_DEPTH * speed / frequency, later)
-    return max(fine, COARSEST_ROUNDING * furthest_place(work, state))
+    return above_rounding(work, state, min(grain, SHARE_OF_DEPTH * speed / frequency, later))
 
 
 def release_grain(scene, work, state, row, grain):
@@ -86,4 +85,4 @@ def release_grain(scene, work, state, row, grain):
     view = contact_view(scene, work, state, row)
     pull = abs(pressed(view, 0.0, -speed, scene.parameters)) / view.effective_mass
     later = GRAINS_AFTER_RELEASE * grain * speed / max(pull * memory_of(work, row), TINY)
-    return max(min(grain, later), COARSEST_ROUNDING * furthest_place(work, state))
+    return above_rounding(work, state, min(grain, later))

@@ -75,6 +75,13 @@ def contact_view(scene, work, state, row):
     )  # fmt: skip
 
 
+def pressed_view(view, overlap, overlap_rate):
+    """The ContactView of the same contact pressed so far and so fast, without any slip."""
+    return ContactView(
+        overlap, overlap_rate, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
+    )
+
+
 def inertia(scene, body, axis):
     """Mass [kg], or moment of inertia [kg m²] for axis 2."""
     return scene.bodies[body, INERTIA] if axis == 2 else scene.bodies[body, MASS]

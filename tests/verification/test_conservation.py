@@ -98,24 +98,17 @@ def test_momentum_stays_with_hundreds_of_contacts_at_once(teeth):
 
 
 @pytest.mark.slow
-def test_implicit_over_a_hundred_thousand_contacts():
-    count, energy_change, momenta_change = drift(Implicit(tolerance=1e-12), 4.2)
-    assert count >= 100_000
-    assert abs(energy_change) < 1e-3
-    assert momenta_change < 1e-5
-
-
-@pytest.mark.slow
-def test_velocity_verlet_over_a_hundred_thousand_contacts():
-    count, energy_change, momenta_change = drift(VelocityVerlet(2.5e-8), 4.2)
-    assert count >= 100_000
-    assert abs(energy_change) < 0.03
-    assert momenta_change < 1e-8
-
-
-@pytest.mark.slow
-def test_implicit_over_a_thousand_contacts():
-    count, energy_change, momenta_change = drift(Implicit(tolerance=1e-13), 0.04)
-    assert count >= 1000
-    assert abs(energy_change) < 1e-4
-    assert momenta_change < 1e-6
+@pytest.mark.parametrize(
+    ("integrator", "seconds", "fewest", "energy", "momentum"),
+    [
+        (Implicit(tolerance=1e-12), 4.2, 100_000, 1e-3, 1e-5),
+        (VelocityVerlet(2.5e-8), 4.2, 100_000, 0.03, 1e-8),
+        (Implicit(tolerance=1e-13), 0.04, 1000, 1e-4, 1e-6),
+    ],
+    ids=["Implicit-100000", "VelocityVerlet-100000", "Implicit-1000"],
+)
+def test_many_contacts_keep_energy_and_momentum(integrator, seconds, fewest, energy, momentum):
+    count, energy_change, momenta_change = drift(integrator, seconds)
+    assert count >= fewest
+    assert abs(energy_change) < energy
+    assert momenta_change < momentum

@@ -1,0 +1,25 @@
+"""How the scripts of the study write: figures in every format, parts of docs/reproduction.md."""
+
+from pathlib import Path
+
+FORMATS = ("png", "pdf")
+
+
+def paths_of(stem):
+    """The figure's path in every format."""
+    return [Path(f"{stem}.{ending}") for ending in FORMATS]
+
+
+def save_all(figure, stem):
+    """Save a figure in every format; the paths."""
+    from flocsim.io.plots import save
+
+    paths = paths_of(stem)
+    for path in paths:
+        save(figure, path)
+    return paths
+
+
+def marked(name, text):
+    """A part between its marks."""
+    return f"<!-- {name} -->\n\n{text}\n\n<!-- end -->"
