@@ -1,6 +1,6 @@
 """Run the benchmarks and put their tables into the pages of docs/, each between its marks.
 
-    python benchmarks/refresh.py [--only NAME …] [--quick]
+    python -m benchmarks.refresh [--only NAME …] [--quick]
 
 A block ``<!-- NAME: command -->`` … ``<!-- end -->`` holds what the command printed.
 """

@@ -7,8 +7,8 @@ __version__ = "0.1.0"
 HOMES = {
     "Body": "body",
     "Fluid": "body",
-    "Sphere": "geometry.sphere",
-    "SpheroPolygon": "geometry.spheropolygon",
+    "Sphere": "geometry.shapes.sphere",
+    "SpheroPolygon": "geometry.shapes.spheropolygon",
     "System": "system",
     "Trajectory": "system",
 }

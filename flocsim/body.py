@@ -3,11 +3,14 @@
 import math
 
 import attrs
+import numpy as np
 
+from flocsim.arrays import Scene
 from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import UsageError
 from flocsim.fields import flag, is_number, quantity
-from flocsim.geometry.shape import Shape
+from flocsim.geometry.contact.circle_tree import outlines_of
+from flocsim.geometry.shapes.shape import Shape
 
 
 def read_vector(name, length, unit):
@@ -133,3 +136,22 @@ class Body:
                 "set bodies.density and bodies.depth, or fluid.buoyancy = false"
             )
         return self.mass * (1.0 - fluid.density / self.density)
+
+
+def scene_of(bodies, fluid, parameters):
+    """The bodies as one Scene of fresh arrays; ``parameters`` are the forces' numbers."""
+    shapes = [body.shape for body in bodies]
+    columns = (
+        [body.mass for body in bodies],
+        [body.buoyant_mass(fluid) for body in bodies],
+        [body.inertia for body in bodies],
+        [0.0 if body.fixed else 1.0 for body in bodies],
+        [shape.equivalent_radius for shape in shapes],
+        [shape.bounding_radius for shape in shapes],
+        [shape.radius for shape in shapes],
+    )
+    return Scene(
+        bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
+        **outlines_of(shapes)._asdict(),
+        parameters=np.array(parameters, dtype=float),
+    )

@@ -1,7 +1,7 @@
 """One compiled function per scene, warm from disk in a new process and never stale.
 
 ``compose`` takes a driver written in plain Python and the functions that fill its slots
-(flocsim.slots), clones every function that the driver reaches with those slots replaced, and
+(flocsim.hooks), clones every function that the driver reaches with those slots replaced, and
 compiles the whole as one. What goes to disk is named by a hash of all that was reached: bytecode,
 constants, Python, numba and numpy versions. An edited kernel therefore has another name; new
 parameter values, which are arguments, do not.
@@ -20,8 +20,7 @@ from pathlib import Path
 
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint, reached, refuse_closure
-from flocsim.linking import pipeline
-from flocsim.typing_memory import quick_typing
+from flocsim.numba_internals import pipeline, quick_typing
 
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
@@ -189,7 +188,7 @@ def compiler_complaint(text):
 def compose(entry, fillings, *, jit=True, allocates=False):
     """The driver ``entry`` with its slots filled, as one function.
 
-    Parameters: ``entry``, a plain function; ``fillings``, {slot function of flocsim.slots: plain
+    Parameters: ``entry``, a plain function; ``fillings``, {slot function of flocsim.hooks: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
     ``allocates``, whether any of the functions makes an array.
     Raises KernelError for kernels that capture variables or read globals that may change.

@@ -6,21 +6,7 @@ from itertools import combinations
 import attrs
 import numpy as np
 
-from flocsim.body import Body, Fluid
-from flocsim.composer import compose
-from flocsim.errors import UsageError
-from flocsim.explain import explain
-from flocsim.fields import is_number, is_whole
-from flocsim.forces.base import Force
-from flocsim.forces.source import scene_functions
-from flocsim.geometry import spheres_only
-from flocsim.geometry.overlap import overlap_fault
-from flocsim.integrators.absent import replacements
-from flocsim.integrators.base import Integrator
-from flocsim.integrators.driver import advance
-from flocsim.integrators.implicit import Implicit
-from flocsim.integrators.status import Status
-from flocsim.layout import (
+from flocsim.arrays import (
     ERROR,
     EVALUATIONS,
     NOW,
@@ -31,8 +17,22 @@ from flocsim.layout import (
     TIME,
     TOLERANCE,
     UNTIL,
+    with_capacity,
+    work_of,
 )
-from flocsim.state import scene_of, with_capacity, work_of
+from flocsim.body import Body, Fluid, scene_of
+from flocsim.composer import compose
+from flocsim.errors import UsageError
+from flocsim.explain import explain
+from flocsim.fields import is_number, is_whole
+from flocsim.forces.base import Force
+from flocsim.forces.codegen import scene_functions
+from flocsim.geometry.contact import spheres_only
+from flocsim.geometry.contact.overlap import overlap_fault
+from flocsim.integrators.absent import replacements
+from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.loop.driver import advance
 
 RECORD_ROWS = 4096
 """Rows of the record between two copies; also the steps between two looks at Ctrl-C."""

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from fast_cases import FORCES, GAPS, SURFACE_DENSITY, random_case, silenced
-from fast_scene import FastScene, shape_of
-from reference.contacts import contacts
-from reference.forces import loads
-from reference.samples import scene_of
+
+from tests.helpers.fast_cases import FORCES, GAPS, SURFACE_DENSITY, random_case, silenced
+from tests.helpers.fast_scene import FastScene, shape_of
+from tests.reference.contacts import contacts
+from tests.reference.forces import loads
+from tests.reference.samples import scene_of
 
 SCENES = range(220)
 ONE_BY_ONE = range(50)

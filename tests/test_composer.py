@@ -11,7 +11,7 @@ from flocsim.composer import compose
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
-from flocsim.integrators.explicit import sum_forces
+from flocsim.integrators.rhs.forces import sum_forces
 
 MODULE = """\
 import math

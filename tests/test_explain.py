@@ -5,13 +5,14 @@ import re
 
 import attrs
 import pytest
-from trial_scenes import Lubrication, Spring, Trap, head_on, hook
 
-from flocsim import Body, Fluid, Sphere, System, slots
+from flocsim import Body, Fluid, Sphere, System
+from flocsim import hooks as slots
 from flocsim.explain import explain
 from flocsim.explain.time_scales import all_scales
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Overdamped, VelocityVerlet
+from tests.helpers.trial_scenes import Lubrication, Spring, Trap, head_on, hook
 
 BALL = Body(Sphere(5e-6), density=2650.0)
 WATER = Fluid(buoyancy=True)

@@ -5,12 +5,10 @@ Everything is read from the source with `ast`, without importing it.
 
 import ast
 import fnmatch
-import itertools
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from statistics import median
 
 import pytest
 
@@ -27,42 +25,61 @@ ROWS = [
     ["system", "io"],
     ["explain"],
     ["forces", "integrators"],
-    ["body", "state"],
+    ["body"],
     ["geometry"],
-    [
-        "composer",
-        "linking",
-        "typing_memory",
-        "fingerprint",
-        "slots",
-        "layout",
-        "fields",
-        "constants",
-        "errors",
-        "interruption",
-    ],
+    ["arrays", "hooks"],
+    ["composer"],
+    ["fingerprint", "numba_internals", "fields", "interruption"],
+    ["constants", "errors"],
 ]
-SIBLING_IMPORTS = {
-    ("composer", "constants"),
-    ("composer", "errors"),
-    ("composer", "fingerprint"),
-    ("composer", "linking"),
-    ("composer", "typing_memory"),
-    ("fingerprint", "errors"),
-    ("fields", "errors"),
+
+# The same inside a room: its sub-rooms and files. A room's own __init__ may import all of them.
+INNER_ROWS = {
+    "geometry": [["fit"], ["contact"], ["shapes"]],
+    "integrators": [
+        ["velocity_verlet", "dormand_prince", "overdamped"],
+        ["implicit"],
+        ["loop", "radau"],
+        ["events"],
+        ["rhs"],
+        ["base", "absent"],
+    ],
+    "ensembles": [
+        ["cli"],
+        ["dry_run", "runner", "report"],
+        ["parallel"],
+        ["progress"],
+        ["estimates"],
+        ["storage"],
+        ["study"],
+        ["preflight"],
+        ["collision"],
+        ["config", "chunks"],
+    ],
+    "io": [
+        ["plots"],
+        ["shapes", "trajectory"],
+        ["images", "results", "journal"],
+        ["files", "provenance", "confidence"],
+    ],
 }
 
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {
-    "mpi4py": ["ensembles/mpi.py"],
-    "h5py": ["io/results.py", "io/results_layout.py", "io/shape_library.py", "io/trajectory.py"],
-    "skimage": ["io/image_*.py"],
-    "matplotlib": ["io/plots.py", "io/plot_*.py"],
-    "shapely": ["geometry/outline.py"],
+    "mpi4py": ["ensembles/parallel/mpi.py"],
+    "h5py": [
+        "io/results/file.py",
+        "io/results/layout.py",
+        "io/shapes/library.py",
+        "io/trajectory.py",
+    ],
+    "skimage": ["io/images/*.py"],
+    "matplotlib": ["io/plots/*.py"],
+    "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
 }
-LONGEST_FILE = 250
-MEDIAN_FUNCTION = 10
+MOST_FILES = 15
+"""Of a folder: more are found by their prefixes, not by their room."""
 
 
 def package_sources():
@@ -75,14 +92,20 @@ def package_sources():
 
 
 def room_of(path):
-    """The room of a file, given by its path inside the package: "io/plots.py" → "io"."""
+    """The room of a file, given by its path inside the package: "io/plots/style.py" → "io"."""
     first = path.split("/")[0].removesuffix(".py")
     return "flocsim" if first == "__init__" else first
 
 
-def level_of(room):
+def inner_room_of(path):
+    """Its room inside that room: "io/plots/style.py" → "plots"; None for a room's __init__."""
+    parts = path.removesuffix(".py").split("/")
+    return parts[1] if len(parts) > 1 and parts[1] != "__init__" else None
+
+
+def level_of(room, rows=ROWS):
     """The row of a room, counted from the top; None for a room that is not in the table."""
-    return next((level for level, row in enumerate(ROWS) if room in row), None)
+    return next((level for level, row in enumerate(rows) if room in row), None)
 
 
 def imports_of(path, tree):
@@ -117,11 +140,27 @@ def wrong_doors(path, tree, rooms):
         return
     for line, name in imports_of(path, tree):
         other = room_imported(name, rooms)
-        if other in (None, room) or (room, other) in SIBLING_IMPORTS or level_of(other) is None:
-            continue
-        if level_of(other) <= level_of(room):
+        if other == room:
+            yield from wrong_inner_door(path, line, name)
+        elif (
+            other is not None and level_of(other) is not None and level_of(other) <= level_of(room)
+        ):
             way = "sideways" if level_of(other) == level_of(room) else "up"
             yield f"flocsim/{path}:{line}: {room} imports {name}: {way} from {room} to {other}"
+
+
+def wrong_inner_door(path, line, name):
+    """The same between the sub-rooms of one room, if they are in the table."""
+    rows, here = INNER_ROWS.get(room_of(path)), inner_room_of(path)
+    there = (name.split(".")[2:] or [None])[0]
+    if rows is None or here is None or here == there:
+        return
+    if level_of(here, rows) is None:
+        yield f"flocsim/{path}: give {here} a row in ARCHITECTURE.md and in INNER_ROWS"
+    elif level_of(there, rows) is None:
+        yield f"flocsim/{path}:{line}: {here} imports {name}, its own room's __init__"
+    elif level_of(there, rows) <= level_of(here, rows):
+        yield f"flocsim/{path}:{line}: {here} imports {name}: up or sideways inside {room_of(path)}"
 
 
 def misplaced_heavyweights(path, tree):
@@ -162,67 +201,23 @@ def test_importing_flocsim_loads_no_heavyweight():
     assert not done.stdout.split(), f"`import flocsim` also loads {done.stdout}"
 
 
-def test_table_agrees_with_architecture_page():
-    page = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
-    drawn = [line.split() for line in page.splitlines() if line.startswith("    ")]
-    rows = ROWS
-    drawn = [set(words[: len(row)]) for words, row in zip(drawn, rows, strict=False)]
-    assert drawn == [set(row) for row in rows], "ARCHITECTURE.md draws other rooms than this test"
+def test_folders_can_be_seen_at_a_glance():
+    counts = {}
+    for path in (ROOT / "flocsim").rglob("*.py"):
+        counts[path.parent] = counts.get(path.parent, 0) + 1
+    full = (
+        f"{folder.relative_to(ROOT)}: {n} files" for folder, n in counts.items() if n > MOST_FILES
+    )
+    refuse(full, f"folders of more than {MOST_FILES} files:")
 
 
-def function_length(function):
-    """Lines of a function, from `def` to its end, without the docstring."""
-    first = function.body[0]
-    words = first if ast.get_docstring(function, clean=False) is not None else None
-    wordy = words.end_lineno - words.lineno + 1 if words else 0
-    return function.end_lineno - function.lineno + 1 - wordy
-
-
-def test_functions_are_short():
-    nodes = [node for tree in package_sources().values() for node in ast.walk(tree)]
-    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
-    middle = median(map(function_length, functions))
-    assert middle < MEDIAN_FUNCTION, f"the median function has {middle} lines; split the long ones"
-
-
-def test_files_are_short():
-    files = sorted((ROOT / "flocsim").rglob("*.py"))
-    lengths = [(path, len(path.read_text("utf-8").splitlines())) for path in files]
-    long = (f"{path.relative_to(ROOT)}: {n} lines" for path, n in lengths if n > LONGEST_FILE)
-    refuse(long, f"files above {LONGEST_FILE} lines, to be split by topic:")
-
-
-def is_documented(owner, method, classes):
-    """Whether a method has a docstring, its own or that of a base class in the package."""
-    own = [node for node in owner.body if getattr(node, "name", None) == method]
-    names = [ast.unparse(base).split(".")[-1] for base in owner.bases]
-    bases = [classes[name] for name in names if classes.get(name) not in (None, owner)]
-    inherited = any(is_documented(base, method, classes) for base in bases)
-    return inherited or any(map(ast.get_docstring, own))
-
-
-def undocumented(path, tree, classes):
-    """The public names of one file that have no docstring."""
-    public = path.endswith("__init__.py") or "/_" not in f"/{path}"
-    if public and tree.body and not ast.get_docstring(tree):
-        yield f"flocsim/{path}: the module"
-    for node in tree.body:
-        if not isinstance(node, (ast.FunctionDef, ast.ClassDef)) or node.name.startswith("_"):
-            continue
-        if not ast.get_docstring(node) and node.name != "main":
-            yield f"flocsim/{path}:{node.lineno}: {node.name}"
-        methods = [inner for inner in node.body if isinstance(inner, ast.FunctionDef)]
-        for method in methods if isinstance(node, ast.ClassDef) else []:
-            if not (method.name.startswith("_") or is_documented(node, method.name, classes)):
-                yield f"flocsim/{path}:{method.lineno}: {node.name}.{method.name}"
-
-
-def test_public_names_have_docstrings():
-    sources = package_sources()
-    nodes = [node for tree in sources.values() for node in tree.body]
-    classes = {node.name: node for node in nodes if isinstance(node, ast.ClassDef)}
-    found = (undocumented(path, tree, classes) for path, tree in sources.items())
-    refuse(itertools.chain.from_iterable(found), "public names without a docstring:")
+def test_every_room_says_what_is_in_it():
+    empty = (
+        f"flocsim/{path}"
+        for path, tree in package_sources().items()
+        if path.endswith("__init__.py") and not ast.get_docstring(tree)
+    )
+    refuse(empty, "rooms without a paragraph that says what is in them:")
 
 
 def test_version_is_one():
@@ -236,17 +231,21 @@ def test_version_is_one():
 @pytest.mark.parametrize(
     ("path", "source", "count"),
     [
-        ("state.py", "from flocsim.forces import base", 1),
-        ("state.py", "from .forces.base import Force", 1),
-        ("state.py", "import flocsim.geometry.shape", 0),
-        ("state.py", "def f():\n    from flocsim import System", 1),
+        ("body.py", "from flocsim.forces import base", 1),
+        ("body.py", "from .forces.base import Force", 1),
+        ("body.py", "import flocsim.geometry.shapes.shape", 0),
+        ("body.py", "def f():\n    from flocsim import System", 1),
         ("forces/drag.py", "from flocsim.integrators import base", 1),
         ("forces/drag.py", "from ..integrators import base", 1),
         ("forces/drag.py", "from . import base\nfrom .base import Force", 0),
         ("composer.py", "from flocsim import constants, errors", 0),
         ("fields.py", "from flocsim.errors import RangeError", 0),
         ("io/provenance.py", "from flocsim import __version__", 0),
-        ("io/plots.py", "import importlib\nimportlib.import_module('flocsim.ensembles.cli')", 1),
+        (
+            "io/plots/figures.py",
+            "import importlib\nimportlib.import_module('flocsim.ensembles.cli')",
+            1,
+        ),
         ("attic.py", "", 1),
     ],
 )
@@ -258,14 +257,14 @@ def test_wrong_doors_are_seen(path, source, count):
 @pytest.mark.parametrize(
     ("path", "source", "count"),
     [
-        ("io/plots.py", "def draw():\n    from matplotlib.figure import Figure", 0),
-        ("io/plot_fit.py", "def draw():\n    import matplotlib", 0),
-        ("io/plots.py", "import matplotlib", 1),
-        ("io/results.py", "def draw():\n    import matplotlib.pyplot", 1),
+        ("io/plots/figures.py", "def draw():\n    from matplotlib.figure import Figure", 0),
+        ("io/plots/fit.py", "def draw():\n    import matplotlib", 0),
+        ("io/plots/figures.py", "import matplotlib", 1),
+        ("io/results/file.py", "def draw():\n    import matplotlib.pyplot", 1),
         ("system.py", "import h5py", 2),
         ("system.py", "def f():\n    return __import__('h5py')", 1),
-        ("ensembles/config.py", "import pint", 1),
-        ("ensembles/config.py", "def f():\n    import pint", 0),
+        ("ensembles/config/schema.py", "import pint", 1),
+        ("ensembles/config/schema.py", "def f():\n    import pint", 0),
     ],
 )
 def test_misplaced_heavyweights_are_seen(path, source, count):

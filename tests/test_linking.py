@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from flocsim import Body, Sphere, System, composer, linking
+from flocsim import Body, Sphere, System, composer
+from flocsim import numba_internals as linking
 from flocsim.composer import compose
 from flocsim.forces import StokesDrag
 

@@ -4,10 +4,10 @@ import subprocess
 import sys
 
 import pytest
-from small_study import command, run_command, write_small
 
 from flocsim import __main__ as entry
 from flocsim.errors import ConfigError, FileError, FlocsimError
+from tests.helpers.small_study import command, run_command, write_small
 
 NAMES = ("init", "fit", "ensemble", "trajectory", "plot", "info")
 

@@ -3,13 +3,14 @@
 import attrs
 import numpy as np
 import pytest
-from trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
-from flocsim.geometry import contacts, spheres_only
+from flocsim.geometry.contact import points as contacts
+from flocsim.geometry.contact import spheres_only
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
+from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 
 BALL = Body(Sphere(5e-6), surface_density=2.0)
 NAN, INF = float("nan"), float("inf")

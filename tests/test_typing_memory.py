@@ -5,8 +5,8 @@ import gc
 import pytest
 from numba.core import types
 
-from flocsim import typing_memory
-from flocsim.typing_memory import quick_typing, remembering
+from flocsim import numba_internals as typing_memory
+from flocsim.numba_internals import quick_typing, remembering
 
 
 def test_each_case_is_asked_once():

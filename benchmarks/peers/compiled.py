@@ -6,15 +6,15 @@ listed pair.
 
 import math
 
-from flocsim.geometry.candidates import list_candidates, spent
-from flocsim.geometry.contacts import locate_contacts
-from flocsim.geometry.handover import hand_over
-from flocsim.integrators.driver import too_deep
-from flocsim.integrators.explicit import locate_and_rate, sum_forces
-from flocsim.integrators.modes import set_modes
-from flocsim.integrators.views import inertia
-from flocsim.layout import BOUNDING_RADIUS, CANDIDATES, CLOSED, FREE, NOW, SLIP_RATES
-from flocsim.slots import observe
+from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, FREE, NOW, SLIP_RATES
+from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.slip_transfer import hand_over
+from flocsim.hooks import observe
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.loop.driver import too_deep
+from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.views import inertia
 
 
 def read_state(work, vector):

@@ -9,8 +9,8 @@ from importlib import metadata
 from pathlib import Path
 
 import numpy as np
-from measure import Measured
 
+from benchmarks.speed.measure import Measured
 from flocsim.constants import STANDARD_GRAVITY
 
 REMARK = (

@@ -7,8 +7,8 @@ import math
 import time
 
 import numpy as np
-from measure import Measured
 
+from benchmarks.speed.measure import Measured
 from flocsim.constants import STANDARD_GRAVITY
 
 LENGTH, TIME, MASS = 1e-6, 1e-3, 1e-12

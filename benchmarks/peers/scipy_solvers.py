@@ -9,16 +9,15 @@ import time
 
 import attrs
 import numpy as np
-from measure import Measured
 from scipy.integrate import BDF, LSODA, Radau
 from scipy.optimize import brentq
 
+from benchmarks.peers.compiled import inspect, list_anew, rate_state
+from benchmarks.speed.measure import Measured
+from flocsim.arrays import CANDIDATES, NOW, with_capacity, work_of
 from flocsim.constants import WATER_VISCOSITY
+from flocsim.hooks import skin_factor
 from flocsim.integrators import VelocityVerlet
-from flocsim.layout import CANDIDATES, NOW
-from flocsim.slots import skin_factor
-from flocsim.state import with_capacity, work_of
-from peers.compiled import inspect, list_anew, rate_state
 
 SOLVERS = {"LSODA": LSODA, "BDF": BDF, "Radau": Radau}
 

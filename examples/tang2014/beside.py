@@ -2,11 +2,10 @@
 
 import attrs
 import numpy as np
-
-from flocsim.ensembles.claims.resampling import counts_of
-from flocsim.ensembles.claims.table import markdown
-from flocsim.ensembles.claims.trends import mean_of, with_delta
-from flocsim.ensembles.claims.verdicts import interval_of
+from claims.resampling import counts_of
+from claims.table import markdown
+from claims.trends import mean_of, with_delta
+from claims.verdicts import interval_of
 
 NAMES = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
          "pr_a_outside": "Pr[A|outside]"}  # fmt: skip

@@ -3,16 +3,16 @@
 import csv
 
 import numpy as np
+from claims import FIT_CLAIMS, check_claims
+from claims.table import claims_table
 from output import save_all
 from summary import write_summary
 
-from flocsim.ensembles.claims import FIT_CLAIMS, check_claims
-from flocsim.ensembles.claims.table import claims_table
-from flocsim.ensembles.flips import flips_between
-from flocsim.ensembles.zone import zone_distance
-from flocsim.io.plots import FIGURES, POPULATION_FIGURES
-from flocsim.io.results import CLASSES, read_results
-from flocsim.io.shape_library import read_library
+from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.estimates.flips import flips_between
+from flocsim.io.plots.figures import FIGURES, POPULATION_FIGURES
+from flocsim.io.results.file import CLASSES, read_results
+from flocsim.io.shapes.library import read_library
 
 MOST_VERTICES = 64
 ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")

@@ -16,17 +16,17 @@ Writes plateau.png, .pdf and plateau.md.
 """
 
 import numpy as np
+from claims.table import markdown
 from output import marked, save_all
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.claims.table import markdown
-from flocsim.ensembles.scene import Record
-from flocsim.ensembles.settling import terminal_motion
+from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.settling import terminal_motion
+from flocsim.ensembles.collision.zone import only_one
 from flocsim.ensembles.study import Study
-from flocsim.ensembles.zone import only_one
 from flocsim.forces import VanDerWaals
-from flocsim.io.intervals import proportion
-from flocsim.io.plot_style import graded_colours, house_style, new_figure, set_probability_axis
+from flocsim.io.confidence import proportion
+from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)

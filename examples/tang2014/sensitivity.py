@@ -11,12 +11,12 @@ import csv
 import time
 
 import numpy as np
+from claims.table import markdown, number_text
 from output import marked, save_all
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.claims.table import markdown, number_text
-from flocsim.ensembles.settings import nested
-from flocsim.io.plot_style import house_style, new_figure, set_probability_axis
+from flocsim.ensembles.config.settings import nested
+from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
 
 COLOURS, MARKERS = ("#0072B2", "#D55E00", "#009E73"), "osD"
 MOST_OPEN = 0.05

@@ -3,12 +3,12 @@
 import numpy as np
 import steps
 from beside import beside_table
+from claims.robust import ALWAYS, contradicting
+from claims.table import claims_table, markdown, verdicts_table
 from output import marked
 
-from flocsim.ensembles.claims.robust import ALWAYS, contradicting
-from flocsim.ensembles.claims.table import claims_table, markdown, verdicts_table
-from flocsim.io.intervals import proportion
-from flocsim.io.results import CLASSES
+from flocsim.io.confidence import proportion
+from flocsim.io.results.file import CLASSES
 
 FLIP_KINDS = ("outcome", "aggregation", "zone")
 MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import attrs
 import numpy as np
+from claims.resampling import weights
+from claims.verdicts import interval_of
 from scipy.optimize import isotonic_regression
 
 from flocsim.ensembles import load_config, run
-from flocsim.ensembles.claims.resampling import weights
-from flocsim.ensembles.claims.verdicts import interval_of
-from flocsim.ensembles.layers import lay_over
-from flocsim.io.intervals import proportion
-from flocsim.io.results import CLASSES
+from flocsim.ensembles.config.layers import lay_over
+from flocsim.io.confidence import proportion
+from flocsim.io.results.file import CLASSES
 
 STUDY = Path(__file__).resolve().parent / "study.toml"
 TYPES = ("I", "II", "III")

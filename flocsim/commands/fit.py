@@ -67,7 +67,7 @@ def check_output(path):
 
 def check_overlay(path):
     """Raise UsageError before the long work if the overlay's name has no known ending."""
-    from flocsim.io.plots import FORMATS
+    from flocsim.io.plots.figures import FORMATS
 
     if path is not None and Path(path).suffix.lower().removeprefix(".") not in FORMATS:
         raise UsageError(f"--overlay {path} must end in .{', .'.join(FORMATS)}")
@@ -80,7 +80,7 @@ def report(error):
 
 def work(names, options):
     """Pictures, and for each of their regions {radius: {N: Fit}}."""
-    from flocsim.io.fit_report import Bar
+    from flocsim.io.shapes.fit_report import Bar
 
     paths = fit_work.list_pictures(names, options.masks, report)
     background = fit_work.find_background(paths, options)
@@ -99,7 +99,7 @@ def work(names, options):
 
 def found_pictures(results, options):
     """The pictures among the results, each with its line printed; errors are reported."""
-    from flocsim.io.fit_report import describe, warn_of_coarse
+    from flocsim.io.shapes.fit_report import describe, warn_of_coarse
 
     for result in results:
         if isinstance(result, FlocsimError):
@@ -113,7 +113,7 @@ def found_pictures(results, options):
 
 def make_entries(pictures, fits, options):
     """ShapeEntries of all flocs, for every spheroradius."""
-    from flocsim.io.shape_library import make_entry
+    from flocsim.io.shapes.library import make_entry
 
     flocs = [(picture, region) for picture in pictures for region in picture.regions]
     several = len(options.radii) > 1
@@ -126,8 +126,8 @@ def make_entries(pictures, fits, options):
 
 def write(args, summary, pictures, fits, entries, options):
     """Write library, table and overlays; print the table of errors."""
-    from flocsim.io.fit_report import format_errors, plural
-    from flocsim.io.shape_library import write_library
+    from flocsim.io.shapes.fit_report import format_errors, plural
+    from flocsim.io.shapes.library import write_library
 
     settings = {"method": options.method, "preserve_area": options.preserve_area,
                 "inscribed": options.inscribed}  # fmt: skip
@@ -143,17 +143,17 @@ def write(args, summary, pictures, fits, entries, options):
 def write_summary(path, pictures, fits, options):
     """Write the table of all regions."""
     from flocsim.io.files import replace_file
-    from flocsim.io.fit_summary import summary_text
+    from flocsim.io.shapes.fit_summary import summary_text
 
     replace_file(path, summary_text(pictures, fits, options.pixel_size).encode())
 
 
 def draw(overlay, pictures, fits, options):
     """Write each picture with the outlines at the largest N and the smallest spheroradius."""
-    from flocsim.io.fit_report import plural
-    from flocsim.io.images import read_grey
-    from flocsim.io.plot_fit import draw_overlay
-    from flocsim.io.plots import save
+    from flocsim.io.images.pictures import read_grey
+    from flocsim.io.plots.figures import save
+    from flocsim.io.plots.fit import draw_overlay
+    from flocsim.io.shapes.fit_report import plural
 
     most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
     for picture in pictures:

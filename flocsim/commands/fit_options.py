@@ -9,7 +9,7 @@ from flocsim.errors import UsageError
 class Options:
     """What to look for and what to fit, ready to be handed to other processes.
 
-    Radii, blur and saturation as in flocsim.io.images.segment; vertices with 1 among them;
+    Radii, blur and saturation as in flocsim.io.images.pictures.segment; vertices with 1 among them;
     radii: spheroradii [px], rising.
     """
 
@@ -108,7 +108,7 @@ def read_options(args):
 
 
 def read_segmentation(args):
-    """The keywords of flocsim.io.images.segment."""
+    """The keywords of flocsim.io.images.pictures.segment."""
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
     endless = args.max_blur.strip() == "inf"
     return {

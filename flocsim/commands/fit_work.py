@@ -38,7 +38,7 @@ def prepare():
     """Compile before there are several processes that would all do it."""
     import numpy as np
 
-    from flocsim.geometry.fit import fit_mask
+    from flocsim.geometry.fit.fit import fit_mask
 
     fit_mask(np.ones((9, 9), bool), vertices=5)
 
@@ -56,7 +56,7 @@ def find_flocs(task):
     try:
         if options.masks:
             return masked(path, name, options)
-        from flocsim.io.images import read_grey, segment
+        from flocsim.io.images.pictures import read_grey, segment
 
         found = segment(read_grey(path), background=background, **options.segmentation)
         return [picture(path, name, found, options)]
@@ -66,7 +66,7 @@ def find_flocs(task):
 
 def masked(path, name, options):
     """[Picture] of the masks in a file."""
-    from flocsim.io.image_masks import read_masks, segment_mask
+    from flocsim.io.images.masks import read_masks, segment_mask
 
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
     return [
@@ -105,7 +105,7 @@ def fit_region(task):
 
 def fit_one(mask, count, radius, options):
     """The Fit of a mask by the Options."""
-    from flocsim.geometry.fit import fit_mask
+    from flocsim.geometry.fit.fit import fit_mask
 
     return fit_mask(
         mask, vertices=count, radius=radius, method=options.method, inscribed=options.inscribed,
@@ -120,8 +120,8 @@ def is_fine(mask, radius):
 
 def list_pictures(names, masks, report):
     """The files' paths, folders replaced by the pictures in them; each path once."""
-    from flocsim.io.image_masks import MASK_SUFFIXES
-    from flocsim.io.image_reading import SUFFIXES
+    from flocsim.io.images.masks import MASK_SUFFIXES
+    from flocsim.io.images.reading import SUFFIXES
 
     suffixes = MASK_SUFFIXES if masks else SUFFIXES
     paths = []
@@ -142,8 +142,8 @@ def find_background(paths, options):
     """The median of the frames, or None where a surface is fitted to each."""
     if options.background == "surface" or options.masks:
         return None
-    from flocsim.io.image_background import FEWEST_FRAMES, median_frame
-    from flocsim.io.images import read_grey
+    from flocsim.io.images.background import FEWEST_FRAMES, median_frame
+    from flocsim.io.images.pictures import read_grey
 
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:

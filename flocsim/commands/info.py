@@ -31,9 +31,9 @@ def add_parser(subparsers):
 
 def run(args):
     """Print the description, or the config; returns the exit code."""
-    from flocsim.io.replicate_totals import replicate_totals
-    from flocsim.io.results import read_results
-    from flocsim.io.shape_library import is_library
+    from flocsim.io.results.file import read_results
+    from flocsim.io.results.totals import replicate_totals
+    from flocsim.io.shapes.library import is_library
 
     if not args.config and is_library(args.results):
         print(describe_library(args.results))
@@ -48,8 +48,8 @@ def run(args):
 
 def describe_library(path):
     """A shape library as text: its flocs, how they were fitted, their errors."""
-    from flocsim.io.fit_report import format_errors
-    from flocsim.io.shape_library import read_library, read_settings
+    from flocsim.io.shapes.fit_report import format_errors
+    from flocsim.io.shapes.library import read_library, read_settings
 
     entries = read_library(path)
     images = sorted({entry.image for entry in entries})
@@ -114,7 +114,7 @@ def overrides(run):
 
 def outcomes(results, totals):
     """(name, value) of what came out, all conditions together."""
-    from flocsim.io.results import OUTCOMES
+    from flocsim.io.results.file import OUTCOMES
 
     found = zip(OUTCOMES, totals.outcomes, strict=True)
     rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
@@ -150,7 +150,7 @@ def readable(name, value):
 
 def failed_lines(results):
     """The replicates that failed, each with the words that run it again."""
-    from flocsim.ensembles.desk import describe_note
+    from flocsim.ensembles.parallel.desk import describe_note
 
     notes = json.loads(results.run.get("failed", "[]"))
     lines = [f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES]]

@@ -53,7 +53,7 @@ def run(args):
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
 
-    from flocsim.io.plots import save
+    from flocsim.io.plots.figures import save
 
     content, figures = read_content(args.results)
     foreign = [name for name in names or () if name not in figures]
@@ -70,9 +70,9 @@ def run(args):
 
 def read_content(path):
     """What a file holds, Results or ShapeEntries, and {name: function} of its figures."""
-    from flocsim.io.plots import FIGURES, POPULATION_FIGURES
-    from flocsim.io.results import read_results
-    from flocsim.io.shape_library import is_library, read_library
+    from flocsim.io.plots.figures import FIGURES, POPULATION_FIGURES
+    from flocsim.io.results.file import read_results
+    from flocsim.io.shapes.library import is_library, read_library
 
     if is_library(path):
         return read_library(path), POPULATION_FIGURES

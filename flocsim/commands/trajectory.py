@@ -96,7 +96,7 @@ def with_one_count(config, vertex_count):
 def check_outputs(config_path, figures, others):
     """FlocsimError now, rather than after the run, for files that could not be written."""
     from flocsim.ensembles.preflight import check_output
-    from flocsim.io.plots import FORMATS
+    from flocsim.io.plots.figures import FORMATS
 
     for path in figures:
         if Path(path).suffix.lower().removeprefix(".") not in FORMATS:
@@ -108,8 +108,8 @@ def check_outputs(config_path, figures, others):
 
 def describe(config, place, replicate, row):
     """One line on what happened."""
-    from flocsim.ensembles.failures import FAILURES
-    from flocsim.io.results_schema import OUTCOMES
+    from flocsim.ensembles.collision.failures import FAILURES
+    from flocsim.io.results.schema import OUTCOMES
 
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
@@ -132,7 +132,7 @@ def strip_paths(args):
 
 def overrides(args):
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.settings import nested, parsed
+    from flocsim.ensembles.config.settings import nested, parsed
 
     given = nested(map(parsed, args.settings))
     return given if args.seed is None else given | {"seed": args.seed}
@@ -146,9 +146,9 @@ def check_animation(path):
 
 def draw_more(args, encounter, arrays, row, title):
     """Draw the forces and the animation where asked for; the paths written."""
-    from flocsim.ensembles.frames import frames_of
-    from flocsim.ensembles.loads import loads_of
-    from flocsim.io.plots import draw_forces, write_animation
+    from flocsim.ensembles.collision.forces_between import loads_of
+    from flocsim.ensembles.collision.snapshots import frames_of
+    from flocsim.io.plots.figures import draw_forces, write_animation
 
     times, position, _ = arrays
     written = []
@@ -165,7 +165,7 @@ def draw_more(args, encounter, arrays, row, title):
 
 def save_all(figure, names):
     """Save a figure under every name; the paths."""
-    from flocsim.io.plots import save
+    from flocsim.io.plots.figures import save
 
     paths = [Path(name) for name in names]
     for path in paths:
@@ -182,7 +182,7 @@ def centre_distance(position):
 
 def draw(args, frames, motion, zone, title):
     """Draw and save what was asked for; the paths written."""
-    from flocsim.io.plots import draw_distance, draw_strip
+    from flocsim.io.plots.figures import draw_distance, draw_strip
 
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
@@ -196,11 +196,11 @@ def draw(args, frames, motion, zone, title):
 
 def run(args):
     """Run the replicate, draw it, print what happened; the exit code."""
-    from flocsim.ensembles.frames import frames_of
-    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.collision.encounter import Record
+    from flocsim.ensembles.collision.sampling import draws
+    from flocsim.ensembles.collision.snapshots import frames_of
+    from flocsim.ensembles.config.loader import load_config
     from flocsim.ensembles.preflight import check_study
-    from flocsim.ensembles.sampling import draws
-    from flocsim.ensembles.scene import Record
     from flocsim.ensembles.study import Study
     from flocsim.io.trajectory import write_trajectory
 

@@ -68,7 +68,7 @@ def reference(system, duration):
 
 def row(system, duration, exact, name, setting, integrator):
     """One line of the table; no error is shown for a run that failed."""
-    from flocsim.ensembles.precision import end_distance
+    from flocsim.ensembles.collision.precision import end_distance
 
     found = timed(attrs.evolve(system, integrator=integrator), duration)
     error = "-"
@@ -80,8 +80,8 @@ def row(system, duration, exact, name, setting, integrator):
 
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    from flocsim.ensembles.precision import replicate_system
-    from flocsim.ensembles.sampling import draws, orientations
+    from flocsim.ensembles.collision.precision import replicate_system
+    from flocsim.ensembles.collision.sampling import draws, orientations
     from flocsim.ensembles.study import Study
 
     study = Study(with_one_count(config, place[1]))
@@ -94,9 +94,9 @@ def replicate(config, place, number):
 
 def run(args):
     """Run the methods, print the table; the exit code."""
-    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.config.loader import load_config
     from flocsim.ensembles.preflight import check_study
-    from flocsim.io.results_schema import OUTCOMES
+    from flocsim.io.results.schema import OUTCOMES
 
     config = load_config(args.config)
     place = select(config, args)

@@ -1,6 +1,6 @@
 """Ensembles of binary collisions: config, scene, sampling, outcomes, statistics, runners."""
 
-from flocsim.ensembles.loader import load_config
+from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.runner import run
 
 __all__ = ["load_config", "run"]

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.io.records import CHUNK, encode
-from flocsim.io.results_schema import REPLICATES, ROW_SIZE
+from flocsim.io.journal.records import CHUNK, encode
+from flocsim.io.results.schema import REPLICATES, ROW_SIZE
 
 MOST_ROWS = 16_384
 """Rows of the longest chunk, 1.8 MB."""

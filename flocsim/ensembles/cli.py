@@ -6,8 +6,8 @@ import io
 import sys
 import traceback
 
+from flocsim.ensembles.parallel.team import Alone, StopRequested, find_team, launched_rank
 from flocsim.ensembles.progress import plain_warnings, tell
-from flocsim.ensembles.team import Alone, StopRequested, find_team, launched_rank
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
 
@@ -46,7 +46,7 @@ def add_arguments(parser):
 
 def overrides(arguments):
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.settings import nested, parsed
+    from flocsim.ensembles.config.settings import nested, parsed
 
     given = nested(map(parsed, arguments.settings))
     if arguments.seed is not None:
@@ -60,7 +60,7 @@ def overrides(arguments):
 
 def checked_config(arguments):
     """The config, found to make a study whose results can be written where they should go."""
-    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.config.loader import load_config
     from flocsim.ensembles.preflight import check_output, check_study
 
     config = load_config(arguments.config, overrides(arguments))
@@ -183,7 +183,7 @@ def gather_team(arguments):
         raise UsageError(f"--jobs must be at least 1, found {arguments.jobs}")
     if team.size > 1:
         raise UsageError("--jobs is for runs without an MPI launcher: leave out one of the two")
-    from flocsim.ensembles.processes import start_processes
+    from flocsim.ensembles.parallel.processes import start_processes
 
     return start_processes(arguments.jobs, on_process, arguments)
 

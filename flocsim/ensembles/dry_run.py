@@ -1,11 +1,7 @@
 """What a study would do, without doing it."""
 
-import attrs
-import numpy as np
-
-from flocsim.ensembles.preflight import sphere_pairs
+from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.explain import force_lines, machinery_lines, scale_lines
-from flocsim.geometry.spheropolygon import SpheroPolygon
 
 
 def condition_lines(config):
@@ -20,24 +16,6 @@ def condition_lines(config):
         )
 
 
-def stand_in(shape, radius):
-    """A polygon about as large as a sphere: what matters here is that it has edges."""
-    angles = np.arange(6) * np.pi / 3.0
-    hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
-    return SpheroPolygon((shape.radius - radius) * hexagon, radius)
-
-
-def placed_system(config, system, shapes):
-    """The system with these shapes, the start gap apart."""
-    reach = sum(shape.bounding_radius for shape in shapes) + config.scene.start_gap
-    places = ((0.0, 0.0), (0.0, reach))
-    bodies = [
-        attrs.evolve(body, shape=shape, position=place)
-        for body, shape, place in zip(system.bodies, shapes, places, strict=True)
-    ]
-    return attrs.evolve(system, bodies=bodies)
-
-
 def code_lines(config):
     """What is compiled in and what is left out, for polygons and for spheres."""
     _, pair = next(sphere_pairs(config))
@@ -47,14 +25,6 @@ def code_lines(config):
         more = [line for line in machinery_lines(system) if line not in lines]
         lines += [f"{line} (where N = 1)" for line in more]
     return [f"  {line}" for line in lines]
-
-
-def kinds(config, spheres):
-    """Shapes of i and j for polygons, if the study has any, and for spheres, if it has any."""
-    if max(config.shapes.vertices) > 1:
-        yield [stand_in(shape, config.shapes.radius) for shape in spheres]
-    if min(config.shapes.vertices) == 1:
-        yield spheres
 
 
 def left_out_lines(team):

@@ -2,12 +2,16 @@
 
 import os
 
-from flocsim.ensembles.flocs import read_flocs
-from flocsim.ensembles.scene import make_encounter
-from flocsim.ensembles.zone import zone_distance
+import attrs
+import numpy as np
+
+from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.flocs import read_flocs
+from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.errors import ConfigError
 from flocsim.forces import ContactForce
-from flocsim.geometry.sphere import Sphere
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.files import check_writable
 
 
@@ -64,3 +68,29 @@ def check_output(path, *inputs):
         if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
             raise ConfigError(f"writing {path} would replace {source}, which is read: name another")
     check_writable(path)
+
+
+def stand_in(shape, radius):
+    """A polygon about as large as a sphere: what matters here is that it has edges."""
+    angles = np.arange(6) * np.pi / 3.0
+    hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
+    return SpheroPolygon((shape.radius - radius) * hexagon, radius)
+
+
+def placed_system(config, system, shapes):
+    """The system with these shapes, the start gap apart."""
+    reach = sum(shape.bounding_radius for shape in shapes) + config.scene.start_gap
+    places = ((0.0, 0.0), (0.0, reach))
+    bodies = [
+        attrs.evolve(body, shape=shape, position=place)
+        for body, shape, place in zip(system.bodies, shapes, places, strict=True)
+    ]
+    return attrs.evolve(system, bodies=bodies)
+
+
+def kinds(config, spheres):
+    """Shapes of i and j for polygons, if the study has any, and for spheres, if it has any."""
+    if max(config.shapes.vertices) > 1:
+        yield [stand_in(shape, config.shapes.radius) for shape in spheres]
+    if min(config.shapes.vertices) == 1:
+        yield spheres

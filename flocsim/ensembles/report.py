@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.io.results import CLASSES
+from flocsim.io.results.file import CLASSES
 
 HEADER = (
     ("", "N"),

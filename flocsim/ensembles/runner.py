@@ -8,25 +8,25 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import ROW
-from flocsim.ensembles.dealer import Dealer
-from flocsim.ensembles.desk import Desk, FarDesk
-from flocsim.ensembles.failures import FAILURES
-from flocsim.ensembles.identity import identity_of, short
-from flocsim.ensembles.intervals import total
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.estimates.stop_rule import StopRule, borders
+from flocsim.ensembles.estimates.summary import Reader, summarize
+from flocsim.ensembles.parallel.dealer import Dealer
+from flocsim.ensembles.parallel.desk import Desk, FarDesk
+from flocsim.ensembles.parallel.team import Alone
+from flocsim.ensembles.parallel.worker import FAILED, work
 from flocsim.ensembles.progress import Progress
-from flocsim.ensembles.resume import Beginning, begin
-from flocsim.ensembles.row_store import RowStore
-from flocsim.ensembles.stop_rule import StopRule, borders
+from flocsim.ensembles.storage.identity import identity_of, short
+from flocsim.ensembles.storage.index_ranges import total
+from flocsim.ensembles.storage.resume import Beginning, begin
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
-from flocsim.ensembles.summary import Reader, summarize
-from flocsim.ensembles.team import Alone
-from flocsim.ensembles.worker import FAILED, work
 from flocsim.errors import FlocsimError
 from flocsim.interruption import STOPPED
-from flocsim.io.journal import MemoryJournal
+from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
-from flocsim.io.results import read_results, write_results
-from flocsim.io.results_schema import Results
+from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.schema import Results
 
 
 @attrs.define
@@ -61,8 +61,8 @@ def run(config, team=None, quiet=True):
 def run_to_file(config, team, output, mode, quiet=True):
     """Run a config's study into the results file ``output``: how it Ended.
 
-    ``mode`` says what to do about an unfinished run (flocsim.ensembles.resume). What is finished
-    goes into a journal beside the file, and from there into the file when all is.
+    ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
+    finished goes into a journal beside the file, and from there into the file when all is.
     """
     study = make_study(config, team)
     progress = Progress(study.size, quiet or team.rank > 0)

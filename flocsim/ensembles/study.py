@@ -6,10 +6,10 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import Condition
-from flocsim.ensembles.flocs import Wardrobe, load_flocs
-from flocsim.ensembles.sampling import draws, orientations
-from flocsim.ensembles.scene import OBSERVER, make_encounter, run_encounter
-from flocsim.ensembles.zone import zone_distance
+from flocsim.ensembles.collision.encounter import OBSERVER, make_encounter, run_encounter
+from flocsim.ensembles.collision.flocs import Wardrobe, load_flocs
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.zone import zone_distance
 
 NO_FLOC = -1
 """In ``floc_i`` and ``floc_j``: a sphere."""

@@ -2,13 +2,16 @@
 
 The lines are read off the force objects and off the slots that the composer really fills, so that
 they cannot disagree with what is compiled.
+
+Which functions the driver of a scene reaches: the report says what is really compiled.
 """
 
 import math
+import types
 from itertools import combinations
 
-from flocsim import slots
-from flocsim.explain.reach import differentiates
+from flocsim import hooks as slots
+from flocsim.fingerprint import reached
 from flocsim.forces.base import BodyForce, ContactForce, PairForce
 from flocsim.forces.check import (
     SAMPLE_BODIES,
@@ -18,7 +21,28 @@ from flocsim.forces.check import (
     results,
     sample_pairs,
 )
+from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+
+
+def functions_of(system):
+    """All plain functions that the system's driver reaches, its slots filled."""
+    fillings, found, pending = system.fillings(), set(), [advance]
+    while pending:
+        function = pending.pop()
+        function = fillings.get(function, function)
+        if function not in found:
+            found.add(function)
+            values = reached(function).values()
+            pending += [value for value in values if isinstance(value, types.FunctionType)]
+    return found
+
+
+def differentiates(system):
+    """Whether the method needs the Jacobian of the forces."""
+    return assemble_jacobian in functions_of(system)
+
 
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim import slots
-from flocsim.state import BodyView, ContactView, PairView
+from flocsim import hooks as slots
+from flocsim.arrays import BodyView, ContactView, PairView
 
 STIFF = 100.0
 """A scale this much shorter than the slowest one is stiff."""

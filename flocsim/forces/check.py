@@ -10,10 +10,10 @@ from numbers import Real
 import attrs
 import numpy as np
 
+from flocsim.arrays import BodyView, ContactView, PairView
 from flocsim.errors import KernelError
 from flocsim.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
-from flocsim.state import BodyView, ContactView, PairView
 
 SAMPLE_BODIES = (
     BodyView(1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6),

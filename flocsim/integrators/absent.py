@@ -1,8 +1,10 @@
 """What replaces the code for forces that a scene does not have: nothing, which compiles at once."""
 
-from flocsim import slots
-from flocsim.geometry import candidates
-from flocsim.integrators import explicit, grain, jacobian
+from flocsim import hooks as slots
+from flocsim.geometry.contact import candidates
+from flocsim.integrators.events import first_event as grain
+from flocsim.integrators.rhs import forces as explicit
+from flocsim.integrators.rhs import jacobian
 
 
 def no_forces(scene, work, time, state, rate):

@@ -2,16 +2,8 @@
 
 import attrs
 
-from flocsim import slots
-from flocsim.fields import quantity
-from flocsim.integrators.accuracy import error_ratio
-from flocsim.integrators.adaptive import adaptive_factor
-from flocsim.integrators.base import Integrator
-from flocsim.integrators.explicit import locate_and_rate, sum_forces
-from flocsim.integrators.jacobian import weigh_velocities
-from flocsim.integrators.slips import limit_slips
-from flocsim.integrators.views import inertia
-from flocsim.layout import (
+from flocsim import hooks as slots
+from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     FIRST,
@@ -23,6 +15,13 @@ from flocsim.layout import (
     TIME,
     UNTIL,
 )
+from flocsim.fields import quantity
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.loop.step_size import adaptive_factor
+from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.jacobian import weigh_velocities
+from flocsim.integrators.rhs.views import inertia
 
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 """Where the stages lie in the step."""

@@ -2,22 +2,21 @@
 
 import attrs
 
-from flocsim import slots
+from flocsim import hooks as slots
+from flocsim.arrays import FIRST, FREE, NOW, PACE, SCRATCH, STIFFNESS, TIME, UNTIL
 from flocsim.fields import quantity
-from flocsim.integrators.accuracy import error_ratio
-from flocsim.integrators.adaptive import SMALLEST_FACTOR, adaptive_factor
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.collocation import collocate
-from flocsim.integrators.frames import gather_clusters
-from flocsim.integrators.jacobian import assemble_jacobian
-from flocsim.integrators.linear import solve
-from flocsim.integrators.radau import evaluate_states, solve_stages
-from flocsim.integrators.radau_tableau import EIGENVALUES, ESTIMATE
-from flocsim.integrators.slips import limit_slips
-from flocsim.integrators.stage_systems import factorise_systems, sum_over_clusters
-from flocsim.integrators.switches import interpolate
-from flocsim.integrators.views import inertia
-from flocsim.layout import FIRST, FREE, NOW, PACE, SCRATCH, STIFFNESS, TIME, UNTIL
+from flocsim.integrators.events.crossings import interpolate
+from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.radau.collocation import collocate
+from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.stages import evaluate_states, solve_stages
+from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
+from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE
+from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.forces import limit_slips
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.integrators.rhs.views import inertia
 
 ORDER_OF_ESTIMATE = 4.0
 """The estimate goes with this power of the step."""

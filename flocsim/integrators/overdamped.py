@@ -3,7 +3,7 @@
 import attrs
 
 from flocsim.integrators.implicit import Implicit
-from flocsim.integrators.views import inertia
+from flocsim.integrators.rhs.views import inertia
 
 
 def massless(scene, body, axis):

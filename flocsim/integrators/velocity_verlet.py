@@ -2,15 +2,14 @@
 
 import attrs
 
-from flocsim import slots
+from flocsim import hooks as slots
+from flocsim.arrays import CANDIDATES, CLOSED, FIRST, FREE, LARGEST_STEP, NEW, NOW, TIME
 from flocsim.fields import quantity
-from flocsim.geometry.contacts import locate_acting, locate_contacts
+from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator, all_finite
-from flocsim.integrators.explicit import locate_and_rate, sum_forces
-from flocsim.integrators.modes import set_modes
-from flocsim.integrators.slips import limit_slips
-from flocsim.integrators.views import inertia, tangential_rate
-from flocsim.layout import CANDIDATES, CLOSED, FIRST, FREE, LARGEST_STEP, NEW, NOW, TIME
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.views import inertia, tangential_rate
 
 
 def locate_and_flag(scene, work, state):

@@ -6,11 +6,11 @@ import csv
 import numpy as np
 import pytest
 from PIL import Image
-from real_images import real_image
 
 from flocsim.commands import fit, info, plot
 from flocsim.errors import FileError, ShapeError, UsageError
-from flocsim.io.shape_library import read_library
+from flocsim.io.shapes.library import read_library
+from tests.helpers.real_images import real_image
 
 
 def run(*arguments):

@@ -7,14 +7,14 @@ import sys
 
 import numpy as np
 import pytest
-from synthetic_results import make_results
 
 from flocsim.commands import info, plot
 from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots import FIGURES, POPULATION_FIGURES
+from flocsim.io.plots.figures import FIGURES, POPULATION_FIGURES
 from flocsim.io.provenance import provenance
-from flocsim.io.results import write_results
+from flocsim.io.results.file import write_results
+from tests.helpers.synthetic_results import make_results
 
 CONFIG = 'preset = "si"\nseed = 3\n'
 

@@ -3,10 +3,10 @@
 import h5py
 import numpy as np
 import pytest
-from small_study import write_small
 
 from flocsim.__main__ import main
 from flocsim.io.files import read_sealed, seal
+from tests.helpers.small_study import write_small
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def test_set_changes_the_scene(folder, capsys):
 
 def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
     from flocsim.ensembles.cli import main as ensemble
-    from flocsim.io.results import read_results
+    from flocsim.io.results.file import read_results
 
     assert ensemble(["small.toml", "--quiet"]) == 0
     words = ["--replicate", 2, "--type", "I", "--vertices", 16, "--delta", 0, "--save", "m.h5"]

@@ -1,11 +1,11 @@
 """`flocsim work-precision`: the table of one replicate."""
 
 import pytest
-from small_study import write_small
 
 from flocsim.__main__ import main
 from flocsim.commands import work_precision
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.small_study import write_small
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_every_method_gets_its_settings():
 
 
 def test_a_method_that_fails_shows_no_error(few, monkeypatch):
-    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.config.loader import load_config
 
     system, duration, _ = work_precision.replicate(load_config("small.toml"), (0, 4, 0.0), 0)
     monkeypatch.setattr(work_precision, "MOST_STEPS", 2)
@@ -54,7 +54,7 @@ def test_a_method_that_fails_shows_no_error(few, monkeypatch):
 
 
 def test_a_replicate_starts_where_the_ensemble_starts_it(few):
-    from flocsim.ensembles.loader import load_config
+    from flocsim.ensembles.config.loader import load_config
 
     config = load_config("small.toml")
     system, duration, row = work_precision.replicate(config, (0, 4, 0.0), 1)

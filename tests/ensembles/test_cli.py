@@ -5,10 +5,10 @@ import sys
 
 import numpy as np
 import pytest
-from small_study import run_command, write_small, write_star_library
 
 from flocsim.ensembles import cli
-from flocsim.io.results import read_results, same_data
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.small_study import run_command, write_small, write_star_library
 
 
 @pytest.fixture

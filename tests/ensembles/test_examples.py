@@ -3,11 +3,11 @@
 import shutil
 
 import pytest
-from small_study import ROOT, run_command, write_star_library
 
-from flocsim.ensembles.loader import load_config
+from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.io.results import read_results
+from flocsim.io.results.file import read_results
+from tests.helpers.small_study import ROOT, run_command, write_star_library
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
 

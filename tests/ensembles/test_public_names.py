@@ -1,9 +1,8 @@
 """The names that scripts of users depend on."""
 
-from small_study import write_small
-
 import flocsim
 from flocsim.ensembles import load_config, run
+from tests.helpers.small_study import write_small
 
 
 def test_a_study_runs_as_a_library(tmp_path):

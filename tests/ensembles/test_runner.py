@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from small_study import small_study
 
-from flocsim.ensembles import worker
-from flocsim.ensembles.dealer import Dealer
+from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.ensembles.parallel import worker
+from flocsim.ensembles.parallel.dealer import Dealer
+from flocsim.ensembles.parallel.team import Alone
 from flocsim.ensembles.progress import Progress
-from flocsim.ensembles.resume import Beginning
-from flocsim.ensembles.row_store import RowStore
 from flocsim.ensembles.runner import describe, make_desk, run, run_study
-from flocsim.ensembles.statistics import tabulate
+from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.ensembles.team import Alone
-from flocsim.io.journal import MemoryJournal
-from flocsim.io.results import read_results, same_data, write_results
+from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.results.file import read_results, same_data, write_results
+from tests.helpers.small_study import small_study
 
 
 class Rank(Alone):
@@ -56,7 +56,7 @@ def alone(study):
 
 @pytest.mark.parametrize("size", [2, 5, 40])
 def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone, size):
-    from flocsim.ensembles.summary import Reader
+    from flocsim.ensembles.estimates.summary import Reader
 
     start = beginning(study)
     dealer = Dealer.of(start.found(3), [3], size)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from small_study import small_config, small_study
 
-from flocsim.ensembles import scene
-from flocsim.ensembles.sampling import draws
+from flocsim.ensembles.collision import encounter as scene
+from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
-from flocsim.io.results_schema import REPLICATES
+from flocsim.io.results.schema import REPLICATES
+from tests.helpers.small_study import small_config, small_study
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.check import check_kernel
-from flocsim.forces.source import scene_functions
+from flocsim.forces.codegen import scene_functions
 
 
 @attrs.frozen

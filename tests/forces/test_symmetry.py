@@ -5,12 +5,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from fast_cases import FORCES, random_case, silenced
-from fast_scene import FastScene
-from reference.samples import SEEDS
-from reference.shapes import Scene, rotation
 
 from flocsim import SpheroPolygon
+from tests.helpers.fast_cases import FORCES, random_case, silenced
+from tests.helpers.fast_scene import FastScene
+from tests.reference.samples import SEEDS
+from tests.reference.shapes import Scene, rotation
 
 BETWEEN_BODIES = [name for name in FORCES if name not in ("gravity", "drag")]
 

@@ -8,12 +8,12 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
-from methods import by_adaptive, by_setting
-from trial_scenes import ELASTIC, PolygonSystem, Spring, encounter, head_on, watched
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_adaptive, by_setting
+from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, encounter, head_on, watched
 
 STICKY = [Contact(k_n=20.0, k_t=2.0, damping_n=4e5), Spring(5e-2, -1e-6)]
 LOOSE = [ELASTIC, Spring(1e-2, -2e-6)]

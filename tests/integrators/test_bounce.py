@@ -5,13 +5,13 @@ import math
 import attrs
 import numpy as np
 import pytest
-from methods import by_adaptive
-from reference.closed_forms import impact
-from trial_scenes import ELASTIC, PolygonSystem, Spring, head_on, watched
 
 from flocsim import Body, Sphere, System
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import VelocityVerlet
+from tests.helpers.methods import by_adaptive
+from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, head_on, watched
+from tests.reference.closed_forms import impact
 
 SPEED, GAP, K_N = 1e-3, 1e-7, 20.0
 

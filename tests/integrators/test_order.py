@@ -8,17 +8,16 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
-from methods import name_of
-from trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
 
 from flocsim import Body, Sphere
+from flocsim.arrays import LARGEST_STEP, NEW, NOW, TIME, TOLERANCE, UNTIL, work_of
 from flocsim.forces import Contact, StokesDrag
-from flocsim.geometry.contacts import locate_contacts
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.hooks import attempt
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.integrators.driver import keep_lists, take_new_state
-from flocsim.layout import LARGEST_STEP, NEW, NOW, TIME, TOLERANCE, UNTIL
-from flocsim.slots import attempt
-from flocsim.state import work_of
+from flocsim.integrators.loop.driver import keep_lists, take_new_state
+from tests.helpers.methods import name_of
+from tests.helpers.trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
 
 EXACT = 1e-18
 """A tolerance [m] at which Newton's method goes on to the last bit."""

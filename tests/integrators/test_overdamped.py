@@ -3,11 +3,11 @@
 import attrs
 import numpy as np
 import pytest
-from trial_scenes import PolygonSystem, Spring, Trap, hook
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Overdamped
+from tests.helpers.trial_scenes import PolygonSystem, Spring, Trap, hook
 
 SPHERE = Sphere(6e-6)
 

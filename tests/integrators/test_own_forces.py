@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from methods import by_method, by_setting
 from scipy.integrate import solve_ivp
-from trial_scenes import (
+
+from flocsim import Body, Sphere, SpheroPolygon, system
+from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_method, by_setting
+from tests.helpers.trial_scenes import (
     WATER_VISCOSITY,
     Hertz,
     Lubrication,
@@ -18,9 +21,6 @@ from trial_scenes import (
     momenta,
     star,
 )
-
-from flocsim import Body, Sphere, SpheroPolygon, system
-from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 
 
 def own(trap=0.02, upright=1e-13, spring=5e-3, film=2e-6, modulus=1e4, loss=20.0, k_t=2.0):

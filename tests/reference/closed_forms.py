@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
-from reference.forces import VACUUM_PERMITTIVITY
+from tests.reference.forces import VACUUM_PERMITTIVITY
 
 
 def balance(hamaker, potential, debye_length, permittivity=78.5):

@@ -6,8 +6,8 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from reference.outline import core_geometry
-from reference.shapes import world_vertices
+from tests.reference.outline import core_geometry
+from tests.reference.shapes import world_vertices
 
 DEEPEST_OVERLAP = 0.5
 

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from reference.contacts import closest, contacts
+from tests.reference.contacts import closest, contacts
 
 VACUUM_PERMITTIVITY = 8.854e-12
 

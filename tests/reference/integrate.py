@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.motion import Motion
-from reference.shapes import Scene
+from tests.reference.motion import Motion
+from tests.reference.shapes import Scene
 
 MOST_EVENTS = 5000
 """A corner that rests at zero overlap opens and closes endlessly; past this many, give up."""

@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from reference.contacts import all_pairs, check_overlaps, measure
-from reference.forces import Contact, loads, refuse_strangers
-from reference.shapes import Scene
+from tests.reference.contacts import all_pairs, check_overlaps, measure
+from tests.reference.forces import Contact, loads, refuse_strangers
+from tests.reference.shapes import Scene
 
 AT_CONTACT = 1e-15
 """An overlap [m] this small after an event is read as zero: its rate decides on or off."""

@@ -5,10 +5,10 @@ from functools import cache
 import numpy as np
 import shapely
 
-from reference.contacts import contacts
-from reference.forces import Contact, DoubleLayer, VanDerWaals
-from reference.scenes import random_scene
-from reference.shapes import Scene, make_body
+from tests.reference.contacts import contacts
+from tests.reference.forces import Contact, DoubleLayer, VanDerWaals
+from tests.reference.scenes import random_scene
+from tests.reference.shapes import Scene, make_body
 
 VISCOSITY, WATER = 8.9e-4, 997.0
 CONTACT = Contact(k_n=20.0, k_t=2.0, damping_n=2e5, damping_t=7e4)

@@ -3,9 +3,9 @@
 import numpy as np
 import shapely
 
-from reference.contacts import all_pairs, measure
-from reference.outline import core_geometry
-from reference.shapes import Scene, make_body, world_vertices
+from tests.reference.contacts import all_pairs, measure
+from tests.reference.outline import core_geometry
+from tests.reference.shapes import Scene, make_body, world_vertices
 
 MOST_VERTICES = 24
 DEEPEST_SHARE = 0.3

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.outline import area_centroid_inertia
+from tests.reference.outline import area_centroid_inertia
 
 
 @dataclass(frozen=True)

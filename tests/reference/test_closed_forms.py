@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import lambertw
 
-from reference.closed_forms import (
+from tests.reference.closed_forms import (
     balance,
     greatest_repulsion,
     impact,
@@ -12,9 +12,9 @@ from reference.closed_forms import (
     terminal_velocity,
     zone_gaps,
 )
-from reference.forces import Contact, DoubleLayer, Drag, Gravity, VanDerWaals, loads, reduced
-from reference.samples import CENTRES, VISCOSITY, WATER
-from reference.shapes import Scene, make_body
+from tests.reference.forces import Contact, DoubleLayer, Drag, Gravity, VanDerWaals, loads, reduced
+from tests.reference.samples import CENTRES, VISCOSITY, WATER
+from tests.reference.shapes import Scene, make_body
 
 
 @pytest.mark.parametrize(

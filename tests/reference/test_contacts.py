@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from reference.contacts import OverlapTooDeepError, contacts, surface_gap
-from reference.forces import loads
-from reference.outline import core_geometry
-from reference.samples import CONTACT, SEEDS, scene_of, spheres
-from reference.shapes import Scene, make_body, world_vertices
+from tests.reference.contacts import OverlapTooDeepError, contacts, surface_gap
+from tests.reference.forces import loads
+from tests.reference.outline import core_geometry
+from tests.reference.samples import CONTACT, SEEDS, scene_of, spheres
+from tests.reference.shapes import Scene, make_body, world_vertices
 
 
 def test_random_scenes_keep_their_promises():

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.closed_forms import impact, relaxation_time, terminal_velocity
-from reference.contacts import OverlapTooDeepError, contacts
-from reference.forces import Contact, Drag, Gravity
-from reference.integrate import simulate
-from reference.motion import hand_over
-from reference.samples import VISCOSITY, random_core, scene_of, spheres
-from reference.scenes import spiral, star
-from reference.shapes import Scene, make_body
+from tests.reference.closed_forms import impact, relaxation_time, terminal_velocity
+from tests.reference.contacts import OverlapTooDeepError, contacts
+from tests.reference.forces import Contact, Drag, Gravity
+from tests.reference.integrate import simulate
+from tests.reference.motion import hand_over
+from tests.reference.samples import VISCOSITY, random_core, scene_of, spheres
+from tests.reference.scenes import spiral, star
+from tests.reference.shapes import Scene, make_body
 
 
 @pytest.mark.parametrize(

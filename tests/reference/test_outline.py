@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-from reference.outline import area_centroid_inertia, core_geometry
-from reference.samples import random_core
-from reference.scenes import c_shape, convex, segment, spiral, star
-from reference.shapes import make_body, rotation
+from tests.reference.outline import area_centroid_inertia, core_geometry
+from tests.reference.samples import random_core
+from tests.reference.scenes import c_shape, convex, segment, spiral, star
+from tests.reference.shapes import make_body, rotation
 
 
 def test_disk_and_capsule():

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reference.contacts import surface_gap
-from reference.forces import Contact, Drag, VanDerWaals, loads, reduced
-from reference.samples import (
+from tests.reference.contacts import surface_gap
+from tests.reference.forces import Contact, Drag, VanDerWaals, loads, reduced
+from tests.reference.samples import (
     CONTACT,
     PAIR_LAWS,
     SEEDS,
@@ -15,7 +15,7 @@ from reference.samples import (
     displacements,
     scene_of,
 )
-from reference.shapes import Scene, rotation
+from tests.reference.shapes import Scene, rotation
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -6,14 +6,23 @@ A weak spring along the line of centres brings the bodies back; nothing dissipat
 import attrs
 import numpy as np
 import pytest
-from methods import by_adaptive
-from reference import shapes as plain
-from reference.contacts import contacts
-from trial_scenes import ELASTIC, Spring, comb, hook, kinetic_energy, momenta, star, watched
 
 from flocsim import Body, System
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit, VelocityVerlet
+from tests.helpers.methods import by_adaptive
+from tests.helpers.trial_scenes import (
+    ELASTIC,
+    Spring,
+    comb,
+    hook,
+    kinetic_energy,
+    momenta,
+    star,
+    watched,
+)
+from tests.reference import shapes as plain
+from tests.reference.contacts import contacts
 
 SPRING = Spring(stiffness=0.1, rest=-6e-6)
 SPEED, ARM = 0.02, 1e-5

@@ -5,13 +5,13 @@ Real masses in water: the contact vibrates at about 1e6 rad/s, the runs last up 
 
 import numpy as np
 import pytest
-from reference import shapes as plain
-from reference.contacts import surface_gap
-from trial_scenes import PolygonSystem, hook, star
 
 from flocsim import Body, Fluid, Sphere
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit
+from tests.helpers.trial_scenes import PolygonSystem, hook, star
+from tests.reference import shapes as plain
+from tests.reference.contacts import surface_gap
 
 WATER = Fluid(buoyancy=True)
 ATTRACTION = VanDerWaals(4.7e-20, gap="surface")

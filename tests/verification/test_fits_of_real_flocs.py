@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from real_images import silhouettes
 from scipy import stats
 
 from flocsim.geometry.fit import fit_mask
+from tests.helpers.real_images import silhouettes
 
 COUNTS = (4, 8, 16, 28, 64)
 RADII = (1.0, 2.0, 4.0)

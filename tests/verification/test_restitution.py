@@ -6,12 +6,12 @@ The bodies are spheres, run through the code for polygons: the same compiled sce
 import math
 
 import pytest
-from methods import by_setting
-from reference.closed_forms import impact
-from trial_scenes import PolygonSystem, Spring, head_on, watched
 
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_setting
+from tests.helpers.trial_scenes import PolygonSystem, Spring, head_on, watched
+from tests.reference.closed_forms import impact
 
 K_N, SPEED, GAP = 20.0, 1e-3, 1e-7
 

@@ -3,13 +3,13 @@
 import attrs
 import numpy as np
 import pytest
-from methods import by_adaptive
-from reference.closed_forms import relaxation_time, terminal_velocity
-from trial_scenes import WATER_VISCOSITY, hook
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_adaptive
+from tests.helpers.trial_scenes import WATER_VISCOSITY, hook
+from tests.reference.closed_forms import relaxation_time, terminal_velocity
 
 RADIUS = 5e-6
 BUOYANT = Fluid(viscosity=WATER_VISCOSITY, density=997.0, buoyancy=True)

@@ -1,6 +1,6 @@
 """A fixed part of the stability table: every family over its ranges, right or clearly failed.
 
-The table itself is benchmarks/stability.py; here some of its cases go through the same functions,
+The table itself is benchmarks/stability/run.py; here some of its cases go through the same functions,
 in this process and without a limit of time.
 """
 
@@ -13,11 +13,10 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
-from stability_cases import FAMILIES, case_of, family_of
-from stability_closed import bounce, resting_overlap, settle
-from stability_ranges import RANGES
-from stability_verdict import judge
-
+from benchmarks.stability.cases import FAMILIES, case_of, family_of
+from benchmarks.stability.closed import bounce, resting_overlap, settle
+from benchmarks.stability.ranges import RANGES
+from benchmarks.stability.verdict import judge
 from flocsim.integrators import Status
 
 LONG = 600
@@ -89,7 +88,7 @@ def test_draws_cover_their_ranges():
 @pytest.mark.parametrize("z", [0.0, 0.05, 0.3, 0.7, 0.95, 1.0, 1.5, 3.0])
 def test_closed_form_of_an_impact(z, tension):
     """Parting at the restitution of Schwager & Pöschel, as the plain reference integrates it."""
-    from reference.closed_forms import impact
+    from tests.reference.closed_forms import impact
 
     restitution, lasted, deepest = impact(z, tension)
     end = min(lasted, 50.0)

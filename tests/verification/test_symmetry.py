@@ -8,13 +8,13 @@ tolerance.
 import attrs
 import numpy as np
 import pytest
-from methods import by_setting
-from reference.shapes import rotation
-from trial_scenes import PolygonSystem, Spring, hook, star, watched
 
 from flocsim import Body, SpheroPolygon
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_setting
+from tests.helpers.trial_scenes import PolygonSystem, Spring, hook, star, watched
+from tests.reference.shapes import rotation
 
 LAW = Contact(k_n=20.0, k_t=2.0, damping_n=3e4, friction=0.4)
 SPRING = Spring(1e-2)

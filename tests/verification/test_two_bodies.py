@@ -3,11 +3,11 @@
 import attrs
 import numpy as np
 import pytest
-from methods import by_adaptive, by_setting
-from trial_scenes import ELASTIC, PolygonSystem, Spring, hook, star, watched
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.methods import by_adaptive, by_setting
+from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, hook, star, watched
 
 STIFFNESS = 1e-2
 

@@ -1,0 +1,108 @@
+"""Error against run time of every integrator, on every scene of scenes.py.
+
+    python -m benchmarks.accuracy.work_precision [--quick] [--markdown] [--figure FILE]
+
+The error of a run is how far any point of an outline ends from where the reference puts it.
+"""
+
+import numpy as np
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.speed.measure import distance, measure, reference
+from benchmarks.speed.scenes import all_scenes
+from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
+
+TOLERANCES = np.logspace(-6, -12, 7)
+"""[m], six decades."""
+
+STEP_COUNTS = np.logspace(1.5, 6.5, 11)
+"""Fixed steps that a run is divided into."""
+
+MARKERS = {"Implicit": "o", "DormandPrince54": "^", "VelocityVerlet": "s", "Overdamped": "D"}
+
+COLUMNS = ("scene", "method", "setting", "error [m]", "CPU [ms]", "steps", "evaluations", "end")
+
+
+def settings(scene, quick):
+    """(method's name, text of the setting, integrator) of every run of a scene."""
+    every = 2 if quick else 1
+    for tolerance in TOLERANCES[::every]:
+        text = f"{tolerance:.0e} m"
+        yield "Implicit", text, Implicit(tolerance)
+        yield "DormandPrince54", text, DormandPrince54(tolerance)
+        if scene.light:
+            yield "Overdamped", text, Overdamped(tolerance)
+    for count in STEP_COUNTS[:: 2 * every]:
+        step = scene.until / count
+        yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
+
+
+def judged(scene, run, exact):
+    """(error [m], how it ended): a run that ends further off than a body's size is no solution."""
+    if not run.finished:
+        return float("nan"), run.status
+    error = distance(scene, run.motion, exact)
+    size = min(body.shape.bounding_radius for body in scene.bodies)
+    return (error, "FINISHED") if error < size else (float("nan"), "WRONG")
+
+
+def measure_scene(scene, table, quick):
+    """Add the runs of a scene to the table; {method: [(error, CPU)]} for the figure."""
+    exact, disagreement, other = reference(scene)
+    agreement = f"{disagreement:.1e}"
+    table.add(scene.name, "reference", f"against {other}", agreement, "", "", "", "agree")
+    points = {}
+    for method, text, integrator in settings(scene, quick):
+        run = measure(scene, integrator, budget=3.0 if quick else 10.0)
+        error, end = judged(scene, run, exact)
+        shown = f"{error:.1e}" if error == error else "-"
+        table.add(scene.name, method, text, shown, 1e3 * run.cpu, run.steps, run.evaluations, end)
+        points.setdefault(method, []).append((error, run.cpu))
+    return points, disagreement
+
+
+def draw_panel(axes, name, points, disagreement):
+    """One scene: lines of runs with an error, crosses at the top for those that failed."""
+    for method, marker in MARKERS.items():
+        errors, cpu = np.array(points.get(method, [(np.nan, np.nan)])).T
+        (line,) = axes.loglog(1e3 * cpu, errors, marker=marker, markersize=5, label=method)
+        failed = 1e3 * cpu[np.isnan(errors)]
+        axes.plot(
+            failed, np.full(len(failed), 0.97), "x", color=line.get_color(),
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+    axes.axhline(max(disagreement, 1e-17), color="0.7", linestyle=":")
+    axes.set(title=name, xlabel="CPU [ms]", ylabel="error [m]")
+
+
+def draw(scenes, path):
+    """All panels: {scene's name: (points, disagreement)}."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 6.5), layout="constrained")
+    panels = figure.subplots(2, (len(scenes) + 1) // 2, squeeze=False).ravel()
+    for axes, (name, (points, disagreement)) in zip(panels, scenes.items(), strict=False):
+        draw_panel(axes, name, points, disagreement)
+    for axes in panels[len(scenes) :]:
+        axes.set_axis_off()
+    handles, labels = panels[0].get_legend_handles_labels()
+    note = "× failed; dotted: how far the two references differ"
+    panels[-1].legend(handles, labels, title=note, loc="center", title_fontsize="small")
+    figure.savefig(path, dpi=110)
+
+
+def main():
+    """Print the table, draw the figure."""
+    figure = {"help": "where to draw, e.g. docs/figures/work_precision.png"}
+    arguments = parse_arguments(__doc__, figure=figure)
+    print_heading()
+    table = Table("Error against run time", COLUMNS)
+    scenes = {s.name: measure_scene(s, table, arguments.quick) for s in all_scenes()}
+    table.print(arguments.markdown)
+    if arguments.figure:
+        draw(scenes, arguments.figure)
+        print(f"drawn: {arguments.figure}")
+
+
+if __name__ == "__main__":
+    main()

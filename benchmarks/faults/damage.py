@@ -1,0 +1,150 @@
+"""Byte flips and truncations of journals and results files: all found, nothing wrong believed."""
+
+import io
+import shutil
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from benchmarks.faults.job import make_study, run_here
+from flocsim.ensembles.chunks import ROW
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.storage.identity import identity_of
+from flocsim.ensembles.storage.resume import Beginning, take_journal
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.study import Study
+from flocsim.errors import FlocsimError
+from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import Damage, scan
+from flocsim.io.results.file import read_results, same_data
+
+WHOLE_RERUNS = 25
+"""Damaged journals that are finished and compared with the undisturbed run, byte for byte."""
+
+
+def damaged(data, rng):
+    """(bytes with one fault, its name): a flipped bit, or an end that is missing."""
+    place = int(rng.integers(len(data)))
+    if rng.random() < 0.25:
+        return data[:place], "truncated"
+    changed = bytearray(data)
+    changed[place] ^= 1 << int(rng.integers(8))
+    return bytes(changed), "flipped"
+
+
+def a_journal(root):
+    """(folder, bytes) of a study of which the journal holds all."""
+    folder = make_study(root / "damage")
+    keep = Journal.remove
+    Journal.remove = lambda self: self.file.close()
+    try:
+        run_here(folder)
+    finally:
+        Journal.remove = keep
+    return folder, (folder / "study.h5.journal").read_bytes()
+
+
+def damage_journal(root, reference, count, rng):
+    """{kind: Tally} of faults in a journal."""
+    from benchmarks.faults.run import Tally
+
+    folder, data = a_journal(root)
+    (folder / "study.h5").unlink()
+    study = Study(load_config(folder / "study.toml"))
+    identity = identity_of(study)
+    truth = read_results(reference).replicates
+    borders = {0, *(each.start for each in records_of(data))}
+    tallies = {"journal flipped": Tally(), "journal truncated": Tally()}
+    for number in range(count):
+        changed, kind = damaged(data, rng)
+        began = time.monotonic()
+        (folder / "study.h5.journal").write_bytes(changed)
+        problem = believed_wrong(folder, study, identity, truth, len(changed) in borders)
+        if not problem and number < WHOLE_RERUNS:
+            problem = finished_wrong(folder, changed, reference)
+        tallies[f"journal {kind}"].add(problem, time.monotonic() - began)
+    return tallies
+
+
+def records_of(data):
+    """The records of a whole journal, as Damage with start and stop (just their places)."""
+    place, file = 0, io.BytesIO(data)
+    for each in scan(file):
+        stop = each.offset + each.length
+        yield Damage(place, stop)
+        place = stop
+
+
+def believed_wrong(folder, study, identity, truth, is_border):
+    """What is wrong with the rows that are taken from a damaged journal; "" if nothing."""
+    journal = Journal(folder / "study.h5.journal")
+    start = Beginning(RowStore(journal, study.conditions), identity)
+    try:
+        take_journal(start)
+    except FlocsimError:
+        return ""  # refused as a whole
+    finally:
+        found = journal.damage
+    if not found and not is_border:
+        return "not detected"
+    problem = "" if rows_agree(start.store, study, truth) else "a wrong row was believed"
+    journal.file.close()
+    return problem
+
+
+def rows_agree(store, study, truth):
+    """Whether all rows that a store has are those of the undisturbed run."""
+    for place in range(len(study.conditions)):
+        at = np.unravel_index(place, study.shape[:3])
+        for first, stop in store.intervals(place):
+            for name in ROW.names:
+                if store.read(place, name, first, stop).tobytes() != (
+                    truth[name][at][first:stop].tobytes()
+                ):
+                    return False
+    return True
+
+
+def finished_wrong(folder, changed, reference):
+    """What is wrong with the study once it is finished from a damaged journal; "" if nothing."""
+    copy = folder.with_name("damage-copy")
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(folder, copy)
+    (copy / "study.h5.journal").write_bytes(changed)
+    try:
+        output = run_here(copy)
+    except FlocsimError as error:
+        return "" if "journal" in str(error) else str(error)
+    return f"bytes differ: {apart}" if (apart := same_data(reference, output)) else ""
+
+
+def damage_results(root, reference, count, rng):
+    """{kind: Tally} of faults in a results file: each is found before HDF5 parses the file."""
+    from benchmarks.faults.run import Tally
+
+    data = Path(reference).read_bytes()
+    path = root / "damaged.h5"
+    tallies = {"results flipped": Tally(), "results truncated": Tally()}
+    opened, parse = [], h5py.File
+    h5py.File = lambda *words, **more: opened.append(words) or parse(*words, **more)
+    try:
+        for _ in range(count):
+            changed, kind = damaged(data, rng)
+            path.write_bytes(changed)
+            began = time.monotonic()
+            tallies[f"results {kind}"].add(read_wrong(path, opened), time.monotonic() - began)
+    finally:
+        h5py.File = parse
+    return tallies
+
+
+def read_wrong(path, opened):
+    """What is wrong with how a damaged results file is refused; "" if nothing."""
+    opened.clear()
+    try:
+        read_results(path)
+    except FlocsimError:
+        return "parsed before it was refused" if opened else ""
+    return "not detected"

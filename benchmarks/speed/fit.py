@@ -1,0 +1,201 @@
+"""Relative errors and CPU times of fits on real silhouettes, against the paper's optimiser.
+
+    python -m benchmarks.speed.fit [--quick] [--markdown] [--images ../shared/images]
+
+Means over flocs come with half their 95 % interval (Student).  `even` is the start of `paper`: N
+points evenly on the outline, drawn in by r.  The paper counts V over the whole picture anew for
+every trial move; that time is computed: its number of counts times the time of one.
+"""
+
+import time
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy import stats
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from flocsim.geometry.fit import fit_mask
+from flocsim.geometry.fit import paper as fit_paper
+from flocsim.geometry.fit.kernels import compiled, count_errors, inset, padded, searched
+from flocsim.geometry.fit.outline import trace_outline
+from flocsim.geometry.fit.search import even_start
+from flocsim.io.images.masks import read_masks, segment_mask
+
+COUNTS = (4, 8, 16, 28, 64)
+CLASSES = {"14 to 26 px": (14.0, 26.0), "4 to 5 px": (4.0, 5.0)}
+GOALS = {
+    ("14 to 26 px", 4): 15.5, ("14 to 26 px", 8): 6.4, ("14 to 26 px", 16): 2.9,
+    ("14 to 26 px", 28): 1.6, ("14 to 26 px", 64): 0.7,
+    ("4 to 5 px", 4): 12.5, ("4 to 5 px", 8): 5.1, ("4 to 5 px", 16): 1.5,
+}  # fmt: skip
+REPEATS = 5
+STEPS = np.array([8.0, 4.0, 2.0, 1.0, 0.5, 0.25])
+IMAGES = Path(__file__).resolve().parents[3] / "shared/images"
+
+
+def silhouettes(images):
+    """[(mask, r_eq)] of the real silhouettes."""
+    masks = read_masks(Path(images) / "silhouettes/flocs_open.npz")
+    regions = [segment_mask(mask, min_radius=0.0).regions[0] for _, mask in masks]
+    return [(region.mask, region.equivalent_radius) for region in regions]
+
+
+class Fits:
+    """Fits of silhouettes, each made once: RE [%] and CPU time [ms]."""
+
+    def __init__(self, flocs, every):
+        """``flocs`` [(mask, r_eq)], of which every 1st, 2nd, … of a class is taken."""
+        self.flocs, self.every = flocs, every
+        self.measure = cache(self._measure)
+
+    def masks(self, low, high):
+        """The masks with low ≤ r_eq ≤ high [px]."""
+        return [mask for mask, radius in self.flocs if low <= radius <= high][:: self.every]
+
+    def _measure(self, low, high, vertices, radius=1.0, method="pattern"):
+        """(RE (n,), ms (n,)) of a class."""
+        masks = self.masks(low, high)
+        fit_mask(masks[0], vertices=vertices, radius=radius, method=method)
+        rows = []
+        for mask in masks:
+            began = time.process_time()
+            fit = fit_mask(mask, vertices=vertices, radius=radius, method=method)
+            rows.append((fit.relative_error, 1e3 * (time.process_time() - began)))
+        return np.array(rows).T
+
+
+def with_half(values):
+    """A mean and half its 95 % interval, as text."""
+    half = stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values))
+    return f"{np.mean(values):.2f} ± {half:.2f}"
+
+
+def error_table(fits):
+    """RE by class and N at r = 1 px beside the goals."""
+    table = Table(
+        "Relative error [%] of the default fit at r = 1 px",
+        ("r_eq", "N", "flocs", "RE", "goal", "every 4th", "worst", "circle", "median ms", "max ms"),
+    )
+    for name, bounds in CLASSES.items():
+        circle = fits.measure(*bounds, 1)[0].mean()
+        for count in COUNTS:
+            errors, times = fits.measure(*bounds, count)
+            goal = GOALS.get((name, count), "")
+            table.add(name, count, len(errors), with_half(errors), goal, errors[::4].mean(),
+                      errors.max(), circle, np.median(times), times.max())  # fmt: skip
+    return table
+
+
+def paper_counts(mask, vertices):
+    """(ms of the paper's motion if it counts V over the whole picture, number of counts)."""
+    room, _ = padded(mask, vertices, 1.0)
+    start = even_start(room, vertices, 1.0)
+    settings = fit_paper.FORCE, fit_paper.DAMPING, fit_paper.SPACING
+    steps = compiled(fit_paper.damped_descent)(
+        room, np.array(start), 1.0, *settings, fit_paper.TIME_STEP, fit_paper.PATIENCE
+    )[1]
+    began = time.process_time()
+    for _ in range(20):
+        count_errors(room, start, 1.0)
+    each = (time.process_time() - began) / 20
+    return 1e3 * each * steps * (4 * vertices + 1), steps * (4 * vertices + 1)
+
+
+def method_table(fits):
+    """The default against the paper's optimiser."""
+    table = Table(
+        "The default (pattern) against the paper's damped dynamics, r = 1 px, 14 to 26 px",
+        ("N", "RE even", "RE paper", "RE pattern", "ms paper", "ms pattern", "ratio",
+         "ms paper, whole picture", "ratio"),
+    )  # fmt: skip
+    bounds = CLASSES["14 to 26 px"]
+    for count in COUNTS:
+        even = fits.measure(*bounds, count, method="even")[0].mean()
+        theirs, ours = (fits.measure(*bounds, count, method=m) for m in ("paper", "pattern"))
+        whole = np.mean([paper_counts(mask, count)[0] for mask in fits.masks(*bounds)])
+        ms_theirs, ms_ours = theirs[1].mean(), ours[1].mean()
+        table.add(count, even, with_half(theirs[0]), with_half(ours[0]), ms_theirs, ms_ours,
+                  ms_theirs / ms_ours, whole, whole / ms_ours)  # fmt: skip
+    return table
+
+
+def time_table(fits):
+    """CPU times of fits of flocs near 40 px."""
+    table = Table(
+        "CPU ms of one fit of a floc near 40 px, r = 1 px, the fastest of five",
+        ("r_eq", "N = 4", "N = 16", "N = 64", "RE at N = 64"),
+    )
+    for mask, radius in [f for f in fits.flocs if 38.0 <= f[1] <= 43.0]:
+        cells = [fastest(mask, count) for count in (4, 16, 64)]
+        table.add(f"{radius:.1f}", *cells, fit_mask(mask, vertices=64).relative_error)
+    return table
+
+
+def fastest(mask, vertices):
+    """CPU ms of the fastest of several fits."""
+    times = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        fit_mask(mask, vertices=vertices)
+        times.append(1e3 * (time.process_time() - began))
+    return min(times)
+
+
+def radius_table(fits, method):
+    """RE by spheroradius, N and class, and the change with r floc by floc (claim 3)."""
+    table = Table(
+        f"Relative error [%] by spheroradius (claim 3), r_eq > 8 px, method {method}",
+        ("N", "r = 1 px", "r = 2 px", "r = 4 px", "2 − 1", "4 − 2"),
+    )
+    rows = {n: [fits.measure(8.0, 99.0, n, r, method)[0] for r in (1.0, 2.0, 4.0)] for n in COUNTS}
+    rows["all"] = np.mean(list(rows.values()), axis=0)
+    for count, (one, two, four) in rows.items():
+        table.add(count, with_half(one), with_half(two), with_half(four), with_half(two - one),
+                  with_half(four - two))  # fmt: skip
+    return table
+
+
+def best_of_random(mask, vertices, starts, rng):
+    """The least RE [%] that pattern searches from random points of the outline come to."""
+    room, _ = padded(mask, vertices, 1.0)
+    outline, least = trace_outline(room), np.inf
+    for _ in range(starts):
+        points = outline[np.sort(rng.choice(len(outline), vertices, replace=False))]
+        least = min(least, searched(room, inset(points, room, 1.0), 1.0, STEPS)[1])
+    return 100 * least / mask.sum()
+
+
+def least_table(fits, starts):
+    """The default against the best of many random starts, where starts matter most."""
+    table = Table(
+        f"How much lower RE [%] can be: the best of {starts} random starts, r = 1 px, 14 to 26 px",
+        ("N", "default", "random starts", "the lower of both", "every 4th"),
+    )
+    bounds = CLASSES["14 to 26 px"]
+    for count in (4, 8):
+        rng = np.random.default_rng(count)
+        found = fits.measure(*bounds, count)[0]
+        least = np.array([best_of_random(m, count, starts, rng) for m in fits.masks(*bounds)])
+        both = np.minimum(found, least)
+        table.add(count, found.mean(), least.mean(), both.mean(), both[::4].mean())
+    return table
+
+
+def main():
+    """Print the tables."""
+    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    print_heading()
+    flocs = silhouettes(arguments.images)
+    fits = Fits(flocs, every=4 if arguments.quick else 1)
+    error_table(fits).print(arguments.markdown)
+    time_table(fits).print(arguments.markdown)
+    least_table(fits, 30 if arguments.quick else 150).print(arguments.markdown)
+    method_table(fits).print(arguments.markdown)
+    sample = Fits(flocs, every=8 if arguments.quick else 3)
+    for method in ("pattern", "paper"):
+        radius_table(sample, method).print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

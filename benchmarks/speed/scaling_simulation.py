@@ -1,0 +1,168 @@
+"""Replays measured costs of replicates on simulated ranks, with the Dealer that real ones have."""
+
+import heapq
+import time
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.chunks import ROW, Condition, chunk_record
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.estimates.summary import Reader, summarize
+from flocsim.ensembles.parallel.dealer import Dealer, chunk_seconds
+from flocsim.ensembles.parallel.desk import Desk, Done
+from flocsim.ensembles.parallel.team import SLEEP, Alone
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.study import Study
+from flocsim.io.journal.journal import Journal
+from flocsim.io.results.schema import ROW_SIZE
+
+LATENCY = SLEEP + 1e-4
+"""Seconds between a rank's request and its arrival, half a look for messages each way included."""
+
+EXACT = 512
+"""Replicates of a chunk up to which every cost is drawn; longer ones by their mean and spread."""
+
+
+@attrs.frozen
+class Costs:
+    """Measured seconds of single replicates, by condition."""
+
+    conditions: list
+
+    @property
+    def number(self):
+        """How many were measured."""
+        return sum(map(len, self.conditions))
+
+    @property
+    def mean(self):
+        """Mean [s] over the conditions."""
+        return float(np.mean([np.mean(each) for each in self.conditions]))
+
+    @property
+    def spread(self):
+        """The largest over the median."""
+        every = np.concatenate(self.conditions)
+        return float(every.max() / np.median(every))
+
+
+@attrs.frozen
+class DeskCosts:
+    """``answer`` [s] to take in a chunk and hand out another; ``rows`` written, ``assembly``: rows
+    made into a results file [1/s]."""
+
+    answer: float
+    rows: float
+    assembly: float
+
+
+def measure_costs(count):
+    """The Costs of replicates of the paper's types, N = 1 to 64, three displacements."""
+    overrides = {
+        "replicates": count,
+        "scene": {"types": ["I", "II", "III"], "delta": [0.0, 0.4, 0.8]},
+    }
+    from pathlib import Path
+
+    examples = Path(__file__).resolve().parents[2] / "examples"
+    study = Study(load_config(examples / "quickstart.toml", overrides))
+    study.compile(study.kinds)
+    return Costs([[timed(study, place, k) for k in range(count)] for place in study.places])
+
+
+def timed(study, place, replicate):
+    """Seconds of a replicate, its shapes made beforehand."""
+    from flocsim.ensembles.collision.sampling import draws
+
+    study.encounter(*place[:2], draws(study.config.seed, replicate))
+    began = time.perf_counter()
+    study.run(*place, replicate)
+    return time.perf_counter() - began
+
+
+def measure_desk(folder):
+    """What rank 0 needs for a chunk: records of 1 row and of 8192, taken in one by one."""
+    conditions = (Condition("I", 4, 0.0),)
+    rates = {}
+    for rows, count in ((1, 2000), (8192, 60)):
+        path = folder / f"desk{rows}.journal"
+        store = RowStore(Journal(path), conditions)
+        dealer = Dealer.of([[]], [10**9], 1000)
+        desk = Desk(Alone(), dealer, store, lambda stop: False, 1e9, lambda left: None)
+        record = chunk_record(conditions[0], 0, np.zeros(rows, ROW), "key")
+        start = len(record) - rows * ROW_SIZE
+        began = time.perf_counter()
+        for _ in range(count):
+            chunk = desk.next_chunk(1)
+            desk.hand_in(
+                1, Done(chunk._replace(stop=chunk.first + rows), rows, record, start), False
+            )
+        store.journal.sync()
+        rates[rows] = (time.perf_counter() - began) / count
+    per_row = (rates[8192] - rates[1]) / 8191
+    return DeskCosts(rates[1], 1.0 / per_row, measure_assembly(store, folder))
+
+
+def measure_assembly(store, folder):
+    """Rows per second that rank 0 makes into tables and columns."""
+    from flocsim.io.files import replace_by_blocks
+
+    count, rows = 200_000, np.zeros(8192, ROW)
+    rows["inside"] = 1  # all of them of class A
+    record = chunk_record(store.conditions[0], 0, rows, "key")
+    for first in range(0, count + 8192, 8192):
+        offset = store.journal.append(record)
+        store.add(0, first, first + 8192, offset + len(record) - 8192 * ROW_SIZE)
+    began = time.perf_counter()
+    reader = Reader(store, (1, 1, 1, count))
+    reader.known = [np.sort(store.entries[0][60 : store.counts[0]], order="first")]
+    parts = (block for name in ROW.names for block in reader.column(name))
+    replace_by_blocks(folder / "columns", count * ROW_SIZE, parts)
+    written = time.perf_counter() - began
+    began = time.perf_counter()
+    summarize(reader)
+    return count / (written + time.perf_counter() - began)
+
+
+def run_length(cost, chunk, seconds, rng):
+    """(replicates done, seconds taken) of a chunk that is given back when its time is up."""
+    count = chunk.stop - chunk.first
+    if count <= EXACT:
+        ends = np.cumsum(rng.choice(cost, count))
+        done = min(int(np.searchsorted(ends, seconds)) + 1, count)
+        return done, float(ends[done - 1])
+    took = count * cost.mean() + np.sqrt(count) * cost.std() * rng.standard_normal()
+    if took <= seconds:
+        return count, took
+    done = max(int(count * seconds / took), 1)
+    return done, took * done / count
+
+
+def simulate(ranks, replicates, costs, desk):
+    """A row of the table: a study of so many replicates on so many ranks."""
+    rng = np.random.default_rng(ranks)
+    every = [np.array(each) for each in costs.conditions]
+    per_condition = max(replicates // len(every), 1)
+    dealer = Dealer.of([[] for _ in every], [per_condition], ranks)
+    seconds = chunk_seconds(ranks)
+    # (time at which a request arrives, rank, its chunk, how much of that is done)
+    requests = [(LATENCY, rank, None, 0) for rank in range(ranks)]
+    free, busy, work, idle = 0.0, 0.0, 0.0, []
+    while requests:
+        now, rank, chunk, done = heapq.heappop(requests)
+        served = desk.answer + done / desk.rows
+        free, busy = max(now, free) + served, busy + served
+        if chunk is not None:
+            dealer.give_back(chunk, done)
+        idle.append(rank)
+        while idle and (new := dealer.take()) is not None:
+            count, took = run_length(every[new.condition], new, seconds, rng)
+            work += took
+            heapq.heappush(requests, (free + took + 2.0 * LATENCY, idle.pop(), new, count))
+    assembly = per_condition * len(every) / desk.assembly
+    ideal = work / ranks
+    return (
+        ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free, assembly,
+        ideal / (free + assembly),
+    )  # fmt: skip

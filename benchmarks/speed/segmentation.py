@@ -1,0 +1,151 @@
+"""Finding flocs: time and outcome on real pictures, r_eq on known outlines, `flocsim fit --jobs`.
+
+    python -m benchmarks.speed.segmentation [--quick] [--markdown] [--images ../shared/images]
+
+Known outlines: real silhouettes put on a 1920×1080 frame with a vignette, blurred by 1 px, with
+noise.  --jobs: wall times in alternate runs, load of the machine beside them; where others keep the
+cores busy, two processes get no more of them than one.  The ratio on free cores is what does not
+depend on that: CPU time of one process / (CPU of the parent + half of the two workers').
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.speed.fit import IMAGES, silhouettes
+from flocsim.io.images.pictures import read_grey, segment
+
+PICTURES = (
+    "flocpy/023.png", "flocpy/024.png", "flocpy/025.png", "safas/brightfield_flocs.png",
+    "safas/clayflocs.png", "safas/darkfield_highgray_mudflocs.png",
+    "safas/darkfield_noisy_mudflocs_left.png", "sandi/FlocCAM-image2.jpg",
+    "sandi/Stereomicroscope-image1.jpg", "soot_tem/201805A_A6_004_half.png",
+)  # fmt: skip
+HUMAN = "soot_tem/201805A_A6_004_half_mask.png"
+FRAME = (1080, 1920)
+CELL = 150
+BLUR = 1.0
+
+
+def picture_table(images):
+    """Time and outcome of every picture."""
+    table = Table(
+        "Segmentation at the default options",
+        ("picture", "pixels", "s", "flocs", "border", "blurred", "small", "foreground %", "IoU"),
+    )
+    human = read_grey(images / HUMAN) > 0.5
+    segment(read_grey(images / PICTURES[-1]))
+    for name in PICTURES:
+        grey = read_grey(images / name)
+        began = time.process_time()
+        found = segment(grey)
+        spent = time.process_time() - began
+        left = found.rejected_by_reason()
+        both = (found.foreground & human, found.foreground | human) if "soot" in name else None
+        table.add(
+            name, f"{grey.shape[1]}×{grey.shape[0]}", spent, len(found.regions),
+            *(left.get(why, 0) for why in ("at the border", "out of focus", "too small")),
+            100 * found.foreground_share, both[0].sum() / both[1].sum() if both else "",
+        )  # fmt: skip
+    return table
+
+
+def known_frame(masks, seed):
+    """A cover (0 … 1) of masks on a grid of cells, and the place of each."""
+    rng = np.random.default_rng(seed)
+    cover, places = np.zeros(FRAME), []
+    for number, mask in enumerate(masks):
+        row, column = divmod(number, FRAME[1] // CELL)
+        spare = CELL - np.array(mask.shape) - 8
+        top, left = (row, column) * np.array(CELL) + 4 + rng.integers(0, spare + 1)
+        cover[top : top + mask.shape[0], left : left + mask.shape[1]] = mask
+        places.append((left + mask.shape[1] / 2, top + mask.shape[0] / 2))
+    return gaussian_filter(cover, BLUR), np.array(places)
+
+
+def known_grey(cover, flocs, vignette, noise, seed):
+    """The frame as a camera would see it."""
+    y, x = np.mgrid[-1 : 1 : FRAME[0] * 1j, -1 : 1 : FRAME[1] * 1j]
+    light = 1.0 - 0.5 * vignette * (x**2 + y**2)
+    grey = 0.8 * light * (1 - 0.8 * cover) if flocs == "dark" else 0.1 * light + 0.7 * cover
+    return grey + noise * np.random.default_rng(seed).standard_normal(FRAME)
+
+
+def known_table(flocs):
+    """r_eq found against r_eq known."""
+    table = Table(
+        "Found/known r_eq of real silhouettes on a synthetic frame",
+        ("flocs", "vignette", "noise", "put", "found", "mean ratio", "deviation"),
+    )
+    usable = [f for f in flocs if f[1] > 5 and max(f[0].shape) < CELL - 8][::2][:70]
+    for polarity in ("dark", "bright"):
+        for vignette, noise in ((0.0, 0.0), (0.8, 0.0), (0.8, 0.02), (0.8, 0.04)):
+            cover, places = known_frame([mask for mask, _ in usable], seed=1)
+            found = segment(known_grey(cover, polarity, vignette, noise, 2), neck=0)
+            centres = np.array([region.centroid for region in found.regions])
+            sizes = np.array([region.equivalent_radius for region in found.regions])
+            away = np.hypot(*(centres[:, None] - places[None]).transpose(2, 0, 1))
+            near = away.argmin(axis=0)
+            ratio = (sizes[near] / [r for _, r in usable])[away.min(axis=0) < 20]
+            table.add(polarity, vignette, noise, len(usable), len(ratio), f"{ratio.mean():.4f}",
+                      f"{ratio.std():.4f}")  # fmt: skip
+    return table
+
+
+RUN = """
+import resource, sys, time
+from flocsim.__main__ import main
+began = time.perf_counter()
+main(sys.argv[1:])
+wall = time.perf_counter() - began
+spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+print(wall, *(usage.ru_utime + usage.ru_stime for usage in spent))
+"""
+
+
+def fit_seconds(images, jobs, folder):
+    """(wall time, CPU time of the parent, of its workers) of a run of `flocsim fit` [s]."""
+    words = ["fit", images / "flocpy", images / "safas", "--pixel-size", "1e-6", "--jobs", jobs,
+             "--vertices", "8,16,28,64", "-o", f"{folder}/{jobs}.h5"]  # fmt: skip
+    command = [sys.executable, "-c", RUN, *map(str, words)]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    return [float(word) for word in done.stdout.split()[-3:]]
+
+
+def jobs_table(images, rounds):
+    """Times with one and two processes."""
+    table = Table(
+        "flocsim fit on eight pictures, N = 8, 16, 28, 64, [s]",
+        ("wall, 1 job", "wall, 2 jobs", "ratio", "CPU, 1 job", "CPU, 2 jobs: parent", "workers",
+         "ratio on free cores", "same bytes", "load average"),
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(rounds):
+            one, two = (fit_seconds(images, jobs, folder) for jobs in (1, 2))
+            same = Path(folder, "1.h5").read_bytes() == Path(folder, "2.h5").read_bytes()
+            load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+            free = (one[1] + one[2]) / (two[1] + two[2] / 2)
+            table.add(one[0], two[0], one[0] / two[0], one[1] + one[2], two[1], two[2], free,
+                      "yes" if same else "no", load)  # fmt: skip
+    return table
+
+
+def main():
+    """Print the tables."""
+    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    print_heading(["scikit-image"])
+    images = Path(arguments.images)
+    picture_table(images).print(arguments.markdown)
+    known_table(silhouettes(images)).print(arguments.markdown)
+    jobs_table(images, 1 if arguments.quick else 3).print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,179 @@
+"""Replicates per second and core, the share of outcomes that flip, and µs per force evaluation.
+
+    python -m benchmarks.speed.throughput [--quick] [--markdown] [--replicates 40] [--tolerance 1e-9]
+
+Everything in one process on one core. Flips: replicates whose outcome (A, B, C, D, missed,
+undecided, failed) differs from that at a tolerance 100 times tighter.
+"""
+
+import time
+
+import attrs
+import numpy as np
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.speed.evaluations import costs
+from benchmarks.speed.scenes import collisions
+from flocsim.ensembles.collision.encounter import run_encounter
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.study import Study
+from flocsim.io.results.schema import OUTCOMES
+
+VERTICES = (1, 4, 16, 64)
+LARGER = (4, 16, 64, 512)
+
+
+@attrs.define
+class Runs:
+    """Outcome, steps, CPU time [s] and set-up time [s] of replicates (delta, replicate)."""
+
+    outcome: np.ndarray
+    steps: np.ndarray
+    cpu: np.ndarray
+    setup: np.ndarray
+
+
+def blank_runs(shape):
+    """Runs to be filled in."""
+    whole = np.zeros(shape, dtype=int), np.zeros(shape, dtype=int)
+    return Runs(*whole, np.zeros(shape), np.zeros(shape))
+
+
+def run_replicate(study, condition, vertices, share, replicate):
+    """(row, CPU time of the run, CPU time of making its encounter)."""
+    began = time.process_time()
+    numbers = draws(study.config.seed, replicate)
+    encounter = study.encounter(condition, vertices, numbers)
+    driver = study.driver(encounter)
+    made = time.process_time()
+    budget = study.config.integrator.max_steps
+    row = run_encounter(encounter, driver, orientations(numbers), share, budget)
+    return row, time.process_time() - made, made - began
+
+
+def run_type(study, condition, vertices):
+    """Runs of one type and N at every displacement."""
+    deltas = study.config.scene.delta
+    runs = blank_runs((len(deltas), study.config.replicates))
+    for d, replicate in np.ndindex(runs.cpu.shape):
+        row, cpu, setup = run_replicate(study, condition, vertices, deltas[d], replicate)
+        runs.outcome[d, replicate], runs.steps[d, replicate] = row["outcome"], row["steps"]
+        runs.cpu[d, replicate], runs.setup[d, replicate] = cpu, setup
+    return runs
+
+
+def share_of(runs, name):
+    """Percent of replicates with an outcome."""
+    return 100.0 * float(np.mean(runs.outcome == OUTCOMES.index(name)))
+
+
+def slowest(values):
+    """The largest over the median."""
+    return float(values.max() / np.median(values))
+
+
+def rate_rows(table, name, vertices, runs):
+    """Add one row of rates."""
+    table.add(
+        name, vertices, runs.cpu.size, float(runs.cpu.size / runs.cpu.sum()),
+        float(runs.cpu.size / (runs.cpu.sum() + runs.setup.sum())),
+        1e3 * float(np.median(runs.cpu)), int(np.median(runs.steps)), slowest(runs.steps),
+        slowest(runs.cpu), share_of(runs, "undecided"), share_of(runs, "failed"),
+    )  # fmt: skip
+
+
+def joined(all_runs):
+    """Runs of several types as one."""
+    fields = attrs.fields_dict(Runs)
+    return Runs(*(np.concatenate([getattr(r, f) for r in all_runs]) for f in fields))
+
+
+def rates(study, markdown):
+    """Print rates by type and N; {type: Runs at the largest N}."""
+    table = Table(
+        f"Replicates at tolerance {study.config.integrator.tolerance:g} m, "
+        f"{study.config.preset}, delta 0 to 1",
+        ("type", "N", "replicates", "per s", "with set-up", "median ms", "median steps",
+         "slowest/median steps", "in time", "undecided %", "failed %"),
+    )  # fmt: skip
+    names = [name for name, _, _ in study.config.scene.conditions]
+    for vertices in study.config.shapes.vertices:
+        found = {n: run_type(study, c, vertices) for c, n in enumerate(names)}
+        for name, runs in found.items():
+            rate_rows(table, name, vertices, runs)
+        rate_rows(table, "all", vertices, joined(list(found.values())))
+    table.print(markdown)
+    return found
+
+
+def flips(found, exact, deltas):
+    """Percent of replicates whose outcome differs, by displacement."""
+    return dict(zip(deltas, 100.0 * np.mean(found.outcome != exact.outcome, axis=1), strict=True))
+
+
+def print_flips(study, exact_study, found, markdown):
+    """Print the share of flipped outcomes by type and displacement."""
+    deltas = study.config.scene.delta
+    tight = exact_study.config.integrator.tolerance
+    vertices = study.config.shapes.vertices[-1]
+    title = f"Outcomes [%] that differ from those at tolerance {tight:g} m, N = {vertices}"
+    table = Table(title, ("type", *(f"delta {d:g}" for d in deltas), "all", "slower by"))
+    total, count = 0, 0
+    for condition, (name, runs) in enumerate(found.items()):
+        exact = run_type(exact_study, condition, vertices)
+        shares = flips(runs, exact, deltas).values()
+        total += np.count_nonzero(runs.outcome != exact.outcome)
+        count += runs.outcome.size
+        mean = float(np.mean(list(shares)))
+        table.add(name, *map(float, shares), mean, float(exact.cpu.sum() / runs.cpu.sum()))
+    table.add("all", *([""] * len(deltas)), 100.0 * total / count, "")
+    table.print(markdown)
+
+
+def print_costs(quick, markdown):
+    """Print µs per force evaluation."""
+    table = Table(
+        "µs per force evaluation, contact search and list upkeep included, Type I",
+        ("preset", "N", "contact", "near", "far", "pairs listed", "evaluations per list",
+         "share in contact"),
+    )  # fmt: skip
+    for preset in ("tang2014", "si"):
+        for vertices in LARGER:
+            contact, near, far = costs(preset, vertices, 20_000)
+            each = (contact.microseconds, near.microseconds, far.microseconds)
+            table.add(preset, vertices, *each, contact.listed, contact.per_list, contact.touching)
+    table.print(markdown)
+
+
+def make_study(arguments, share):
+    """The Study at ``share`` of the asked for tolerance, its kinds of code compiled."""
+    config = collisions(
+        arguments.preset,
+        replicates=5 if arguments.quick else arguments.replicates,
+        shapes={"vertices": list(VERTICES)},
+        integrator={"tolerance": arguments.tolerance},
+    )
+    tolerance = share * config.integrator.tolerance
+    integrator = attrs.evolve(config.integrator, tolerance=tolerance)
+    study = Study(attrs.evolve(config, integrator=integrator))
+    study.compile(study.kinds)
+    return study
+
+
+def main():
+    """Print the three tables."""
+    arguments = parse_arguments(
+        __doc__,
+        preset={"default": "tang2014"},
+        replicates={"type": int, "default": 40, "help": "of each condition"},
+        tolerance={"type": float, "help": "[m], default: the integrator's own"},
+    )
+    print_heading()
+    study = make_study(arguments, 1.0)
+    found = rates(study, arguments.markdown)
+    print_flips(study, make_study(arguments, 0.01), found, arguments.markdown)
+    print_costs(arguments.quick, arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""What the paper claims, each claim a small pure function of results: `check_claims`."""
+
+from . import fits, robust, soft
+from .resampling import counts_of
+from .verdicts import Finding, Lacking
+
+__all__ = ["COLLISION_CLAIMS", "FIT_CLAIMS", "check_claims"]
+
+FEWEST = 30
+"""Replicates below which resamples of them say too little about how they spread."""
+
+FIT_CLAIMS = {
+    1: ("sphere RE ≥ 32 % as a class mean", fits.sphere_error),
+    2: ("spheropolygon RE < sphere RE", fits.polygon_error),
+    3: ("RE(r=1) < RE(r=2) < RE(r=4)", fits.radius_error),
+    4: ("r_eq > 5 µm: RE falls with N", fits.error_trend),
+    5: ("best RE < 1 % (N = 64, r = 1)", fits.best_error),
+}
+"""Number → (words, function of a shape library's entries that yields Parts)."""
+
+COLLISION_CLAIMS = {
+    6: ("spheres: Pr[C inside] = 1 and Pr[A] = 1", robust.always_so(6)),
+    7: ("Type III: Pr[C inside] = 1", robust.always_so(7)),
+    8: ("Pr[C inside]: I ≤ II ≤ III", robust.type_order),
+    9: ("A + B = Pr[C inside]; A + B + C + D = 1", robust.always_so(9)),
+    10: ("Type III has only A and B", robust.always_so(10)),
+    11: ("all classes occur: Type I, N = 64, δ = 0", robust.all_classes),
+    12: ("Pr[C inside] of I, II falls with N and δ", soft.inside_falls),
+    13: ("Pr[A|inside] < 1, falls with N and δ", soft.aggregation_inside),
+    14: ("Type II has the highest Pr[A|inside]", soft.middle_highest),
+    15: ("Pr[A|outside] > 0 in I, II, falls with N, δ; 0 for I at δ_max", soft.aggregation_outside),
+    16: ("Pr[A|outside] < Pr[A|inside]", soft.outside_below_inside),
+    17: ("Type I: D ≈ 50 %, rising with N", soft.half_depart),
+    18: ("Type II: A most frequent, falling with N", soft.most_frequent),
+}
+"""Number → (words, function of Results and their Counts that yields Parts)."""
+
+
+def check_claims(results=None, entries=None):
+    """The Findings of all claims, in the order of their numbers.
+
+    ``results``: Results that hold their replicates; ``entries``: a shape library's. A claim about
+    what is not there has no parts, a note that says so, and is undecided.
+    """
+    fitted = (entries,) if entries else None
+    enough = results is not None and results.count >= FEWEST
+    collided = (results, counts_of(results)) if enough else None
+    return [check(number, *claim, fitted) for number, claim in FIT_CLAIMS.items()] + [
+        check(number, *claim, collided) for number, claim in COLLISION_CLAIMS.items()
+    ]
+
+
+def check(number, claim, parts_of, data):
+    """The Finding of one claim on ``data``, the arguments of its function; None for no data."""
+    try:
+        if data is None:
+            what = "a shape library" if number in FIT_CLAIMS else f"{FEWEST} replicates at least"
+            raise Lacking(f"needs {what}")
+        return Finding(number, claim, tuple(parts_of(*data)))
+    except Lacking as lack:
+        return Finding(number, claim, (), str(lack))

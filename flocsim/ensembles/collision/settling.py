@@ -1,0 +1,67 @@
+"""Terminal velocities: where a body's own forces balance."""
+
+import math
+
+import numpy as np
+
+from flocsim import hooks as slots
+from flocsim.arrays import BodyView
+from flocsim.errors import UsageError
+
+ITERATIONS = 50
+"""Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
+
+
+def lone_view(body, fluid, vx, vy):
+    """The BodyView of a body at the origin, without spin."""
+    radius = body.shape.equivalent_radius
+    return BodyView(
+        0.0, 0.0, 0.0, body.angle, vx, vy, 0.0, body.mass, body.buoyant_mass(fluid), body.inertia,
+        radius,
+    )  # fmt: skip
+
+
+def balance(force, body, fluid, parameters, velocity):
+    """(fx, fy) on a body that moves at a velocity."""
+    return np.array(force(lone_view(body, fluid, *velocity), parameters)[:2])
+
+
+def derivative(force, body, fluid, parameters, velocity):
+    """∂(fx, fy)/∂(vx, vy) by central differences."""
+    size = 1e-3 * max(abs(velocity[0]), abs(velocity[1])) + 1e-9
+    columns = []
+    for step in np.eye(2) * size:
+        ahead = balance(force, body, fluid, parameters, velocity + step)
+        behind = balance(force, body, fluid, parameters, velocity - step)
+        columns.append((ahead - behind) / (2.0 * size))
+    return np.array(columns).T
+
+
+def terminal_motion(system, body):
+    """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
+
+    The velocity at which the system's body forces balance; the mobility is the inverse of their
+    resistance along gravity. Zero both for a fixed body. UsageError where there is no balance.
+    """
+    if body.fixed:
+        return np.zeros(2), 0.0
+    force = system.pieces.fillings.get(slots.body_force, slots.body_force)
+    known = (force, body, system.fluid, system.pieces.parameters)
+    velocity = np.zeros(2)
+    for _ in range(ITERATIONS):
+        slope = derivative(*known, velocity)
+        if not abs(np.linalg.det(slope)) > 0.0:
+            break
+        change = np.linalg.solve(slope, balance(*known, velocity))
+        velocity = velocity - change
+        if np.abs(change).max() <= 1e-12 * (np.abs(velocity).max() + 1e-15):
+            return velocity, float(-1.0 / slope[1, 1])
+    raise UsageError(
+        "no terminal velocity: a binary collision starts from steady settling, which needs a drag "
+        f"(forces {', '.join(system.pieces.used) or 'none'} do not balance); add [forces.drag]"
+    )
+
+
+def turn_time(radius_i, radius_j, drift):
+    """(r_i + r_j)/|relative drift| [s]: how long the pair takes to pass or to turn over."""
+    return (radius_i + radius_j) / math.hypot(*drift)

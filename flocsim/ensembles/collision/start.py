@@ -1,0 +1,64 @@
+"""Where a binary collision starts: j above i, displaced sideways, outlines a gap apart."""
+
+import math
+from functools import cache
+
+import numpy as np
+
+from flocsim.composer import compose
+from flocsim.geometry.contact.circle_tree import core_distance, outlines_of
+
+MOST_ADVANCES = 1000
+"""Moves towards the wanted gap; each is as long as the distance still allows."""
+
+
+def half_extents(shape, angle):
+    """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
+    x = shape.placed_vertices(angle=angle)[:, 0]
+    return shape.radius - x.min(), shape.radius + x.max()
+
+
+def largest_displacement(rule, shape_i, angle_i, shape_j, angle_j):
+    """δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j ("radius")."""
+    if rule == "radius":
+        return shape_i.bounding_radius + shape_j.bounding_radius
+    return half_extents(shape_i, angle_i)[1] + half_extents(shape_j, angle_j)[0]
+
+
+def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
+    """Height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
+
+    ``outlines``: those of i and j; ``contact`` = r_i + r_j of the spheroradii; ``reach`` =
+    R_i + R_j. From far above, j comes down by the distance that is left (it cannot overshoot);
+    where it passes without coming so near, it starts clear above.
+    """
+    clear = reach + gap
+    height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
+    turn_c, turn_s = math.cos(angle_j - angle_i), math.sin(angle_j - angle_i)
+    c, s = math.cos(angle_i), math.sin(angle_i)
+    for _ in range(MOST_ADVANCES):
+        x, y = c * displacement + s * height, c * height - s * displacement
+        left = core_distance(outlines, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
+        if left <= 1e-6 * gap:
+            return height
+        height -= left
+        if height < -clear:
+            break
+    return clear
+
+
+@cache
+def compiled_height():
+    """`start_height` as machine code."""
+    return compose(start_height, {})
+
+
+def place_pair(shapes, angles, displacement, gap):
+    """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
+    contact = shapes[0].radius + shapes[1].radius
+    reach = shapes[0].bounding_radius + shapes[1].bounding_radius
+    height = compiled_height()(
+        outlines_of(shapes), float(angles[0]), float(angles[1]),
+        contact, reach, float(displacement), gap,
+    )  # fmt: skip
+    return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])

@@ -1,0 +1,153 @@
+"""The page of all keys, from the schema itself.
+
+Write it anew with `python -m flocsim.ensembles.config.page > docs/config.md`.
+"""
+
+import inspect
+import re
+
+import attrs
+
+from flocsim.ensembles.config import presets
+from flocsim.ensembles.config.force_tables import FORCES
+from flocsim.ensembles.config.loader import STUDY_KEYS, TABLES
+from flocsim.ensembles.config.presets import PRESETS
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.values import list_words
+
+QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
+
+INTRODUCTION = """\
+# The config file
+
+A study is one TOML file; `flocsim init` writes an example. Every key is listed below with what it
+takes, its default and its meaning. (This page is made from the schema by
+`python -m flocsim.ensembles.config.page`.)
+
+- **Quantities** are numbers in SI units, or strings with a unit, converted exactly:
+  `radius = 1e-6` is `radius = "1 um"`. Units multiply by a space or `*`, divide by `/`, and have
+  whole exponents: `"0.89 mPa s"`, `"1.2 g/cm^3"`, `"1.2 g cm-3"`. Another dimension is an error.
+- **Nothing is guessed.** Unknown keys are errors, `2.7` and `3.0` are no integers, `true` is no
+  number, and there is no `nan` and no `inf`. All errors are told at once, with file and line.
+- **Presets** lie under the file: every value that the file gives replaces the preset's. Keys that
+  exclude each other (`types` and `pairs`; `surface_density` and `density` with `depth`; `root`,
+  `distance` and `centre`) replace each other too. `forces.contact = false` leaves out a force
+  that the preset has.
+- Without a preset, `[bodies]` needs a mass, and only the forces that have a table act, be the
+  table empty.
+"""
+
+OWN_FORCES = """\
+## Forces of your own
+
+```toml
+[forces.steric]
+class = "brush:StericBrush"    # brush.py beside the config file, or an installed module
+strength = 1e-3
+length = "10 nm"
+```
+
+The other keys are the attrs fields of the class, a subclass of `flocsim.forces.BodyForce`,
+`CentreForce`, `SurfaceForce` or `ContactForce`. A field made with `flocsim.fields.quantity("m")`
+takes strings with a unit and checks the dimension; a plain `attrs.field()` takes numbers in SI.
+The name of the table is free, except for the five above.
+"""
+
+
+def schema_page():
+    """The whole page as Markdown text."""
+    study = {key: attrs.fields_dict(Config)[key] for key in ("preset", *STUDY_KEYS)}
+    parts = [INTRODUCTION, "## At the top\n", key_table(study)]
+    for name, table_class in TABLES.items():
+        parts += [f"## [{name}]\n", about(table_class, name), key_table(fields(table_class))]
+    for name, force_class in FORCES.items():
+        parts += [f"## [forces.{name}]\n", about(force_class, name)]
+        parts += [key_table(fields(force_class))]
+    parts += [OWN_FORCES, "## Presets\n", about(presets, ""), preset_table()]
+    return "\n".join(parts)
+
+
+def fields(some_class):
+    """Key → attrs field."""
+    return attrs.fields_dict(some_class)
+
+
+def about(documented, name):
+    """The docstring as Markdown, without the name of the table that is in the heading."""
+    text = inspect.getdoc(documented).removeprefix(f"[{name}]: ").replace("``", "`")
+    return text[0].upper() + text[1:] + "\n"
+
+
+def key_table(keys):
+    """A Markdown table: key, what it takes, default, meaning."""
+    rows = [
+        [f"`{key}`", takes(field), default_of(field), field.metadata.get("help", "")]
+        for key, field in keys.items()
+    ]
+    return markdown_table(["key", "takes", "default", "meaning"], rows)
+
+
+def markdown_table(heading, rows):
+    """Rows of cells as Markdown text."""
+    lines = [heading, ["---"] * len(heading), *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n"
+
+
+def takes(field):
+    """What a key takes, in words."""
+    metadata = field.metadata
+    if metadata.get("flag"):
+        return "`true` or `false`"
+    if "vector" in metadata:
+        words = f"a list of {metadata['vector']} numbers"
+    elif "allowed" in metadata:
+        words = metadata["allowed"]
+    else:
+        words = list_words(metadata["choices"])
+    words = QUOTED_WORD.sub(r'`"\1"`', words)
+    return f"{words} [{metadata['unit']}]" if metadata.get("unit") else words
+
+
+def default_of(field):
+    """The default as TOML writes it."""
+    shown = field.metadata.get("shown") or as_toml(field.default)
+    return shown if shown == "none" else f"`{shown}`"
+
+
+def as_toml(value):
+    """A value as TOML writes it; "none" for one that may be left out."""
+    if value is None:
+        return "none"
+    if isinstance(value, tuple):
+        return "[" + ", ".join(as_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def preset_table():
+    """A Markdown table of every value of every preset."""
+    columns = [dict(flat(preset)) for preset in PRESETS.values()]
+    keys = list(dict.fromkeys(key for column in columns for key in column))
+    rows = [[f"`{key}`", *(as_cell(column.get(key)) for column in columns)] for key in keys]
+    return markdown_table(["key", *(f"`{name}`" for name in PRESETS)], rows)
+
+
+def as_cell(value):
+    """A preset's value; empty where the preset does not give the key, "on" for a bare table."""
+    if value is None:
+        return ""
+    return "on" if value == {} else as_toml(value)
+
+
+def flat(table, around=""):
+    """(dotted key, value) of all values in a nested table; an empty table is a value."""
+    for key, value in table.items():
+        if isinstance(value, dict) and value:
+            yield from flat(value, f"{around}{key}.")
+        else:
+            yield f"{around}{key}", value
+
+
+if __name__ == "__main__":
+    print(schema_page(), end="")

@@ -1,0 +1,51 @@
+"""The numerical error of probabilities: outcomes that change at a tighter tolerance.
+
+Replicates are exchangeable, as an index does nothing but name random numbers; so the first few
+of a study, run again at a tighter tolerance, are a random sample of it.
+"""
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.results.schema import CLASSES
+
+
+@attrs.frozen(eq=False)
+class Flips:
+    """Which replicates change: flags (type, vertices, delta, replicate).
+
+    ``both``: decided collisions in both runs; ``aggregation`` and ``zone``: those of them that
+    change between aggregated and departed, inside and outside; ``outcome``: any change of outcome,
+    also to missed or undecided, among ``all`` replicates.
+    """
+
+    both: np.ndarray
+    aggregation: np.ndarray
+    zone: np.ndarray
+    outcome: np.ndarray
+
+
+def flips_between(found, exact):
+    """The Flips of ``found`` against ``exact``, Results of the same conditions, replicates paired.
+
+    The shorter of the two decides how many replicates are compared. UsageError where the
+    conditions differ.
+    """
+    same = (
+        found.types == exact.types
+        and np.array_equal(found.vertices, exact.vertices)
+        and np.array_equal(found.delta, exact.delta)
+    )
+    if not same:
+        raise UsageError("the two results are not of the same conditions: name runs of one config")
+    count = min(found.count, exact.count)
+    a, b = (each.replicates["outcome"][..., :count] for each in (found, exact))
+    both = (a < len(CLASSES)) & (b < len(CLASSES))
+    return Flips(both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), a != b)
+
+
+def share(changed, among):
+    """Percent of what is in ``among`` that has changed; NaN of nothing."""
+    count = np.count_nonzero(among)
+    return 100.0 * np.count_nonzero(changed & among) / count if count else np.nan

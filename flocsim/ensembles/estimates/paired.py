@@ -1,0 +1,87 @@
+"""Differences between conditions from the same replicates: common random numbers, used.
+
+Replicate k has the same orientations (and flocs) in all conditions, so that what it does in two of
+them is correlated, and the difference is known better than from independent samples.
+"""
+
+import numpy as np
+
+from flocsim.io.confidence import wilson
+from flocsim.io.results.schema import AXES, NOT_APPLICABLE
+
+AGGREGATED = (0, 2)
+DECIDED = 4
+"""Outcomes below this code are classes A to D."""
+
+
+def events_of(outcome, inside):
+    """(counts, happens) of the two events, each (2, …): a collision is inside; it aggregates."""
+    counts = np.stack([inside != NOT_APPLICABLE, outcome < DECIDED])
+    happens = np.stack([inside == 1, np.isin(outcome, AGGREGATED)])
+    return counts, happens & counts
+
+
+def joint_counts(outcome, inside):
+    """How often an event happens in both, here only, there only, in neither.
+
+    ``outcome``, ``inside``: codes (type, vertices, delta, replicate). Returns whole numbers
+    (against, event, type, vertices, delta, 4): each condition and the first along each axis, over
+    the replicates that count in both.
+    """
+    counts, happens = events_of(outcome, inside)
+    tables = []
+    for axis in range(1, 1 + len(AXES)):
+        first_counts = np.take(counts, [0], axis)
+        first = np.take(happens, [0], axis)
+        both = counts & first_counts
+        cells = (happens & first, happens & ~first, ~happens & first, ~happens & ~first)
+        tables.append(np.stack([np.sum(both & cell, axis=-1) for cell in cells], axis=-1))
+    return np.stack(tables)
+
+
+def paired_differences(joint):
+    """The arrays of DIFFERENCES from joint counts (…, 4); NaN where no replicate counts."""
+    joint = np.asarray(joint)
+    pairs = joint.sum(axis=-1)
+    difference, low, high = newcombe(*np.moveaxis(joint, -1, 0))
+    return {
+        "n_pairs": pairs,
+        "difference": difference,
+        "difference_low": low,
+        "difference_high": high,
+    }
+
+
+def newcombe(both, here, there, neither):
+    """(difference, low, high) of two paired proportions: here minus there, 95 %.
+
+    ``both``, ``here`` only, ``there`` only, ``neither``: whole-number counts. Wilson's intervals
+    of the two, joined by squares with the correlation φ between them. Source: R. G. Newcombe,
+    Stat. Med. 17 (1998) 2635–2650, method 10.
+    """
+    counts = (np.asarray(each, dtype=float) for each in (both, here, there, neither))
+    both, here, there, neither = counts
+    n = both + here + there + neither
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (both + here) / n, (both + there) / n
+        one_low, one_high = wilson(both + here, n)
+        other_low, other_high = wilson(both + there, n)
+        phi = correlation(both, here, there, neither)
+        down = joined(one - one_low, other_high - other, phi)
+        up = joined(one_high - one, other - other_low, phi)
+        return one - other, one - other - down, one - other + up
+
+
+def joined(one, other, phi):
+    """√(a² − 2φab + b²)."""
+    return np.sqrt(np.maximum(one * one - 2.0 * phi * one * other + other * other, 0.0))
+
+
+def correlation(both, here, there, neither):
+    """φ of a table of four cells with Newcombe's continuity correction; 0 for an empty margin."""
+    n = both + here + there + neither
+    excess = both * neither - here * there
+    excess = np.where(excess > 0.0, np.maximum(excess - 0.5 * n, 0.0), excess)
+    margins = (both + here) * (there + neither) * (both + there) * (here + neither)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(margins > 0.0, excess / np.sqrt(margins), 0.0)

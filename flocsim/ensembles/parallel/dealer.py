@@ -1,0 +1,99 @@
+"""Hands out the replicates of a study, a stage after the other, without sending anything.
+
+Guided self-scheduling: a chunk is a share of what is left, so that the last ones are small, and a
+worker gives back what it has not done when its time for the chunk is up, since replicates cost
+1 to 1000 times as much as each other.
+"""
+
+import attrs
+
+from flocsim.ensembles.chunks import MOST_ROWS, Chunk
+from flocsim.ensembles.storage.index_ranges import missing, total
+
+SHORTEST_SECONDS = 0.25
+"""Least time for a chunk [s]: asking costs about 1 ms."""
+
+SECONDS_PER_RANK = 1e-3
+"""Time for a chunk per rank [s]: keeps rank 0 below some thousand answers a second."""
+
+SHARE = 3
+"""A chunk is no more than what is left over so many chunks per rank."""
+
+
+def chunk_seconds(size):
+    """How long a chunk may take [s] on one of ``size`` ranks."""
+    return max(SHORTEST_SECONDS, SECONDS_PER_RANK * size)
+
+
+@attrs.define
+class Stage:
+    """Replicates [first, stop) of every condition: intervals to hand out, how many
+    replicates these are, and how many are to come."""
+
+    first: int
+    stop: int
+    todo: list
+    waiting: int
+    open: int
+
+
+@attrs.define
+class Dealer:
+    """What is to be done in a study, what is being done."""
+
+    size: int
+    stages: list
+    left: int = 0
+    final: int = -1
+
+    @classmethod
+    def of(cls, done, borders, size):
+        """The Dealer for ``size`` ranks.
+
+        ``done``: of every condition the intervals that exist already; ``borders``: where stages
+        end, [100, 125, …].
+        """
+        starts = [0, *borders[:-1]]
+        stages = [make_stage(done, *ends) for ends in zip(starts, borders, strict=True)]
+        return cls(size, stages, sum(stage.open for stage in stages))
+
+    def take(self):
+        """The next Chunk, None where all is handed out."""
+        stage = next((stage for stage in self.stages if stage.todo), None)
+        if stage is None:
+            return None
+        count = min(MOST_ROWS, max(1, stage.waiting // (SHARE * self.size)))
+        condition, first, stop = stage.todo.pop()
+        if stop - first > count:
+            stage.todo.append((condition, first + count, stop))
+        chunk = Chunk(condition, first, min(stop, first + count))
+        stage.waiting -= chunk.stop - chunk.first
+        return chunk
+
+    def give_back(self, chunk, done):
+        """Note that the first ``done`` replicates of a chunk are finished; hand out the rest."""
+        stages = (stage for stage in self.stages if stage.first <= chunk.first < stage.stop)
+        if (stage := next(stages, None)) is None:
+            return  # more than was needed
+        stage.open -= done
+        self.left -= done
+        if chunk.first + done < chunk.stop:
+            stage.todo.append((chunk.condition, chunk.first + done, chunk.stop))
+            stage.waiting += chunk.stop - chunk.first - done
+
+    def finished_stages(self):
+        """Take away the leading stages of which all is there; the last replicate of each."""
+        while self.stages and self.stages[0].open == 0:
+            yield self.stages.pop(0).stop
+
+    def end_at(self, final):
+        """Hand out nothing more: the study ends with this many replicates."""
+        self.final, self.stages, self.left = final, [], 0
+
+
+def make_stage(done, first, stop):
+    """The Stage of replicates [first, stop) where these exist already."""
+    gaps = [missing(intervals, first, stop) for intervals in done]
+    todo = [(place, *gap) for place, each in reversed(list(enumerate(gaps))) for gap in each[::-1]]
+    count = sum(map(total, gaps))
+    return Stage(first, stop, todo, count, count)

@@ -1,0 +1,70 @@
+"""Ranks under MPI. The only importer of mpi4py."""
+
+import sys
+import time
+
+from flocsim.ensembles.parallel.team import Team
+from flocsim.errors import UsageError
+from flocsim.interruption import INTERRUPTION, end_with_parent
+
+LAST_WORDS = 0.5
+"""Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
+
+
+def load_mpi():
+    """mpi4py's MPI module; UsageError where it or its library is missing."""
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise UsageError(
+            f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
+            "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
+            "the launcher"
+        ) from None
+    return MPI
+
+
+class MpiTeam(Team):
+    """The ranks of MPI's world."""
+
+    def __init__(self, launched):
+        """Join the world; UsageError where its size is not what the launcher started."""
+        super().__init__()
+        self.mpi = load_mpi()
+        self.world = self.mpi.COMM_WORLD
+        self.rank = self.world.rank
+        self.size = self.world.size
+        if launched is not None and launched != self.size:
+            raise UsageError(
+                f"the launcher started {launched} ranks but MPI counts {self.size}: mpirun and the "
+                "MPI library that mpi4py uses are of different kinds; use the mpirun beside this "
+                "Python"
+            )
+        INTERRUPTION.speaks = self.rank == 0
+        if self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE:
+            # Where one rank just goes, the launcher kills the others, and says so by its code.
+            INTERRUPTION.leave = self.world.Abort
+        end_with_parent()
+
+    @property
+    def threads(self):
+        """Whether a thread of rank 0 may use MPI while the main one computes."""
+        return self.mpi.Query_thread() >= self.mpi.THREAD_SERIALIZED
+
+    def send(self, to, message):
+        """Send an object to a rank."""
+        self.world.send(message, to)
+
+    def arrived(self):
+        """(source, message) of all that has come."""
+        status = self.mpi.Status()
+        while self.world.Iprobe(status=status):
+            source = status.Get_source()
+            yield source, self.world.recv(source=source)
+
+    def abort(self, code):
+        """End the whole job: every rank, wherever it is."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        time.sleep(LAST_WORDS)
+        self.world.Abort(code)

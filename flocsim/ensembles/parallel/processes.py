@@ -1,0 +1,103 @@
+"""Ranks as processes of this machine, without MPI: `--jobs 4`."""
+
+import contextlib
+import multiprocessing
+import os
+import sys
+from multiprocessing.connection import wait
+
+from flocsim.ensembles.parallel.team import StopRequested, Team
+from flocsim.errors import FlocsimError
+from flocsim.interruption import INTERRUPTION, STOPPED, install, stop_requested
+
+LAST_SECONDS = 5.0
+"""Seconds in which the others end by themselves when the work is done."""
+
+
+class LostRank(FlocsimError):
+    """A process of the job has died."""
+
+
+class ProcessTeam(Team):
+    """One process of several, with a pipe to rank 0 or, on rank 0, to each of the others."""
+
+    threads = True
+
+    def __init__(self, rank, size, pipes, others=()):
+        """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started."""
+        super().__init__()
+        self.rank, self.size = rank, size
+        self.pipes = pipes
+        self.others = others
+
+    def send(self, to, message):
+        """Send an object to a rank."""
+        try:
+            self.pipes[to].send(message)
+        except OSError:
+            self.lose(to)
+
+    def arrived(self):
+        """(source, message) of all that has come; LostRank where a process has gone."""
+        ranks = {pipe: rank for rank, pipe in self.pipes.items()}
+        for pipe in wait(list(ranks), timeout=0):
+            try:
+                yield ranks[pipe], pipe.recv()
+            except (EOFError, OSError):
+                self.lose(ranks[pipe])
+
+    def lose(self, rank):
+        """A process has gone: without rank 0 there is nobody to tell."""
+        if self.rank > 0:
+            os._exit(FlocsimError.exit_code)
+        process = self.others[rank - 1]
+        process.join(LAST_SECONDS)
+        if process.exitcode == STOPPED or stop_requested():
+            raise StopRequested("stopped by a signal; go on with --resume")
+        raise LostRank(
+            f"the process of rank {rank} has died (exit code {process.exitcode}); what was "
+            "computed is kept: go on with --resume"
+        )
+
+    def close(self):
+        """Wait for the other processes, which have nothing more to do."""
+        for process in self.others:
+            process.join(LAST_SECONDS)
+        self.end_others()
+
+    def end_others(self):
+        """End what is left of the other processes."""
+        for process in self.others:
+            with contextlib.suppress(Exception):
+                process.kill()
+
+    def abort(self, code):
+        """End the whole job."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self.end_others()
+        os._exit(code)
+
+
+def start_processes(jobs, target, arguments):
+    """The team of this process, rank 0, and ``jobs`` − 1 others that call ``target(team, …)``."""
+    context = multiprocessing.get_context("spawn")
+    pipes, others = {}, []
+    for rank in range(1, jobs):
+        pipes[rank], far_end = context.Pipe()
+        process = context.Process(
+            target=join_team, args=(target, rank, jobs, far_end, arguments), daemon=True
+        )
+        process.start()
+        far_end.close()
+        others.append(process)
+    team = ProcessTeam(0, jobs, pipes, others)
+    INTERRUPTION.leave = team.abort
+    return team
+
+
+def join_team(target, rank, jobs, pipe, arguments):
+    """Where a process that rank 0 has started begins."""
+    install()
+    INTERRUPTION.speaks = False
+    sys.exit(target(ProcessTeam(rank, jobs, {0: pipe}), arguments))

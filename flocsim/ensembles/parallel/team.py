@@ -1,0 +1,134 @@
+"""The ranks of a job behind one interface: alone, MPI's, or processes of this machine.
+
+All ranks talk to rank 0 only. Nobody waits inside a library: a rank that waits looks for a message,
+then sleeps a little, so that it takes no processor from those who compute, and hears signals.
+"""
+
+import collections
+import os
+import sys
+import time
+
+from flocsim.errors import FlocsimError
+from flocsim.interruption import INTERRUPTION, LAUNCHER_RANKS, stop_requested
+
+LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS")
+"""Environment variables in which launchers tell a process how many ranks there are."""
+
+SLEEP = 5e-4
+"""Seconds between two looks for a message."""
+
+
+class StopRequested(FlocsimError):
+    """A signal has come while this rank waited for the others."""
+
+    exit_code = 75
+
+
+class Team:
+    """Messages between rank 0 and the others, and what can be made of them.
+
+    A subclass has ``rank``, ``size``, ``send(to, message)``, and ``arrived()``, which yields
+    (source, message) of all that has come in.
+    """
+
+    def __init__(self):
+        """Nothing has come yet."""
+        self.inbox = collections.defaultdict(collections.deque)
+
+    def pump(self):
+        """Take in what has come."""
+        for source, message in self.arrived():
+            self.inbox[source].append(message)
+
+    def messages(self):
+        """(source, message) of all that is here."""
+        self.pump()
+        for source in [source for source, queue in self.inbox.items() if queue]:
+            while self.inbox[source]:
+                yield source, self.inbox[source].popleft()
+
+    def receive(self, source, heed_signals=True):
+        """The next message of a rank; StopRequested where a signal comes first."""
+        while not self.inbox[source]:
+            self.pump()
+            if self.inbox[source]:
+                break
+            if heed_signals and stop_requested():
+                raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
+            time.sleep(SLEEP)
+        return self.inbox[source].popleft()
+
+    def gather(self, value):
+        """The values of all ranks, on rank 0."""
+        if self.rank > 0:
+            self.send(0, value)
+            return None
+        return [value, *(self.receive(rank) for rank in range(1, self.size))]
+
+    def share(self, value, heed_signals=True):
+        """Rank 0's value, on all ranks."""
+        if self.rank > 0:
+            return self.receive(0, heed_signals)
+        for rank in range(1, self.size):
+            self.send(rank, value)
+        return value
+
+    def collect(self, value):
+        """The values of all ranks, on all ranks."""
+        return self.share(self.gather(value))
+
+    def wait(self):
+        """Until all ranks are here."""
+        self.collect(None)
+
+    def close(self):
+        """The work is done: let the others go."""
+
+
+class Alone(Team):
+    """One process: what a job without a launcher runs on."""
+
+    rank = 0
+    size = 1
+    threads = True
+
+    def send(self, to, message):
+        """There is nobody."""
+
+    def arrived(self):
+        """Nothing comes."""
+        return ()
+
+    def abort(self, code):
+        """End the whole job."""
+        sys.stdout.flush()
+        sys.stderr.flush()
+        sys.exit(code)
+
+
+def launched_size():
+    """Number of ranks that the launcher started: None where it does not say, 0 without one."""
+    for name in LAUNCHER_SIZES:
+        if os.environ.get(name, "").isdigit():
+            return int(os.environ[name])
+    return None if any(name in os.environ for name in LAUNCHER_RANKS) else 0
+
+
+def launched_rank():
+    """This process's rank according to its launcher, 0 without one; needs no MPI library."""
+    said = [os.environ.get(name, "") for name in LAUNCHER_RANKS]
+    return next((int(rank) for rank in said if rank.isdigit()), 0)
+
+
+def find_team():
+    """The ranks of this job: MPI only where a launcher started more than one."""
+    try:
+        size = launched_size()
+        if size in (0, 1):
+            return Alone()
+        from flocsim.ensembles.parallel.mpi import MpiTeam
+
+        return MpiTeam(size)
+    finally:
+        INTERRUPTION.held = False

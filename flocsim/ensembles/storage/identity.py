@@ -1,0 +1,179 @@
+"""What the rows of a study follow from, as a flat table: two runs that agree on it agree on rows.
+
+Seed, scene, bodies, fluid, forces, method, the flocs themselves, and the code: of the compiled
+kernels (their fingerprint covers bytecode, constants, Python, numba and numpy) and of the modules
+that prepare a replicate. How many replicates, which types, N and δ there are is not part of it, as
+no row depends on the others.
+"""
+
+import ast
+import hashlib
+import json
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.collision.encounter import OBSERVER
+from flocsim.ensembles.config.methods import make_integrator
+from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
+from flocsim.fingerprint import fingerprint
+from flocsim.integrators.loop.driver import advance
+
+VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file"}}
+"""Keys that choose rows, but change none."""
+
+PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
+"""Starts of names that need to agree only where both runs have them."""
+
+PHYSICS = (
+    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py",
+    "forces", "integrators", "geometry/shapes", "geometry/contact",
+    "ensembles/collision", "ensembles/study.py", "ensembles/config/methods.py",
+)  # fmt: skip
+"""The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
+makes shapes: what it made is compared itself."""
+
+
+def identity_of(study):
+    """{name: text or number} of all that the rows of a Study follow from."""
+    config = study.config
+    facts = {"seed": config.seed, "code": physics_digest()}
+    for table in ("scene", "shapes", "bodies", "fluid", "zone"):
+        facts |= settings(table, getattr(config, table))
+    facts |= settings("integrator", make_integrator(config))
+    facts["integrator.name"] = config.integrator.name
+    facts["integrator.max_steps"] = config.integrator.max_steps
+    for name, force in zip(config.force_names, config.forces, strict=True):
+        facts[f"forces.{name}"] = type(force).__qualname__
+        facts |= settings(f"forces.{name}", force)
+    facts |= type_facts(config) | floc_facts(study) | kernel_facts(config)
+    return json.loads(json.dumps(facts))
+
+
+def settings(table, values):
+    """The fields of an attrs object under the names that the config file has for them."""
+    left_out = VARIABLE.get(table, ())
+    return {
+        f"{table}.{field.name}": plain(getattr(values, field.name))
+        for field in attrs.fields(type(values))
+        if field.name not in left_out and field.init
+    }
+
+
+def plain(value):
+    """A value that JSON gives back as it was: floats exactly, infinite ones as words."""
+    if isinstance(value, tuple | list):
+        return [plain(each) for each in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if isinstance(value, str | int | float | None) else repr(value)
+
+
+def type_facts(config):
+    """Radii of the collision types, and the numbers that the forces hand to the kernels."""
+    facts = {f"types.{name}": list(radii) for name, *radii in config.scene.conditions}
+    for name, pair in sphere_pairs(config):
+        facts[f"numbers.{name}"] = digest(np.array(pair.system.pieces.parameters, float))
+    return facts
+
+
+def floc_facts(study):
+    """A digest of all flocs at each number of vertices."""
+    facts = {}
+    for n in study.config.shapes.vertices:
+        if n > 1:
+            parts = [np.array([floc.ratio]) for floc in study.flocs]
+            shapes = [floc.shapes[n] for floc in study.flocs]
+            parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
+            facts[f"flocs.{n}"] = digest(np.concatenate(parts))
+    return facts
+
+
+def kernel_facts(config):
+    """Fingerprints of the code that is compiled for spheres and for polygons."""
+    _, pair = next(sphere_pairs(config))
+    facts = {}
+    for shapes in kinds(config, pair.shapes):
+        system = placed_system(config, pair.system, shapes)
+        name = "spheres" if system.spheres_only else "polygons"
+        facts[f"kernels.{name}"] = fingerprint(advance, system.fillings(OBSERVER))
+    return facts
+
+
+def physics_digest():
+    """A hash of the modules that decide what is in a row: of what they do, not how they look."""
+    found = hashlib.blake2b(digest_size=16)
+    for path in physics_files():
+        found.update(essence(path.read_text("utf-8")).encode())
+    return found.hexdigest()
+
+
+def physics_files(root=Path(__file__).parents[2]):
+    """The files of PHYSICS in the package's folder, in an order that is always the same."""
+    for name in PHYSICS:
+        place = root / name
+        yield from sorted(place.rglob("*.py")) if place.is_dir() else [place]
+
+
+def essence(source):
+    """A module's syntax tree as text, without comments, layout and docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [each for each in body if not is_text(each)]
+    return ast.dump(tree)
+
+
+def is_text(node):
+    """Whether a statement is nothing but a string."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+def digest(array):
+    """A hash of an array's bytes."""
+    return hashlib.blake2b(np.ascontiguousarray(array).tobytes(), digest_size=16).hexdigest()
+
+
+def short(identity):
+    """An identity in 16 letters."""
+    text = json.dumps(identity, sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
+
+
+def differences(stored, current):
+    """Lines on what differs between two identities; none where rows of both agree."""
+    names = sorted(stored.keys() | current.keys())
+    apart = [name for name in names if stored.get(name) != current.get(name)]
+    both = [
+        name
+        for name in apart
+        if not name.startswith(PARTIAL) or (name in stored and name in current)
+    ]
+    # What the user has changed comes first; what follows from it need not be said.
+    telling = [name for name in both if name.partition(".")[0] not in EXPLAINED] or both
+    return [difference(name, stored.get(name), current.get(name)) for name in telling]
+
+
+def difference(name, stored, current):
+    """One line on what differs."""
+    kind, _, rest = name.partition(".")
+    if kind in EXPLAINED:
+        return EXPLAINED[kind].format(rest)
+    return f"{name} is {show(stored)} in the file, {show(current)} now"
+
+
+EXPLAINED = {
+    "code": "flocsim's own code has changed",
+    "flocs": "the flocs with N = {} have changed",
+    "numbers": "the numbers that the forces work with have changed for type {}",
+    "kernels": "the compiled code for {} has changed (flocsim, a force of your own, Python, numba "
+    "or numpy)",
+}
+"""First part of a name → words in place of two hashes."""
+
+
+def show(value):
+    """A value for messages."""
+    return "nothing" if value is None else json.dumps(value)

@@ -1,0 +1,202 @@
+"""Where a study begins: with nothing, or with what a journal and an older results file hold."""
+
+import contextlib
+import json
+import os
+import shlex
+import sys
+
+import attrs
+
+from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, named
+from flocsim.ensembles.storage.identity import differences, short
+from flocsim.ensembles.storage.row_store import OldTable, RowStore
+from flocsim.errors import FileError, UsageError
+from flocsim.io.journal.journal import Journal, journal_path
+from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.provenance import now
+
+NEW, RESUME, RESTART = "new", "resume", "restart"
+"""What to do about an unfinished run: refuse to touch it, go on with it, throw it away."""
+
+MOST_DIFFERENCES = 5
+HISTORY = ("date", "command")
+"""What is kept of a run that contributed to a results file."""
+
+
+@attrs.define(eq=False)
+class Beginning:
+    """What a study starts from.
+
+    ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
+    ``history`` has date and command of the runs before; ``complete`` is what an older results
+    file holds, (conditions, replicates of each), where nothing else was found.
+    """
+
+    store: RowStore
+    identity: dict
+    remarks: list = attrs.Factory(list)
+    notes: list = attrs.Factory(list)
+    history: list = attrs.Factory(list)
+    complete: tuple = None
+    resources: object = attrs.Factory(contextlib.ExitStack)
+
+    @property
+    def journal(self):
+        """Where finished chunks go."""
+        return self.store.journal
+
+    def found(self, count):
+        """Of every condition the replicates below ``count`` that exist, as intervals."""
+        whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
+        return [
+            [(first, min(stop, count)) for first, stop in each if first < count] for each in whole
+        ]
+
+
+def begin(study, identity, output, mode):
+    """The Beginning of a study whose results go to the file ``output``.
+
+    Raises UsageError where an unfinished run is in the way, or is one of another config, of other
+    shapes or other physics; FileError where the journal cannot be opened.
+    """
+    path = journal_path(output)
+    if mode == NEW and path.exists() and path.stat().st_size:
+        raise UsageError(
+            f"{path} holds an unfinished run: go on with it by --resume, or throw it away by "
+            "--restart"
+        )
+    if mode == RESTART:
+        with contextlib.suppress(OSError):
+            os.unlink(path)
+    journal = Journal(path)
+    start = Beginning(RowStore(journal, study.conditions), identity)
+    start.resources.callback(journal.close)
+    try:
+        take_journal(start)
+        if mode == RESUME and os.path.exists(output):
+            take_results(start, output)
+        journal.append(encode(SESSION, session(start)))
+    except Exception:
+        journal.drop_if_empty()
+        raise
+    return start
+
+
+def session(start):
+    """The description of this run, for the journal."""
+    identity = start.identity
+    return {
+        "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
+        "command": shlex.join(sys.argv),
+    }  # fmt: skip
+
+
+def take_journal(start):
+    """Find the chunks in the journal; UsageError where they are those of another study."""
+    journal = start.journal
+    if journal.damage and not journal.records and not journal.is_cut_short:
+        raise FileError(
+            f"{journal.path} is no journal of flocsim, or damaged from its start: move it away"
+        )
+    sessions = [record.description for record in journal.records if record.kind == SESSION]
+    start.history += [{key: each[key] for key in HISTORY} for each in sessions]
+    for description in sessions:
+        refuse_other(start, journal.path, description["identity"])
+        if description["layout"] != layout():
+            raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
+    known = {*(each["short"] for each in sessions), short(start.identity)}
+    places = {condition: place for place, condition in enumerate(start.store.conditions)}
+    for record in journal.records:
+        if record.kind == CHUNK and fits(record.description, record.length):
+            take_chunk(start, record, known, places)
+    for each in journal.damage:
+        start.remarks.append(
+            f"{journal.path}: damaged from byte {each.start} to {each.stop} "
+            f"({named(each.description)}); what is missing is computed again"
+        )
+
+
+REMEDY = "name another output, or throw it away by --restart"
+
+
+def refuse_other(start, path, stored):
+    """UsageError where an identity in a file is not that of this study."""
+    lines = differences(stored, start.identity)
+    if lines:
+        shown = "; ".join(lines[:MOST_DIFFERENCES])
+        more = len(lines) - MOST_DIFFERENCES
+        more = f"; and {more} more" if more > 0 else ""
+        raise UsageError(f"{path} is of another study: {shown}{more}; {REMEDY}")
+
+
+def take_chunk(start, record, known, places):
+    """Note where a chunk's rows lie, if they are of a condition of this study."""
+    about = record.description
+    if about["identity"] not in known:
+        start.remarks.append(
+            f"{start.journal.path}: nothing vouches for {named(about)}: computed again"
+        )
+        return
+    place = places.get(condition_of(about))
+    if place is not None:
+        first = about["first"]
+        start.store.add(place, first, first + about["count"], record.offset)
+        start.notes += about.get("notes", [])
+
+
+def take_results(start, output):
+    """Use the rows of an older results file, if they are of this study.
+
+    With rows in the journal, the old file may be of another study: it will be replaced.
+    """
+    from flocsim.io.results.file import opened
+
+    begun = any(start.store.counts)
+    try:
+        file = start.resources.enter_context(opened(output))
+        refuse_other(start, output, stored_identity(output, file))
+    except (FileError, UsageError) as error:
+        if not begun:
+            raise
+        start.remarks.append(f"not used: {error}")
+        return
+    rows = file["replicates"]
+    places = old_places(rows)
+    count = len(rows["replicate"])
+    for place, condition in enumerate(start.store.conditions):
+        if condition in places and count:
+            start.store.add(place, 0, count, -1)
+    start.store.old = OldTable(rows, places)
+    start.notes += stored(file, "failed", [])
+    start.history = [*stored(file, "history", []), earlier(file), *start.history]
+    if not begun:
+        start.complete = (tuple(places), count)
+
+
+def stored_identity(output, file):
+    """The identity in a results file."""
+    if "identity" not in file["run"]:
+        raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
+    return json.loads(file["run/identity"].asstr()[()])
+
+
+def stored(file, name, default):
+    """What a results file holds as JSON."""
+    return json.loads(file[f"run/{name}"].asstr()[()]) if name in file["run"] else default
+
+
+def earlier(file):
+    """Date and command of the run that wrote a results file."""
+    return {key: file[f"run/{key}"].asstr()[()] for key in HISTORY if key in file["run"]}
+
+
+def old_places(rows):
+    """Condition → its place in the arrays of a results file."""
+    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
+    return {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for t, name in enumerate(axes[0])
+        for v, n in enumerate(axes[1])
+        for d, share in enumerate(axes[2])
+    }

@@ -1,0 +1,4 @@
+"""Where two bodies touch: candidates, their contact points, and how slip passes between them.
+
+Kernels on scalars and on the arrays of a run.  May import ``geometry.shapes``.
+"""

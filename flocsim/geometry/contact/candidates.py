@@ -1,0 +1,177 @@
+"""Candidates: which vertex–edge pairs can touch before the bodies have moved much further.
+
+Pairs are listed while their gap is below a cut-off, and the list holds as long as the relative
+motion of the two bodies stays within a budget.
+"""
+
+import math
+
+from flocsim.arrays import (
+    BOUNDING_RADIUS,
+    CANDIDATES,
+    EQUIVALENT_RADIUS,
+    LISTED,
+    NOW,
+    RADIUS,
+    REBUILDS,
+)
+from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
+from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
+from flocsim.hooks import skin_factor, surface_reach
+
+SKIN = 0.1
+"""Pairs are listed up to a gap of this share of r_i + r_j, or up to the smaller one of …"""
+
+SKIN_OF_EDGE = 0.3
+"""… this share of the shorter edges' length, so that few are listed but lists last, …"""
+
+SKIN_OF_SIZE = 0.1
+"""… and this share of the smaller body, whatever is larger."""
+
+
+def edge_length(scene, body):
+    """The mean length of a body's edges [m], as if its outline were a circle's."""
+    points = scene.first[body + 1] - scene.first[body]
+    return 2.0 * math.pi * scene.bodies[body, EQUIVALENT_RADIUS] / points
+
+
+def skin_of(scene, a, b):
+    """Cut-off gap of the list of a pair of bodies [m]."""
+    size = min(scene.bodies[a, BOUNDING_RADIUS], scene.bodies[b, BOUNDING_RADIUS])
+    edge = min(edge_length(scene, a), edge_length(scene, b))
+    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    return skin_factor() * max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
+
+
+def list_for_surface_force(scene, work, a, b, skin, reach):
+    """List what can become the closest pair before the budget is spent; the budget [m]."""
+    least = gap_between(scene, work, a, b)
+    if least > reach + skin:
+        return least - reach
+    spend = max(0.5 * skin, 0.25 * least)
+    if list_polygons(scene, work, a, b, max(skin, least + 2.0 * spend)):
+        return spend
+    return -math.inf
+
+
+def list_pair(scene, work, a, b):
+    """List the candidates of two bodies; how far they may move before it must be made again."""
+    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
+    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    reach = surface_reach(scene.parameters)
+    skin = skin_of(scene, a, b)
+    apart = (
+        math.sqrt(ox * ox + oy * oy)
+        - scene.bodies[a, BOUNDING_RADIUS]
+        - scene.bodies[b, BOUNDING_RADIUS]
+    )
+    if apart > max(0.0, reach) + skin:
+        return apart - max(0.0, reach)
+    if reach > 0.0:
+        return list_for_surface_force(scene, work, a, b, skin, reach)
+    before = work.tally[CANDIDATES]
+    if not list_polygons(scene, work, a, b, skin):
+        return -math.inf
+    if work.tally[CANDIDATES] == before:
+        return max(skin, gap_between(scene, work, a, b))
+    return skin
+
+
+def since_listing(work, state, body, axis):
+    """How much one coordinate of a body has changed since the listing."""
+    return work.motion[state, body, axis] - work.bodies[body, LISTED + axis]
+
+
+def core_radius(scene, body):
+    """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
+    return scene.bodies[body, BOUNDING_RADIUS] - scene.bodies[body, RADIUS]
+
+
+def shifted_by(dx, dy, ox, oy, turn):
+    """How far (dx, dy) lies from (ox, oy) turned by an angle."""
+    c, s = math.cos(turn), math.sin(turn)
+    x, y = dx - (c * ox - s * oy), dy - (s * ox + c * oy)
+    return math.sqrt(x * x + y * y)
+
+
+def moved(scene, work, state, a, b, enough):
+    """How far the cores of two bodies may have moved against each other since the listing [m].
+
+    Seen from b, all of a's core has moved by no more than its centroid, plus the relative turn
+    times its size; seen from a, the same holds of b: a doublet that turns as one does not count.
+    Where a plainer bound, which needs no turning, stays below ``enough``, that one is given.
+    """
+    ox = work.bodies[a, LISTED] - work.bodies[b, LISTED]
+    oy = work.bodies[a, LISTED + 1] - work.bodies[b, LISTED + 1]
+    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
+    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    turn_a = since_listing(work, state, a, 2)
+    turn_b = since_listing(work, state, b, 2)
+    size_a, size_b = core_radius(scene, a), core_radius(scene, b)
+    plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
+    if plain < enough:
+        return plain
+    turn = abs(turn_a - turn_b)
+    seen_from_b = shifted_by(dx, dy, ox, oy, turn_b) + turn * size_a
+    seen_from_a = shifted_by(dx, dy, ox, oy, turn_a) + turn * size_b
+    return min(plain, seen_from_b, seen_from_a)
+
+
+def spent(scene, work, state):
+    """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
+    worst = 0.0
+    pair = 0
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            budget = work.budget[pair]
+            if budget <= 0.0:
+                return math.inf
+            worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
+            pair += 1
+    return worst
+
+
+def relative_speed(scene, work, a, b):
+    """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
+    v = work.motion
+    x, y = v[NOW, a, 0] - v[NOW, b, 0], v[NOW, a, 1] - v[NOW, b, 1]
+    vx, vy = v[NOW, a, 3] - v[NOW, b, 3], v[NOW, a, 4] - v[NOW, b, 4]
+    spin_a, spin_b = v[NOW, a, 5], v[NOW, b, 5]
+    turning = abs(spin_a - spin_b)
+    seen_from_b = math.hypot(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
+    seen_from_a = math.hypot(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
+    return min(seen_from_b, seen_from_a)
+
+
+def time_within(scene, work, share):
+    """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
+    longest = math.inf
+    pair = 0
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            speed = relative_speed(scene, work, a, b)
+            if speed > 0.0:
+                longest = min(longest, share * work.budget[pair] / speed)
+            pair += 1
+    return longest
+
+
+def list_candidates(scene, work):
+    """Make the list anew at the current position; False where it has no room."""
+    kept = keep_slips(work)
+    work.tally[CANDIDATES] = 0
+    work.tally[REBUILDS] += 1
+    for body in range(scene.bodies.shape[0]):
+        for axis in range(3):
+            work.bodies[body, LISTED + axis] = work.motion[NOW, body, axis]
+    pair = 0
+    room = True
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            budget = list_pair(scene, work, a, b)
+            work.budget[pair] = budget
+            room = room and budget > 0.0
+            pair += 1
+    if room:
+        restore_slips(work, kept)
+    return room

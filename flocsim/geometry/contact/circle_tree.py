@@ -1,0 +1,240 @@
+"""A hierarchy of circles over each outline, and the walk down two of them against each other.
+
+A body's core points, each with the edge that starts at it, are halved by their number until few are
+left: a full binary tree, whose node i has the children 2i and 2i + 1. Every node keeps a circle
+around its run of core points and edges, in the body's frame. Two trees are walked without a stack:
+which of them is split next follows from the sizes of their pieces alone, so that the way back up
+is known as well.
+
+Distances are taken in the frame of one body: a *pose* (c, s, x, y) turns and shifts the other's
+points into it, and only those of the nodes that are met. Inner functions are handed scalars and
+single arrays instead of the whole scene, which would cost more to pass than they do.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
+
+LEAF = 2
+"""Core points in a run that is not split any more: from this to twice as many."""
+
+ROUNDING = 1e-13
+"""Circles are drawn larger by this share of the outline's size, for the rounding of distances."""
+
+
+def tree_depth(points):
+    """How often that many core points are halved."""
+    return max(points // LEAF, 1).bit_length() - 1
+
+
+def level_runs(points, depth):
+    """Core points (nodes, most) of the runs at a depth; short rows repeat their last point.
+
+    Each run includes the end of its last edge.
+    """
+    bounds = (np.arange((1 << depth) + 1) * points) >> depth
+    steps = np.arange(np.diff(bounds).max() + 1)
+    return np.minimum(bounds[:-1, None] + steps, bounds[1:, None]) % points
+
+
+def circles_around(runs, margin):
+    """Circles (k, 3) as x, y, radius around runs of points (k, m, 2)."""
+    choices = []
+    for centre in (0.5 * (runs.min(axis=1) + runs.max(axis=1)), 0.5 * (runs[:, 0] + runs[:, -1])):
+        reach = np.hypot(*np.moveaxis(runs - centre[:, None], -1, 0)).max(axis=1)
+        choices.append(np.column_stack([centre, reach + margin]))
+    box, chord = choices
+    return np.where(box[:, 2:] <= chord[:, 2:], box, chord)
+
+
+def tree_of(vertices):
+    """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
+
+    Row 0 holds the depth of the tree; rows that the tree does not fill are 0.
+    """
+    points = len(vertices)
+    tree = np.zeros((2 * points, 3))
+    tree[0] = tree_depth(points)
+    margin = ROUNDING * np.abs(vertices).max()
+    for depth in range(tree_depth(points) + 1):
+        runs = vertices[level_runs(points, depth)]
+        tree[1 << depth : 2 << depth] = circles_around(runs, margin)
+    return tree
+
+
+class Outlines(NamedTuple):
+    """The cores of some bodies, as the kernels here read them; a Scene has the same fields.
+
+    Core points of body b are rows ``first[b]`` to ``first[b + 1]`` of ``vertices``, its circles the
+    rows from ``2 * first[b]`` on of ``tree``.
+    """
+
+    first: np.ndarray
+    vertices: np.ndarray
+    tree: np.ndarray
+
+
+@lru_cache(maxsize=256)
+def tree_of_shape(shape):
+    """The tree of a shape, made once."""
+    return tree_of(shape.vertices)
+
+
+def outlines_of(shapes):
+    """The Outlines of some shapes, one body each."""
+    sizes = [len(shape.vertices) for shape in shapes]
+    return Outlines(
+        first=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        # C order whatever the shapes have: another order would be compiled anew.
+        vertices=np.ascontiguousarray(np.concatenate([shape.vertices for shape in shapes])),
+        tree=np.concatenate([tree_of_shape(shape) for shape in shapes]),
+    )
+
+
+def side_of(outlines, body):
+    """(first core point, their number, first row of the tree, leaves) of a body's outline."""
+    first = outlines.first[body]
+    return first, outlines.first[body + 1] - first, 2 * first, 1 << int(outlines.tree[2 * first, 0])
+
+
+def run_of(side, leaf):
+    """(first, end) of the core points of a leaf."""
+    first, points, _, leaves = side
+    # Exact: the divisor is a power of two.
+    share = points / leaves
+    place = leaf - leaves
+    return first + int(place * share), first + int((place + 1) * share)
+
+
+def reversed_pose(pose):
+    """The pose that takes the other body's points into the frame of this one."""
+    c, s, x, y = pose
+    return c, -s, -c * x - s * y, s * x - c * y
+
+
+def posed(pose, x, y):
+    """A point of one body in the frame of the other."""
+    return pose[0] * x - pose[1] * y + pose[2], pose[1] * x + pose[0] * y + pose[3]
+
+
+def circle_reach(tree, pose, row, other):
+    """(squared distance of centres, sum of radii) of two circles, rows of the tree."""
+    x, y = posed(pose, tree[row, 0], tree[row, 1])
+    dx, dy = x - tree[other, 0], y - tree[other, 1]
+    return dx * dx + dy * dy, tree[row, 2] + tree[other, 2]
+
+
+def plan_of(tree, side_a, side_b):
+    """What steers a walk: first rows and leaves of both trees, radii of their largest circles."""
+    row_a, row_b = side_a[2], side_b[2]
+    return row_a, row_b, side_a[3], side_b[3], tree[row_a + 1, 2], tree[row_b + 1, 2]
+
+
+START = (1, 1, 1, 1)
+"""The walk at both roots: node of a, node of b, nodes on a's level, on b's level.
+
+A walk is over when its first number is 0.
+"""
+
+
+def within(tree, pose, plan, walk, distance):
+    """Whether the runs of the two nodes can be nearer to each other than a distance."""
+    distance2, radii = circle_reach(tree, pose, plan[0] + walk[0], plan[1] + walk[1])
+    return distance2 < (radii + distance) ** 2
+
+
+def at_leaves(plan, walk):
+    """Whether neither node can be split."""
+    return walk[2] == plan[2] and walk[3] == plan[3]
+
+
+def descended(plan, walk):
+    """The walk at the first child of the larger piece, a's where they are alike."""
+    i, j, level_a, level_b = walk
+    _, _, leaves_a, leaves_b, size_a, size_b = plan
+    larger = size_a * level_b >= size_b * level_a
+    if level_a < leaves_a and (larger or level_b == leaves_b):
+        return 2 * i, j, 2 * level_a, level_b
+    return i, 2 * j, level_a, 2 * level_b
+
+
+def passed(plan, walk):
+    """The walk at what comes after the two nodes and all below them."""
+    i, j, level_a, level_b = walk
+    size_a, size_b = plan[4], plan[5]
+    while level_a * level_b > 1:
+        # Pieces are split in the order of their sizes, so the smaller piece was split last.
+        if level_b == 1 or (level_a > 1 and size_a * level_b < size_b * level_a):
+            if i & 1 == 0:
+                return i + 1, j, level_a, level_b
+            i, level_a = i >> 1, level_a >> 1
+        else:
+            if j & 1 == 0:
+                return i, j + 1, level_a, level_b
+            j, level_b = j >> 1, level_b >> 1
+    return 0, 0, 1, 1
+
+
+def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
+    """The smaller of ``least`` and the squared distances from a's points to b's edges."""
+    edges = side_b[0] + max(edge_count(side_b[1]), 1)
+    start_a, end_a = run_of(side_a, leaf_a)
+    start_b, end_b = run_of(side_b, leaf_b)
+    for point in range(start_a, end_a):
+        x, y = posed(pose, vertices[point, 0], vertices[point, 1])
+        for start in range(start_b, min(end_b, edges)):
+            end = edge_end(side_b[0], side_b[1], start)
+            distance2 = segment_distance2(
+                x, y, vertices[start, 0], vertices[start, 1], vertices[end, 0], vertices[end, 1]
+            )
+            least = min(least, distance2)
+    return least
+
+
+def leaf_distance2(vertices, pose, side_a, side_b, walk, least):
+    """The smaller of ``least`` and the squared distance of the runs of two leaves."""
+    least = run_distance2(vertices, pose, side_a, walk[0], side_b, walk[1], least)
+    back = reversed_pose(pose)
+    return run_distance2(vertices, back, side_b, walk[1], side_a, walk[0], least)
+
+
+def nearer_child(tree, pose, plan, walk):
+    """The walk at that child of the larger piece which seems to be nearer to the other piece."""
+    child = descended(plan, walk)
+    sibling = (child[0] + (child[2] > walk[2]), child[1] + (child[3] > walk[3]), child[2], child[3])
+    near, radii = circle_reach(tree, pose, plan[0] + child[0], plan[1] + child[1])
+    far, other_radii = circle_reach(tree, pose, plan[0] + sibling[0], plan[1] + sibling[1])
+    if math.sqrt(near) - radii <= math.sqrt(far) - other_radii:
+        return child
+    return sibling
+
+
+def core_distance(outlines, a, b, pose):
+    """Smallest distance [m] between a core point of one body and the core of the other.
+
+    ``pose`` takes a's points into b's frame. Branch and bound: straight down to two runs that are
+    near, then through all that can be nearer.
+    """
+    vertices, tree = outlines.vertices, outlines.tree
+    side_a, side_b = side_of(outlines, a), side_of(outlines, b)
+    plan = plan_of(tree, side_a, side_b)
+    walk = START
+    while not at_leaves(plan, walk):
+        walk = nearer_child(tree, pose, plan, walk)
+    least2 = leaf_distance2(vertices, pose, side_a, side_b, walk, math.inf)
+    least = math.sqrt(least2)
+    walk = START
+    while walk[0] > 0:
+        if not within(tree, pose, plan, walk, least):
+            walk = passed(plan, walk)
+        elif at_leaves(plan, walk):
+            least2 = leaf_distance2(vertices, pose, side_a, side_b, walk, least2)
+            least = math.sqrt(least2)
+            walk = passed(plan, walk)
+        else:
+            walk = descended(plan, walk)
+    return least

@@ -1,0 +1,108 @@
+"""Which vertex–edge pairs of two bodies are near each other, and how near the two outlines are.
+
+Both trees of circles are walked against each other (see hierarchy.py), in the frame of one body.
+"""
+
+import math
+
+from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, NOW, RADIUS
+from flocsim.geometry.contact.circle_tree import (
+    START,
+    at_leaves,
+    core_distance,
+    descended,
+    passed,
+    plan_of,
+    posed,
+    reversed_pose,
+    run_of,
+    side_of,
+    within,
+)
+from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
+
+
+def pose_of(work, a, b):
+    """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
+    x = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
+    y = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    turn = work.motion[NOW, a, 2] - work.motion[NOW, b, 2]
+    c, s = math.cos(work.motion[NOW, b, 2]), math.sin(work.motion[NOW, b, 2])
+    return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
+
+
+def add_pair(work, a, point, b, start, end):
+    """Append a pair to the list; False where no room is left."""
+    row = work.tally[CANDIDATES]
+    if row == work.candidates.shape[0]:
+        return False
+    work.candidates[row, 0], work.candidates[row, 1] = a, point
+    work.candidates[row, 2], work.candidates[row, 3], work.candidates[row, 4] = b, start, end
+    work.candidates[row, CLOSED], work.candidates[row, CLOSEST] = 0, 0
+    work.tally[CANDIDATES] = row + 1
+    return True
+
+
+def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
+    """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
+    vertices = scene.vertices
+    edges = side_b[0] + edge_count(side_b[1])
+    start_a, end_a = run_of(side_a, leaf_a)
+    start_b, end_b = run_of(side_b, leaf_b)
+    room = True
+    for point in range(start_a, end_a):
+        x, y = posed(pose, vertices[point, 0], vertices[point, 1])
+        for start in range(start_b, min(end_b, edges)):
+            end = edge_end(side_b[0], side_b[1], start)
+            distance2 = segment_distance2(
+                x, y, vertices[start, 0], vertices[start, 1], vertices[end, 0], vertices[end, 1]
+            )
+            if distance2 < reach * reach:
+                room = add_pair(work, a, point, b, start, end) and room
+    return room
+
+
+def list_polygons(scene, work, a, b, cutoff):
+    """List the pairs of two bodies, both ways round; False for a full list."""
+    side_a, side_b = side_of(scene, a), side_of(scene, b)
+    if side_a[1] == 1 and side_b[1] == 1:
+        return list_spheres(scene, work, a, b, cutoff)
+    reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
+    pose = pose_of(work, a, b)
+    back = reversed_pose(pose)
+    plan = plan_of(scene.tree, side_a, side_b)
+    walk = START
+    room = True
+    while walk[0] > 0 and room:
+        if not within(scene.tree, pose, plan, walk, reach):
+            walk = passed(plan, walk)
+        elif at_leaves(plan, walk):
+            room = list_one_way(scene, work, pose, a, b, side_a, walk[0], side_b, walk[1], reach)
+            room = room and list_one_way(
+                scene, work, back, b, a, side_b, walk[1], side_a, walk[0], reach
+            )
+            walk = passed(plan, walk)
+        else:
+            walk = descended(plan, walk)
+    return room
+
+
+def list_spheres(scene, work, a, b, cutoff):
+    """List the one pair of two spheres where its gap is below the cut-off; False if full."""
+    if sphere_gap(scene, work, a, b) >= cutoff:
+        return True
+    point = scene.first[b]
+    return add_pair(work, a, scene.first[a], b, point, point)
+
+
+def sphere_gap(scene, work, a, b):
+    """The gap of two spheres now [m]."""
+    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
+    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    return math.sqrt(ox * ox + oy * oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+
+
+def gap_between(scene, work, a, b):
+    """The distance between two outlines now [m], negative where they overlap."""
+    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    return core_distance(scene, a, b, pose_of(work, a, b)) - contact

@@ -1,0 +1,17 @@
+"""What replaces the polygon code in a scene of spheres: one pair per two bodies."""
+
+from flocsim.geometry.contact import near_pairs
+from flocsim.geometry.contact import points as contacts
+
+
+def turn_nothing(work, state):
+    """Spheres look the same at every angle."""
+
+
+FILLINGS = {
+    contacts.turn_bodies: turn_nothing,
+    near_pairs.list_polygons: near_pairs.list_spheres,
+    near_pairs.gap_between: near_pairs.sphere_gap,
+    contacts.locate_polygons: contacts.locate_spheres,
+}
+"""The replacements, for flocsim.composer.compose."""

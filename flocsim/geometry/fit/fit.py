@@ -1,0 +1,205 @@
+"""Pixel masks → spheropolygons: the fit of the paper's section 2.3."""
+
+import warnings
+
+import attrs
+import numpy as np
+
+from flocsim.errors import ShapeError, UsageError
+from flocsim.fields import is_number
+from flocsim.geometry.fit.outline import require_one_region
+from flocsim.geometry.shapes.resize import core_factor
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+
+METHODS = ("pattern", "paper", "even")
+
+SLACK = 0.01
+"""Share of the mask's area by which the swept area may be off before the outline is settled."""
+
+
+@attrs.frozen(eq=False)
+class Fit:
+    """A shape fitted to a mask.
+
+    shape: SpheroPolygon, or Sphere for one vertex, in pixels around its own centroid.
+    vertices: (N, 2) [px] in the mask's frame, x right and y **up**: the centre of the mask's pixel
+    (row i, column j) is (j, −i), so that the body looks as it does in the picture.
+    radius: spheroradius [px].  wrong_pixels: V, the pixels where shape and mask differ.
+    relative_error: RE = 100 V/P(I) [%], P(I) the mask's pixels (paper, eq. 2).
+    """
+
+    shape: Shape
+    vertices: np.ndarray
+    radius: float
+    wrong_pixels: int
+    relative_error: float
+
+    def scaled(self, pixel_size):
+        """The shape in metres, for pixels of `pixel_size` [m]; UsageError unless positive."""
+        if not is_number(pixel_size) or pixel_size <= 0:
+            raise UsageError(f"the pixel size must be a length above 0 m, found {pixel_size!r}")
+        return self.shape.scaled(pixel_size)
+
+
+def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=False, inscribed=False):
+    """Fit a spheropolygon to a floc's mask: minimise the pixels where the two differ.
+
+    A pixel belongs to the spheropolygon if its centre lies in the core polygon or within the
+    spheroradius of its boundary.
+
+    mask: (h, w) bool or 0/1, one 8-connected region; vertices: N ≥ 1; radius: spheroradius [px].
+    method: "pattern" starts from the best splits of the outline into N segments, moves each vertex
+    in eight directions by shrinking steps (8 … 0.25 px) while V falls, then takes vertices from
+    where they count least to where they lower V; "paper" lets the vertices move as damped
+    particles down the gradient of V (paper, section 2.3), from even spacing; "even" spaces N points
+    evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
+    preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the
+    difference of the pixel counts.  inscribed: no pixel outside of the mask is covered ("pattern"
+    only); the shape is then smaller than the floc.  N = 1 is the circle of the mask's area about
+    its centroid; all other options are then ignored.
+
+    Returns a Fit, the same for the same input; its polygon is simple.  By plain V,
+    "pattern" and "paper" never end above "even".  Warns if radius ≥ r_eq (paper, section 3.2:
+    "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region
+    or too thin to inscribe a shape in, UsageError for a wrong option.
+    """
+    mask = require_one_region(mask)
+    _check_options(vertices, radius, method)
+    if vertices == 1:
+        return _equal_area_circle(mask)
+    if inscribed:
+        _require_pattern_alone(method, preserve_area)
+    elif preserve_area:
+        _require_room(mask, radius)
+    _warn_if_coarse(mask, radius)
+    return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area, inscribed)
+
+
+def _check_options(vertices, radius, method):
+    if not isinstance(vertices, int | np.integer) or isinstance(vertices, bool) or vertices < 1:
+        raise UsageError(f"vertices must be a whole number of at least 1, found {vertices!r}")
+    if not is_number(radius) or radius <= 0:
+        raise UsageError(f"the spheroradius must be a number of pixels above 0, found {radius!r}")
+    if method not in METHODS:
+        raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
+
+
+def _require_pattern_alone(method, preserve_area):
+    if method != "pattern" or preserve_area:
+        raise UsageError(
+            "an inscribed fit goes with the method 'pattern' and without preserving the area, "
+            f"found the method {method!r}, preserve_area {preserve_area}"
+        )
+
+
+def _require_room(mask, radius):
+    equivalent = np.sqrt(mask.sum() / np.pi)
+    if radius >= equivalent:
+        raise UsageError(
+            f"the area cannot be preserved: a spheroradius of {radius:g} px alone covers more than "
+            f"the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
+        )
+
+
+def _warn_if_coarse(mask, radius):
+    equivalent = np.sqrt(mask.sum() / np.pi)
+    if radius >= equivalent:
+        warnings.warn(
+            f"spheroradius {radius:g} px is not below the floc's r_eq = {equivalent:.2f} px: "
+            "the fit cannot follow its outline; use r < r_eq",
+            stacklevel=3,
+        )
+
+
+def _equal_area_circle(mask):
+    rows, columns = np.nonzero(mask)
+    x, y = columns.mean(), rows.mean()
+    radius = float(np.sqrt(mask.sum() / np.pi))
+    # Room for the parts of the circle that leave a long floc's box.
+    margin = int(radius) + 2
+    padded = np.pad(mask, margin)
+    row, column = np.ogrid[: padded.shape[0], : padded.shape[1]]
+    inside = (column - margin - x) ** 2 + (row - margin - y) ** 2 <= radius**2
+    wrong = int(np.count_nonzero(inside != padded))
+    return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, _percent(wrong, mask))
+
+
+def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
+    points = _find(mask, count, radius, method, preserve_area, inscribed)
+    shape = SpheroPolygon(points * (1.0, -1.0), radius)
+    if inscribed:
+        _require_inside(mask, points, radius)
+    elif preserve_area:
+        factor = core_factor(shape.vertices, radius, float(mask.sum()))
+        points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
+    elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
+        points = _settled(mask, points, radius, shape.area)
+    vertices = points * (1.0, -1.0)
+    wrong = _wrong_pixels(mask, points, radius)
+    return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, _percent(wrong, mask))
+
+
+def _settled(mask, points, radius, area):
+    """The outline moved towards the mask's area as far as V does not rise.
+
+    Pixel centres leave an outline about half a pixel of play; V does not say where in it to be.
+    """
+    from flocsim.geometry.fit.kernels import compiled
+    from flocsim.geometry.fit.simple import simple_inset
+
+    wrong = _wrong_pixels(mask, points, radius)
+    perimeter = np.hypot(*(np.roll(points, -1, axis=0) - points).T).sum() + 2.0 * np.pi * radius
+    for share in (1.0, 0.5, 0.25):
+        moved = np.array(points)
+        simple = compiled(simple_inset)(moved, float(share * (area - mask.sum()) / perimeter))
+        if simple and _wrong_pixels(mask, moved, radius) <= wrong:
+            return moved
+    return points
+
+
+def _find(mask, count, radius, method, preserve_area, inscribed):
+    """The vertices (N, 2) as x, y-down [px] that a method leads to."""
+    from flocsim.geometry.fit.kernels import padded
+    from flocsim.geometry.fit.paper import paper_fit
+    from flocsim.geometry.fit.pattern import AREA, INSCRIBED, PLAIN
+    from flocsim.geometry.fit.search import even_start, pattern_fit
+
+    room, margin = padded(mask, count, radius)
+    if method == "pattern":
+        weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
+        return pattern_fit(room, count, radius, weights) - margin
+    start = even_start(room, count, radius)
+    return (paper_fit(room, start, radius) if method == "paper" else start) - margin
+
+
+def _wrong_pixels(mask, points, radius):
+    """V, counted on an array that the whole shape fits in."""
+    from flocsim.geometry.fit.kernels import count_errors
+
+    margin = _margin(mask, points, radius)
+    return count_errors(np.pad(mask, margin), points + margin, radius)
+
+
+def _margin(mask, points, radius):
+    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
+    return max(0, int(np.ceil(beyond.max() + radius))) + 2
+
+
+def _require_inside(mask, points, radius):
+    """ShapeError if the shape covers pixels that are not the mask's."""
+    from flocsim.geometry.fit.kernels import covered
+
+    margin = _margin(mask, points, radius)
+    cover = covered(np.pad(mask, margin).shape, points + margin, radius)
+    outside = np.count_nonzero(cover & ~np.pad(mask, margin))
+    if outside:
+        raise ShapeError(
+            f"no shape of {len(points)} vertices and spheroradius {radius:g} px was found that "
+            f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
+        )
+
+
+def _percent(wrong, mask):
+    return 100.0 * wrong / float(mask.sum())

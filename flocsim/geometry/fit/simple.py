@@ -1,0 +1,144 @@
+"""Keeping a polygon simple while its vertices move: plain Python, compiled by fit_search."""
+
+import numpy as np
+
+from flocsim.geometry.fit.coverage import squared_distance
+
+CLEARANCE = 0.01
+"""Least distance [px] between a vertex and an edge not its own: simple polygons stay simple."""
+
+
+def side(ax, ay, bx, by, x, y):
+    """Twice the signed area of the triangle a, b, (x, y)."""
+    return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+
+
+def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+    """Whether the segments a–b and c–d cross at an inner point of both."""
+    return (side(ax, ay, bx, by, cx, cy) > 0.0) != (side(ax, ay, bx, by, dx, dy) > 0.0) and (
+        side(cx, cy, dx, dy, ax, ay) > 0.0
+    ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
+
+
+def edge_is_clear(vertices, start, stop, moved, x, y):
+    """Whether the edge between the neighbours `start` and `stop` keeps clear of all others.
+
+    The vertex `moved`, one of the two, counts as being at (x, y).
+    """
+    limit = CLEARANCE * CLEARANCE
+    count = len(vertices)
+    ax, ay = (x, y) if start == moved else (vertices[start, 0], vertices[start, 1])
+    bx, by = (x, y) if stop == moved else (vertices[stop, 0], vertices[stop, 1])
+    if (bx - ax) ** 2 + (by - ay) ** 2 < limit:
+        return False
+    for k in range(count):
+        cx, cy = vertices[k]
+        if k in (start, stop):
+            continue
+        if squared_distance(cx, cy, ax, ay, bx, by) < limit:
+            return False
+        following = (k + 1) % count
+        if following in (start, stop):
+            continue
+        dx, dy = vertices[following]
+        if squared_distance(x, y, cx, cy, dx, dy) < limit:
+            return False
+        if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+            return False
+    return True
+
+
+def stays_simple(vertices, k, x, y):
+    """Whether a simple polygon stays simple when its vertex k goes to (x, y)."""
+    count = len(vertices)
+    before, after = (k - 1) % count, (k + 1) % count
+    return edge_is_clear(vertices, before, k, k, x, y) and edge_is_clear(
+        vertices, k, after, k, x, y
+    )
+
+
+def is_simple(vertices):
+    """Whether no edges cross and every vertex is clear of the edges that are not its own."""
+    for k in range(len(vertices)):
+        if not stays_simple(vertices, k, vertices[k, 0], vertices[k, 1]):
+            return False
+    return True
+
+
+def edges_cross(vertices, first, second):
+    """Whether the edges that begin at the vertices `first` and `second` cross."""
+    count = len(vertices)
+    ax, ay = vertices[first]
+    bx, by = vertices[(first + 1) % count]
+    cx, cy = vertices[second]
+    dx, dy = vertices[(second + 1) % count]
+    return segments_cross(ax, ay, bx, by, cx, cy, dx, dy)
+
+
+def reverse(vertices, first, last):
+    """Reverse the order of the vertices first … last, in place."""
+    while first < last:
+        for axis in range(2):
+            kept = vertices[first, axis]
+            vertices[first, axis] = vertices[last, axis]
+            vertices[last, axis] = kept
+        first += 1
+        last -= 1
+
+
+def untangle(vertices):
+    """Reorder the vertices, in place, until no edges cross, as far as that is found.
+
+    Of every crossing pair of edges the part between is reversed, which shortens the polygon.
+    Points on one line can seem to cross for ever, by rounding: the rounds are counted.
+    """
+    count = len(vertices)
+    for _ in range(count):
+        crossed = False
+        for first in range(count - 2):
+            for second in range(first + 2, count - (first == 0)):
+                if edges_cross(vertices, first, second):
+                    reverse(vertices, first + 1, second)
+                    crossed = True
+        if not crossed:
+            break
+
+
+def bisector(vertices, k):
+    """Unit bisector of the corner k, to the right hand of a walk: inwards for trace_outline's."""
+    count = len(vertices)
+    x, y = vertices[k]
+    ux, uy = x - vertices[k - 1, 0], y - vertices[k - 1, 1]
+    wx, wy = vertices[(k + 1) % count, 0] - x, vertices[(k + 1) % count, 1] - y
+    before, after = max(np.hypot(ux, uy), 1e-12), max(np.hypot(wx, wy), 1e-12)
+    nx, ny = -uy / before - wy / after, ux / before + wx / after
+    length = max(np.hypot(nx, ny), 1e-12)
+    return nx / length, ny / length
+
+
+def draw_in(vertices, depth):
+    """Move every vertex by `depth` [px] along its bisector, in place.
+
+    Where the polygon would not stay simple, by half of it, or not at all.
+    """
+    count = len(vertices)
+    inwards = np.empty((count, 2))
+    for k in range(count):
+        inwards[k, 0], inwards[k, 1] = bisector(vertices, k)
+    for k in range(count):
+        for share in (1.0, 0.5):
+            x = vertices[k, 0] + share * depth * inwards[k, 0]
+            y = vertices[k, 1] + share * depth * inwards[k, 1]
+            if stays_simple(vertices, k, x, y):
+                vertices[k, 0], vertices[k, 1] = x, y
+                break
+
+
+def simple_inset(vertices, depth):
+    """Untangle the polygon and draw it in by `depth` [px], in place; whether that succeeded."""
+    if not is_simple(vertices):
+        untangle(vertices)
+        if not is_simple(vertices):
+            return False
+    draw_in(vertices, depth)
+    return True

@@ -1,0 +1,88 @@
+"""How finely the instant of a touch must be known: what follows from a contact hangs on it.
+
+A contact that is noticed g too deep gives back a velocity that is off by about ω0 g; one that goes
+on damping until g behind its end, by that force's acceleration times g/speed.
+"""
+
+import math
+
+from flocsim.arrays import MEMORY
+from flocsim.hooks import contact_force
+from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
+
+SHARE_OF_DEPTH = 0.02
+"""Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
+
+GRAINS_LATER = 100.0
+"""… and so finely that the error of velocity leads to so many grains at most."""
+
+GRAINS_AFTER_RELEASE = 1e3
+"""As many where a contact ends: a step that has to be cut there costs more than that is worth."""
+
+NEARLY = 0.99
+"""Critical damping is told from less in spite of rounding."""
+
+COARSEST_ROUNDING = 2e-15
+"""Not finer than this share of the places, in which ten neighbouring numbers lie."""
+
+TINY = 1e-300
+"""Keeps a quotient finite."""
+
+
+def pressed(view, overlap, overlap_rate, parameters):
+    """The normal force of a contact with such an overlap [N]."""
+    force, _ = contact_force(pressed_view(view, overlap, overlap_rate), parameters)
+    return force
+
+
+def bounces(view, speed, frequency, parameters):
+    """Whether bodies fly apart again: damping below critical, or none that pulls."""
+    drag = 2.0 * NEARLY * frequency * speed * view.effective_mass
+    return pressed(view, 0.0, speed, parameters) < drag or (
+        pressed(view, 0.0, -speed, parameters) >= 0.0
+    )
+
+
+def memory_of(work, row):
+    """How long a velocity of either body of a pair is remembered [s]."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
+
+
+def furthest_place(work, state):
+    """The largest coordinate of a body [m]."""
+    furthest = 0.0
+    for body in range(work.motion.shape[1]):
+        for axis in range(2):
+            furthest = max(furthest, abs(work.motion[state, body, axis]))
+    return furthest
+
+
+def above_rounding(work, state, length):
+    """The length [m], not finer than places can be told apart."""
+    return max(length, COARSEST_ROUNDING * furthest_place(work, state))
+
+
+def touch_grain(scene, work, state, row, grain):
+    """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
+    speed = -normal_rate(work, state, row)
+    view = contact_view(scene, work, state, row)
+    stiffness = pressed(view, grain, 0.0, scene.parameters) / grain
+    if not (stiffness > 0.0 and speed > 0.0):
+        return grain
+    frequency = math.sqrt(stiffness / view.effective_mass)
+    if not bounces(view, speed, frequency, scene.parameters):
+        return grain
+    later = GRAINS_LATER * grain / max(frequency * memory_of(work, row), TINY)
+    return above_rounding(work, state, min(grain, SHARE_OF_DEPTH * speed / frequency, later))
+
+
+def release_grain(scene, work, state, row, grain):
+    """How far a contact may have opened unnoticed [m], while its damping still pulls."""
+    speed = normal_rate(work, state, row)
+    if not speed > 0.0:
+        return grain
+    view = contact_view(scene, work, state, row)
+    pull = abs(pressed(view, 0.0, -speed, scene.parameters)) / view.effective_mass
+    later = GRAINS_AFTER_RELEASE * grain * speed / max(pull * memory_of(work, row), TINY)
+    return above_rounding(work, state, min(grain, later))

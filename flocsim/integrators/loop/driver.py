@@ -1,0 +1,153 @@
+"""The one loop around every integrator: lists, error control, switches, budgets, recording."""
+
+import math
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    CODE,
+    ERROR,
+    LOCATED,
+    MAX_STEPS,
+    NEW,
+    NOW,
+    PAUSE_AT,
+    RADIUS,
+    RECORDED,
+    REJECTED,
+    STEP_ERROR,
+    STEPS,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+)
+from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.slip_transfer import hand_over
+from flocsim.hooks import attempt, has_contact, observe, surface_reach
+from flocsim.integrators.events.first_event import switch_share
+from flocsim.integrators.events.modes import SAME, set_modes
+from flocsim.integrators.loop.step_size import choose_step, plan, reject
+
+FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
+    1, 10
+)
+"""The values of integrators.status.Status, as plain numbers for the compiled loop."""
+
+MOST_TRIALS = 12
+"""Steps tried to end at one switch."""
+
+
+def too_deep(scene, work):
+    """Whether any listed pair overlaps past the limit of the contact law."""
+    for row in range(work.tally[CANDIDATES]):
+        a, b = work.candidates[row, 0], work.candidates[row, 2]
+        if -work.geometry[NOW, row, 2] > DEEPEST_OVERLAP * (
+            scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+        ):
+            return True
+    return False
+
+
+def take_new_state(work):
+    """Make the new state the current one."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(6):
+            work.motion[NOW, body, axis] = work.motion[NEW, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        for column in range(work.geometry.shape[2]):
+            work.geometry[NOW, row, column] = work.geometry[NEW, row, column]
+        if work.candidates[row, CLOSED] == 1:
+            work.slip[NOW, row] = work.slip[NEW, row]
+
+
+def accept(scene, work, clock, counts, step, lists):
+    """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
+    take_new_state(work)
+    clock[TIME] += step
+    counts[STEPS] += 1
+    clock[ERROR] += clock[STEP_ERROR]
+    if not lists:
+        return SAME
+    switched = set_modes(scene, work, NOW)
+    hand_over(work)
+    return switched
+
+
+def record_row(work, clock, counts, record):
+    """Write the current state to the record (rows of time, then six numbers for each body)."""
+    row = counts[RECORDED]
+    record[row, 0] = clock[TIME]
+    for body in range(work.motion.shape[1]):
+        for axis in range(6):
+            record[row, 1 + 6 * body + axis] = work.motion[NOW, body, axis]
+    counts[RECORDED] = row + 1
+
+
+def pause_reason(clock, counts, record):
+    """The Status that ends the loop before the next step; 0 to go on."""
+    if counts[STEPS] + counts[REJECTED] + counts[LOCATED] >= counts[MAX_STEPS]:
+        return STEP_BUDGET
+    if counts[STEPS] >= counts[PAUSE_AT]:
+        return PAUSED
+    if record.shape[0] > 0 and counts[RECORDED] == record.shape[0]:
+        return RECORD_FULL
+    return 0
+
+
+def keep_lists(scene, work):
+    """Make the candidate lists anew where half their budget is spent; False without room."""
+    if spent(scene, work, NOW) > 0.5:
+        if not list_candidates(scene, work):
+            return False
+        locate_contacts(scene, work, NOW)
+        set_modes(scene, work, NOW)
+    return True
+
+
+def look(scene, work, memo, clock, counts, record, lists):
+    """Record and watch the state that has been accepted: a Status, or 0 to go on."""
+    if record.shape[0] > 0:
+        record_row(work, clock, counts, record)
+    if lists and too_deep(scene, work):
+        return TOO_DEEP
+    counts[CODE] = observe(scene, work, memo, clock[TIME])
+    return STOPPED if counts[CODE] != 0 else 0
+
+
+def advance(scene, work, memo, clock, counts, record):
+    """Run until a Status; call again to go on after PAUSED, RECORD_FULL or NO_ROOM.
+
+    ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
+    """
+    lists = has_contact() or surface_reach(scene.parameters) > 0.0
+    limit, trials = math.inf, 0
+    while clock[TIME] < clock[UNTIL]:
+        status = pause_reason(clock, counts, record)
+        if status != 0:
+            return status
+        if lists and trials == 0 and not keep_lists(scene, work):
+            return NO_ROOM
+        step = min(choose_step(scene, work, clock, lists), limit)
+        ratio = attempt(scene, work, clock, step)
+        if ratio < 0.0 and clock[TOLERANCE] == math.inf:
+            return NOT_FINITE
+        too_far = lists and ratio >= 0.0 and spent(scene, work, NEW) > 1.0
+        if ratio < 0.0 or ratio > 1.0 or too_far:
+            limit, trials = math.inf, 0
+            if not reject(clock, counts, step, ratio, too_far):
+                return STALLED
+            continue
+        share = switch_share(scene, work, memo, clock, step) if lists else math.inf
+        if share < 1.0 and trials < MOST_TRIALS:
+            limit, trials = share * step, trials + 1
+            counts[LOCATED] += 1
+            continue
+        switched = accept(scene, work, clock, counts, step, lists)
+        plan(clock, step, ratio, trials > 0, switched)
+        limit, trials = math.inf, 0
+        status = look(scene, work, memo, clock, counts, record, lists)
+        if status != 0:
+            return status
+    return FINISHED

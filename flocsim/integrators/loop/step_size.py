@@ -1,0 +1,166 @@
+"""The size of the next step: from the last one's error, the lists, and what is about to switch.
+
+How the error of one step sets the size of the next.
+"""
+
+import math
+
+from flocsim.arrays import (
+    BEARABLE_STEP,
+    CANDIDATES,
+    LARGEST_STEP,
+    NOW,
+    PREVIOUS_RATIO,
+    PREVIOUS_STEP,
+    REJECTED,
+    REJECTED_RATIO,
+    REJECTED_STEP,
+    SETTLED_STEP,
+    SETTLING,
+    STAGED_STEP,
+    STEP,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+)
+from flocsim.geometry.contact.candidates import time_within
+from flocsim.hooks import next_step
+from flocsim.integrators.events.first_event import grain_of
+from flocsim.integrators.events.modes import OTHER_CLOSEST, OTHER_CONTACTS
+from flocsim.integrators.events.resolution import touch_grain
+from flocsim.integrators.rhs.views import normal_rate
+
+SAFETY = 0.9
+"""Aim that far below the step at which the error would meet the tolerance."""
+
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
+"""Bounds of the change from one step to the next."""
+
+
+LOWEST_ORDER = 0.5
+"""Least power of the step that an error is taken to go with."""
+
+
+def seen_order(clock, step, ratio, order):
+    """The power of the step that the errors of two rejected trials in a row go with.
+
+    Behind a switch stiff forces settle, and the error falls far more slowly than the order says
+    (Gustafsson 1994).
+    """
+    if clock[REJECTED_STEP] <= step:
+        return order
+    decay = math.log(clock[REJECTED_RATIO] / ratio) / math.log(clock[REJECTED_STEP] / step)
+    return min(max(decay, LOWEST_ORDER), order)
+
+
+def adaptive_factor(clock, step, ratio, order):
+    """By how much to change the step after one whose error was ``ratio`` times the tolerance.
+
+    The trend of the last two steps is carried on, and a step behind a rejected one does not grow
+    (Gustafsson 1994, as in Hairer & Wanner, Solving Ordinary Differential Equations II, IV.8).
+    """
+    ratio = max(ratio, 1e-12)
+    if ratio > 1.0:
+        order = seen_order(clock, step, ratio, order)
+    factor = SAFETY * ratio ** (-1.0 / order)
+    before = clock[PREVIOUS_STEP]
+    if ratio <= 1.0 and before == 0.0:
+        factor = min(factor, 1.0)
+    elif ratio <= 1.0 and before < math.inf:
+        trend = max(clock[PREVIOUS_RATIO], 1e-2) / (ratio * ratio)
+        factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
+    return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
+
+
+SMALLEST_STEP = 1e-14
+"""A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
+
+IMMINENT = 0.05
+"""A switch within this share of the step is run up to by a step of its own."""
+
+SHARE_OF_FAILED, RECOVERY = 0.6, 2.0
+"""Behind a step that failed, steps grow to this share of it, and that by so much a step."""
+
+SETTLED_GROWTH = 3.0
+"""The first step behind a switch is at most so many times the one behind the switch before."""
+
+
+def imminent_switch(scene, work, clock, step):
+    """The step, or the much shorter one behind which a pair is just about to switch."""
+    grain = grain_of(work, clock)
+    for row in range(work.tally[CANDIDATES]):
+        gap = work.geometry[NOW, row, 2]
+        if 0.0 <= gap < clock[TOLERANCE]:
+            rate = normal_rate(work, NOW, row)
+            if gap * rate < 0.0:
+                behind = 0.5 * touch_grain(scene, work, NOW, row, grain)
+                ahead = (abs(gap) + behind) / abs(rate)
+                if ahead < IMMINENT * step:
+                    step = ahead
+    return step
+
+
+def choose_step(scene, work, clock, lists):
+    """The size of the next step [s]."""
+    step = min(clock[STEP], clock[LARGEST_STEP])
+    if lists:
+        step = min(step, time_within(scene, work, 0.5))
+        if clock[TOLERANCE] < math.inf:
+            step = imminent_switch(scene, work, clock, step)
+    left = clock[UNTIL] - clock[TIME]
+    # Two even steps at the end instead of a long one and a sliver.
+    if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
+        return 0.5 * left
+    return min(step, left)
+
+
+def reject(clock, counts, step, ratio, too_far):
+    """Choose a smaller step; False where there is none."""
+    counts[REJECTED] += 1
+    clock[PREVIOUS_STEP] = 0.0
+    clock[STAGED_STEP] = 0.0
+    failed = ratio < 0.0 or too_far
+    clock[STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
+    clock[REJECTED_STEP] = 0.0 if failed else step
+    clock[REJECTED_RATIO] = ratio
+    if ratio < 0.0:
+        clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
+    return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
+
+
+def plan_behind_switch(clock):
+    """Behind a switch the forces are new, and settle about as fast as behind the last one."""
+    clock[PREVIOUS_STEP] = math.inf
+    clock[STAGED_STEP] = 0.0
+    clock[SETTLING] = 1.0
+    clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
+
+
+def plan_behind_alarm(clock, step):
+    """Behind a step that was cut for a switch which then did not come: too long to tell."""
+    clock[PREVIOUS_STEP] = math.inf
+    clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
+    clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
+
+
+def plan_next_step(clock, step, ratio):
+    """The size of the step after an accepted one that ran its length."""
+    if clock[SETTLING] == 1.0:
+        clock[SETTLED_STEP] = step
+        clock[SETTLING] = 0.0
+    cut = step < 0.5 * clock[STEP]
+    clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
+    clock[BEARABLE_STEP] *= RECOVERY
+    clock[PREVIOUS_STEP] = math.inf if cut else step
+    clock[PREVIOUS_RATIO] = ratio
+
+
+def plan(clock, step, ratio, was_cut, switched):
+    """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
+    clock[REJECTED_STEP] = 0.0
+    if switched == OTHER_CONTACTS or (was_cut and switched == OTHER_CLOSEST):
+        plan_behind_switch(clock)
+    elif was_cut:
+        plan_behind_alarm(clock, step)
+    else:
+        plan_next_step(clock, step, ratio)

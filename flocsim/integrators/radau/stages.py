@@ -1,0 +1,132 @@
+"""The stages of a Radau IIA step: collocation of place, velocity and tangential displacement.
+
+Unknown are the stages' velocities; places and displacements follow from them. Newton's method with
+the derivatives of the step's start, carried along with the contacts (frames.py), solves one real
+and one complex system of 3n equations.
+"""
+
+import math
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FIRST,
+    MEMORY,
+    NOW,
+    PACE,
+    SCRATCH,
+    SLIP_RATES,
+    SOLVES,
+    TIME,
+)
+from flocsim.integrators.radau.collocation import guess_stages
+from flocsim.integrators.radau.contact_frames import follow_contacts
+from flocsim.integrators.radau.systems import solve, write_changes, write_loads
+from flocsim.integrators.radau.tableau import MATRIX, NODES
+from flocsim.integrators.rhs.error import rounding_size, step_tolerance
+from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces
+from flocsim.integrators.rhs.views import lever
+
+MOST_ITERATIONS = 10
+"""Newton steps before a step is given up and made smaller."""
+
+FIRST_PACE = 0.5
+"""What to expect of the second iteration when only one has been made."""
+
+NEWTON_SHARE = 1e-3
+"""Newton's method goes on until what is left is below this share of the tolerance."""
+
+
+def place_stages(work, step):
+    """Places at the stages from the velocities there."""
+    motion = work.motion
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            for stage in range(3):
+                weights = MATRIX[stage]
+                mean = weights[0] * motion[FIRST, body, 3 + axis]
+                mean += weights[1] * motion[FIRST + 1, body, 3 + axis]
+                mean += weights[2] * motion[FIRST + 2, body, 3 + axis]
+                motion[FIRST + stage, body, axis] = motion[NOW, body, axis] + step * mean
+
+
+def slip_stages(work, step):
+    """Tangential displacements at the stages from their rates there."""
+    slip = work.slip
+    rates = SLIP_RATES + FIRST
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            for stage in range(3):
+                weights = MATRIX[stage]
+                mean = weights[0] * slip[rates, row] + weights[1] * slip[rates + 1, row]
+                mean += weights[2] * slip[rates + 2, row]
+                slip[FIRST + stage, row] = slip[NOW, row] + step * mean
+
+
+def evaluate_states(scene, work, time, step, first, last):
+    """Forces in the states from ``first`` to before ``last``; NOW is state 0, the stages follow."""
+    for state in range(first, last):
+        locate_and_rate(scene, work, state, state)
+    if last > FIRST:
+        slip_stages(work, step)
+    for state in range(first, last):
+        node = 0.0 if state == NOW else NODES[state - FIRST]
+        sum_forces(scene, work, time + node * step, state, state)
+
+
+def correct_stages(scene, work, step):
+    """Add the solutions to the stages' velocities; the largest change it makes in place [m]."""
+    largest = 0.0
+    for stage in range(3):
+        write_changes(scene, work, stage)
+        for body in range(work.motion.shape[1]):
+            memory = step + work.bodies[body, MEMORY]
+            for axis in range(3):
+                change = work.motion[SCRATCH, body, 3 + axis]
+                if not abs(change) < math.inf:
+                    return math.inf
+                work.motion[FIRST + stage, body, 3 + axis] += change
+                largest = max(largest, lever(scene, body, axis) * memory * abs(change))
+    return largest
+
+
+def newton_step(scene, work, time, step):
+    """One iteration; the largest change it makes in place [m]."""
+    place_stages(work, step)
+    evaluate_states(scene, work, time, step, FIRST, FIRST + 3)
+    follow_contacts(work)
+    write_loads(scene, work, step)
+    for which in range(2):
+        solve(work.system, which)
+    work.tally[SOLVES] += 1
+    return correct_stages(scene, work, step)
+
+
+def finish_stages(work, step):
+    """Places and tangential displacements that go with the last correction of the velocities."""
+    place_stages(work, step)
+    for state in range(FIRST, FIRST + 3):
+        rate_slips(work, state, state)
+    slip_stages(work, step)
+
+
+def solve_stages(scene, work, clock, step):
+    """Find the stages' velocities; False where Newton's method does not converge."""
+    guess_stages(work, clock, step)
+    allowed = step_tolerance(work, clock)
+    # Turning makes every other iteration worse, so that the pace is taken over two of them.
+    before, earlier = math.inf, math.inf
+    for _ in range(MOST_ITERATIONS):
+        change = newton_step(scene, work, clock[TIME], step)
+        goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, step))
+        pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
+        if before == math.inf:
+            pace = FIRST_PACE
+        if pace < 1.0 and change * pace <= goal * (1.0 - pace):
+            finish_stages(work, step)
+            clock[PACE] = pace if before < math.inf else 0.0
+            return True
+        if not change < math.inf or (earlier < math.inf and pace > 1.0):
+            return False
+        before, earlier = change, before
+    return False

@@ -1,0 +1,71 @@
+"""How large an error is: in metres, at any point of an outline, and in what a velocity leads to."""
+
+import math
+
+from flocsim.arrays import (
+    BOUNDING_RADIUS,
+    MEMORY,
+    NEW,
+    SCRATCH,
+    STEP_ERROR,
+    TOLERANCE,
+)
+from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.integrators.rhs.views import lever
+
+ROUNDING = 1e-15
+"""A few units in the last place of a number."""
+
+
+FREE_SHARE = 0.01
+"""Share of the tolerance that is allowed while no gap is below it: free motion is cheap to follow,
+and what it runs into hangs on nanometres."""
+
+
+def step_tolerance(work, clock):
+    """What the error of the next step may be [m]."""
+    if least_listed_gap(work) > clock[TOLERANCE]:
+        return FREE_SHARE * clock[TOLERANCE]
+    return clock[TOLERANCE]
+
+
+def error_ratio(scene, work, clock, step):
+    """The error of the step over what is allowed, −1 where it or the new state is no number."""
+    error = error_size(scene, work)
+    clock[STEP_ERROR] = error
+    if not error < math.inf:
+        return -1.0
+    return error / max(step_tolerance(work, clock), rounding_size(scene, work, step))
+
+
+def body_error(scene, work, body):
+    """The error of one body, from SCRATCH: displacement of its outline, now and later [m]."""
+    e = work.motion
+    size = scene.bodies[body, BOUNDING_RADIUS]
+    place = math.hypot(e[SCRATCH, body, 0], e[SCRATCH, body, 1]) + size * abs(e[SCRATCH, body, 2])
+    speed = math.hypot(e[SCRATCH, body, 3], e[SCRATCH, body, 4]) + size * abs(e[SCRATCH, body, 5])
+    return place + speed * work.bodies[body, MEMORY]
+
+
+def error_size(scene, work):
+    """The largest error of a body; inf where it, or the new state, is no number."""
+    largest = 0.0
+    for body in range(scene.bodies.shape[0]):
+        error = body_error(scene, work, body)
+        if not error < math.inf:
+            return math.inf
+        largest = max(largest, error)
+    return largest
+
+
+def rounding_size(scene, work, step):
+    """What rounding alone does to a step's result [m]."""
+    largest = 0.0
+    for body in range(scene.bodies.shape[0]):
+        memory = work.bodies[body, MEMORY]
+        for axis in range(3):
+            place = abs(work.motion[NEW, body, axis])
+            speed = abs(work.motion[NEW, body, 3 + axis])
+            size = place * (1.0 + memory / step) + speed * (step + memory)
+            largest = max(largest, lever(scene, body, axis) * size)
+    return ROUNDING * largest

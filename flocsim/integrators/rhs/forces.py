@@ -1,0 +1,109 @@
+"""The right-hand side as it stands: all forces and torques in a state.
+
+Forces act through the listed pairs that are flagged as closed, or as the closest of two bodies.
+An integrator that freezes these flags for a step has a smooth right-hand side in it.
+
+What contacts can hold: the limit of their tangential displacements.
+"""
+
+from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, EVALUATIONS, NEW, SLIP_RATES
+from flocsim.geometry.contact.points import locate_acting
+from flocsim.hooks import (
+    body_force,
+    centre_force,
+    contact_force,
+    has_centre_force,
+    has_contact,
+    slip_limit,
+    surface_force,
+    surface_reach,
+)
+from flocsim.integrators.rhs.views import (
+    add_force,
+    body_view,
+    centre_line,
+    centre_view,
+    contact_view,
+    push_pair,
+    surface_view,
+    tangential_rate,
+)
+
+
+def limit_slips(scene, work):
+    """Cut the displacements of the closed pairs in NEW to what they can hold there."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            limit = slip_limit(contact_view(scene, work, NEW, row), scene.parameters)
+            work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
+
+
+def start_rates(work, state, rate):
+    """The velocities of a state, and no force yet."""
+    for body in range(work.bodies.shape[0]):
+        for axis in range(3):
+            work.rates[rate, body, axis] = work.motion[state, body, 3 + axis]
+            work.rates[rate, body, 3 + axis] = 0.0
+
+
+def add_body_forces(scene, work, time, state, rate):
+    """Weight, drag and their like."""
+    for body in range(scene.bodies.shape[0]):
+        view = body_view(scene, work, time, state, body)
+        fx, fy, torque = body_force(view, scene.parameters)
+        add_force(work, rate, body, fx, fy, torque)
+
+
+def add_centre_forces(scene, work, time, state, rate):
+    """Forces along the lines of centres."""
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            view = centre_view(scene, work, time, state, a, b)
+            nx, ny, _ = centre_line(work, state, a, b)
+            repulsion = centre_force(view, scene.parameters)
+            add_force(work, rate, a, repulsion * nx, repulsion * ny, 0.0)
+            add_force(work, rate, b, -repulsion * nx, -repulsion * ny, 0.0)
+
+
+def add_surface_forces(scene, work, time, state, rate):
+    """Forces at the closest points of the outlines."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSEST] == 1:
+            view = surface_view(scene, work, time, state, row)
+            push_pair(work, state, rate, row, surface_force(view, scene.parameters), 0.0)
+
+
+def add_contact_forces(scene, work, state, rate):
+    """Visco-elastic forces of all closed pairs."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            view = contact_view(scene, work, state, row)
+            normal, tangential = contact_force(view, scene.parameters)
+            push_pair(work, state, rate, row, normal, tangential)
+
+
+def rate_slips(work, state, rate):
+    """Rates of the tangential displacements of all closed pairs."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            work.slip[SLIP_RATES + rate, row] = tangential_rate(work, state, row)
+
+
+def locate_and_rate(scene, work, state, rate):
+    """Contact geometry of a state, and the rates of its tangential displacements."""
+    if has_contact() or surface_reach(scene.parameters) > 0.0:
+        locate_acting(scene, work, state)
+        rate_slips(work, state, rate)
+
+
+def sum_forces(scene, work, time, state, rate):
+    """All forces and torques of a state into ``work.rates[rate]``; its geometry is located."""
+    work.tally[EVALUATIONS] += 1
+    start_rates(work, state, rate)
+    add_body_forces(scene, work, time, state, rate)
+    if has_centre_force():
+        add_centre_forces(scene, work, time, state, rate)
+    if surface_reach(scene.parameters) > 0.0:
+        add_surface_forces(scene, work, time, state, rate)
+    if has_contact():
+        add_contact_forces(scene, work, state, rate)

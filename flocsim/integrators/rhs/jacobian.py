@@ -1,0 +1,269 @@
+"""Derivatives of the forces: DAMPING = −∂F/∂v and STIFFNESS = −∂F/∂q, of all bodies' coordinates.
+
+A force along a direction J (its entries on two bodies, three each) whose size depends on J·q and
+J·v gives products JᵀJ. What turning does to the directions is kept where it is of first order in
+the contact forces; the rest is left to Newton's iterations, whose result it does not touch.
+
+Directions of pairs on the coordinates of their two bodies, and products of them.
+
+What turning does to the force of a pair: its normal and its arms change with the bodies' places.
+
+With f = N n + T t the normal turns by ψ, and the force by (N t − T n) ψ. On the vertex's body the
+torque changes by A (ψ − θ_a), where A = p·f and p leads from the centroid to the vertex. On the
+edge's body, the same holds for an end of the edge; on its inside the foot slides by σ instead, and
+the torque changes by N σ.
+
+Derivatives of the contact forces, taken from the kernels by differences.
+"""
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    CLOSEST,
+    DAMPING,
+    NOW,
+    RADIUS,
+    STIFFNESS,
+    BodyView,
+    ContactView,
+)
+from flocsim.hooks import (
+    centre_damping,
+    centre_force,
+    centre_slope,
+    contact_force,
+    has_centre_force,
+    has_contact,
+    position_force,
+    reads_position,
+    reads_velocity,
+    surface_damping,
+    surface_force,
+    surface_reach,
+    surface_slope,
+    velocity_force,
+)
+from flocsim.integrators.rhs.velocity_memory import remember_velocities
+from flocsim.integrators.rhs.views import (
+    body_view,
+    centre_line,
+    centre_view,
+    contact_view,
+    surface_view,
+)
+
+
+def normal_rows(work, row):
+    """Entries of a pair's normal direction on its two bodies, now."""
+    g = work.geometry
+    nx, ny = g[NOW, row, 0], g[NOW, row, 1]
+    return (nx, ny, g[NOW, row, 3]), (-nx, -ny, -g[NOW, row, 5])
+
+
+def tangent_rows(work, row):
+    """Entries of a pair's tangential direction on its two bodies, now."""
+    g = work.geometry
+    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
+    return (tx, ty, g[NOW, row, 4]), (-tx, -ty, -g[NOW, row, 6])
+
+
+def add_product(work, which, a, b, out, by, weight):
+    """weight · outᵀ by of two directions, each with its entries on bodies a and b."""
+    if weight == 0.0:
+        return
+    matrix = work.jacobian
+    for i in range(3):
+        for j in range(3):
+            matrix[which, 3 * a + i, 3 * a + j] += weight * out[0][i] * by[0][j]
+            matrix[which, 3 * a + i, 3 * b + j] += weight * out[0][i] * by[1][j]
+            matrix[which, 3 * b + i, 3 * a + j] += weight * out[1][i] * by[0][j]
+            matrix[which, 3 * b + i, 3 * b + j] += weight * out[1][i] * by[1][j]
+
+
+NOTHING = (0.0, 0.0, 0.0)
+"""A body on which a direction has no entries."""
+
+
+def sliding_row(scene, work, row):
+    """Entries of σ, by which the vertex moves along the edge, on the two bodies; and the arms.
+
+    The arms are p·n and the same for the foot.
+    """
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    g = work.geometry
+    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
+    difference = scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+    distance = g[NOW, row, 2] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    arm_a = g[NOW, row, 4] + 0.5 * (distance + difference)
+    arm_b = g[NOW, row, 6] - 0.5 * (distance - difference)
+    # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
+    beside = distance if g[NOW, row, 7] == 0.0 else 0.0
+    return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
+
+
+def scaled(row, share):
+    """A direction's entries on one body, times a number."""
+    return row[0] * share, row[1] * share, row[2] * share
+
+
+def add_turning(scene, work, row, normal, tangential):
+    """Derivative by the places of a pair's force whose size stays the same."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    g, stiffness = work.geometry, work.jacobian
+    slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
+    nx, ny, turning = g[NOW, row, 0], g[NOW, row, 1], g[NOW, row, 7]
+    fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
+    torque_a = normal * arm_a - tangential * g[NOW, row, 3]
+    torque_b = normal * arm_b - tangential * g[NOW, row, 5]
+    stiffness[STIFFNESS, 3 * a + 2, 3 * a + 2] += torque_a
+    if turning == 0.0:
+        out = (fx, fy, torque_a), (-fx, -fy, 0.0)
+        add_product(work, STIFFNESS, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
+        on_b = NOTHING, (0.0, 0.0, 1.0)
+        add_product(work, STIFFNESS, a, b, on_b, (slide_a, slide_b), -normal)
+    else:
+        out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
+        by = scaled(slide_a, turning), scaled(slide_b, turning)
+        add_product(work, STIFFNESS, a, b, out, by, -1.0)
+        stiffness[STIFFNESS, 3 * b + 2, 3 * b + 2] -= torque_b
+
+
+def changed_view(view, axis, by):
+    """A ContactView with its overlap, overlap rate, slip or slip rate (axis 0–3) changed."""
+    return ContactView(
+        view.overlap + by * (axis == 0), view.overlap_rate + by * (axis == 1),
+        view.slip + by * (axis == 2), view.slip_rate + by * (axis == 3),
+        view.effective_mass, view.radius_i, view.radius_j,
+    )  # fmt: skip
+
+
+def change_of(view, axis):
+    """How much to change one entry of a view by for a difference [m or m/s]."""
+    value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
+    floor = 1e-13 if axis % 2 == 0 else 1e-9
+    return 1e-3 * abs(value) + floor
+
+
+def add_contact(scene, work, row):
+    """The derivatives of one contact's forces."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    view = contact_view(scene, work, NOW, row)
+    normal, tangential = contact_force(view, scene.parameters)
+    along, across = normal_rows(work, row), tangent_rows(work, row)
+    for axis in range(4):
+        size = change_of(view, axis)
+        more, further = contact_force(changed_view(view, axis, size), scene.parameters)
+        # An overlap grows against the normal, a slip along the tangent.
+        sign, by = (1.0, along) if axis < 2 else (-1.0, across)
+        which = STIFFNESS if axis % 2 == 0 else DAMPING
+        add_product(work, which, a, b, along, by, sign * (more - normal) / size)
+        add_product(work, which, a, b, across, by, sign * (further - tangential) / size)
+    add_turning(scene, work, row, normal, tangential)
+
+
+def add_contacts(scene, work):
+    """The derivatives of all closed pairs."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            add_contact(scene, work, row)
+
+
+def shifted(view, axis, by):
+    """A BodyView with one of x, y, angle (axis 0–2) or vx, vy, spin (axis 3–5) changed."""
+    return BodyView(
+        view.time,
+        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
+        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
+        view.mass, view.buoyant_mass, view.inertia, view.radius,
+    )  # fmt: skip
+
+
+def add_velocity_derivative(scene, work, view, body):
+    """One body's forces by its velocity, by differences of the kernels."""
+    speeds = (view.vx, view.vy, view.spin)
+    before = velocity_force(view, scene.parameters)
+    for axis in range(3):
+        floor = 1e-9 / view.radius if axis == 2 else 1e-9
+        size = 1e-3 * abs(speeds[axis]) + floor
+        after = velocity_force(shifted(view, 3 + axis, size), scene.parameters)
+        for part in range(3):
+            damping = -(after[part] - before[part]) / size
+            work.jacobian[DAMPING, 3 * body + part, 3 * body + axis] += damping
+
+
+def add_position_derivative(scene, work, view, body):
+    """One body's forces by its place, by differences of the kernels."""
+    before = position_force(view, scene.parameters)
+    for axis in range(3):
+        size = 1e-6 if axis == 2 else 1e-6 * view.radius
+        after = position_force(shifted(view, axis, size), scene.parameters)
+        for part in range(3):
+            stiffness = -(after[part] - before[part]) / size
+            work.jacobian[STIFFNESS, 3 * body + part, 3 * body + axis] += stiffness
+
+
+def clear_jacobian(work):
+    """No derivative yet."""
+    for which in range(2):
+        for row in range(work.jacobian.shape[1]):
+            for column in range(work.jacobian.shape[2]):
+                work.jacobian[which, row, column] = 0.0
+
+
+def add_bodies(scene, work, time):
+    """Derivatives of the body forces."""
+    for body in range(scene.bodies.shape[0]):
+        view = body_view(scene, work, time, NOW, body)
+        if reads_velocity():
+            add_velocity_derivative(scene, work, view, body)
+        if reads_position():
+            add_position_derivative(scene, work, view, body)
+
+
+def add_centres(scene, work, time):
+    """Derivatives of the centre forces."""
+    for a in range(scene.bodies.shape[0]):
+        for b in range(a):
+            view = centre_view(scene, work, time, NOW, a, b)
+            nx, ny, distance = centre_line(work, NOW, a, b)
+            along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
+            across = ((-ny, nx, 0.0), (ny, -nx, 0.0))
+            slope = centre_slope(view, scene.parameters)
+            damping = centre_damping(view, scene.parameters)
+            add_product(work, STIFFNESS, a, b, along, along, -slope)
+            add_product(work, DAMPING, a, b, along, along, damping)
+            if distance > 0.0:
+                turning = -centre_force(view, scene.parameters) / distance
+                add_product(work, STIFFNESS, a, b, across, across, turning)
+
+
+def add_surfaces(scene, work, time):
+    """Derivatives of the surface forces, at the closest pair of every two bodies."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSEST] == 1:
+            view = surface_view(scene, work, time, NOW, row)
+            along = normal_rows(work, row)
+            a, b = work.candidates[row, 0], work.candidates[row, 2]
+            slope = surface_slope(view, scene.parameters)
+            damping = surface_damping(view, scene.parameters)
+            add_product(work, STIFFNESS, a, b, along, along, -slope)
+            add_product(work, DAMPING, a, b, along, along, damping)
+            add_turning(scene, work, row, surface_force(view, scene.parameters), 0.0)
+
+
+def weigh_velocities(scene, work, time, remaining):
+    """Derivatives of the body forces, and from them how long each body remembers its velocity."""
+    clear_jacobian(work)
+    add_bodies(scene, work, time)
+    remember_velocities(scene, work, remaining)
+
+
+def assemble_jacobian(scene, work, time, remaining):
+    """DAMPING and STIFFNESS of the current state, whose contact geometry is located."""
+    weigh_velocities(scene, work, time, remaining)
+    if has_centre_force():
+        add_centres(scene, work, time)
+    if surface_reach(scene.parameters) > 0.0:
+        add_surfaces(scene, work, time)
+    if has_contact():
+        add_contacts(scene, work)

@@ -1,0 +1,156 @@
+"""What kernels are shown: views of bodies, pairs and contacts, made from the arrays."""
+
+import math
+
+from flocsim.arrays import (
+    BOUNDING_RADIUS,
+    BUOYANT_MASS,
+    CANDIDATES,
+    EQUIVALENT_RADIUS,
+    FREE,
+    INERTIA,
+    MASS,
+    RADIUS,
+    BodyView,
+    ContactView,
+    PairView,
+)
+
+
+def body_view(scene, work, time, state, body):
+    """The BodyView of one body in a state."""
+    motion, known = work.motion, scene.bodies
+    return BodyView(
+        time,
+        motion[state, body, 0], motion[state, body, 1], motion[state, body, 2],
+        motion[state, body, 3], motion[state, body, 4], motion[state, body, 5],
+        known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
+        known[body, EQUIVALENT_RADIUS],
+    )  # fmt: skip
+
+
+def effective_mass(scene, a, b):
+    """M = m_a m_b/(m_a + m_b) [kg]; the mass of the free one where the other is fixed."""
+    if scene.bodies[a, FREE] == 0.0:
+        return scene.bodies[b, MASS]
+    if scene.bodies[b, FREE] == 0.0:
+        return scene.bodies[a, MASS]
+    mass_a, mass_b = scene.bodies[a, MASS], scene.bodies[b, MASS]
+    return mass_a * mass_b / (mass_a + mass_b)
+
+
+def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
+    """The PairView of two bodies."""
+    radius_a = scene.bodies[a, EQUIVALENT_RADIUS]
+    radius_b = scene.bodies[b, EQUIVALENT_RADIUS]
+    return PairView(
+        time, gap, gap_rate, centre_distance, radius_a, radius_b,
+        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
+    )  # fmt: skip
+
+
+def normal_rate(work, state, row):
+    """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    g, motion = work.geometry, work.motion
+    rate = g[state, row, 0] * (motion[state, a, 3] - motion[state, b, 3])
+    rate += g[state, row, 1] * (motion[state, a, 4] - motion[state, b, 4])
+    return rate + motion[state, a, 5] * g[state, row, 3] - motion[state, b, 5] * g[state, row, 5]
+
+
+def tangential_rate(work, state, row):
+    """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    g, motion = work.geometry, work.motion
+    rate = g[state, row, 0] * (motion[state, a, 4] - motion[state, b, 4])
+    rate -= g[state, row, 1] * (motion[state, a, 3] - motion[state, b, 3])
+    return rate + motion[state, a, 5] * g[state, row, 4] - motion[state, b, 5] * g[state, row, 6]
+
+
+def contact_view(scene, work, state, row):
+    """The ContactView of a listed pair in a state."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    return ContactView(
+        -work.geometry[state, row, 2], -normal_rate(work, state, row),
+        work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
+        scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
+    )  # fmt: skip
+
+
+def pressed_view(view, overlap, overlap_rate):
+    """The ContactView of the same contact pressed so far and so fast, without any slip."""
+    return ContactView(
+        overlap, overlap_rate, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
+    )
+
+
+def inertia(scene, body, axis):
+    """Mass [kg], or moment of inertia [kg m²] for axis 2."""
+    return scene.bodies[body, INERTIA] if axis == 2 else scene.bodies[body, MASS]
+
+
+def lever(scene, body, axis):
+    """How far the outline moves for a unit of a coordinate: 1, or the bounding radius [m/rad]."""
+    return scene.bodies[body, BOUNDING_RADIUS] if axis == 2 else 1.0
+
+
+def add_force(work, rate, body, fx, fy, torque):
+    """Add to the force and torque on a body at a stage."""
+    work.rates[rate, body, 3] += fx
+    work.rates[rate, body, 4] += fy
+    work.rates[rate, body, 5] += torque
+
+
+def push_pair(work, state, rate, row, normal, tangential):
+    """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    g = work.geometry
+    fx = normal * g[state, row, 0] - tangential * g[state, row, 1]
+    fy = normal * g[state, row, 1] + tangential * g[state, row, 0]
+    torque_a = normal * g[state, row, 3] + tangential * g[state, row, 4]
+    torque_b = normal * g[state, row, 5] + tangential * g[state, row, 6]
+    add_force(work, rate, a, fx, fy, torque_a)
+    add_force(work, rate, b, -fx, -fy, -torque_b)
+
+
+def closest_rows(work, state, row):
+    """(end of the run of rows that belong to the same two bodies, row with the smallest gap)."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    closest = row
+    end = row
+    while end < work.tally[CANDIDATES]:
+        c, d = work.candidates[end, 0], work.candidates[end, 2]
+        if not ((c == a and d == b) or (c == b and d == a)):
+            break
+        if work.geometry[state, end, 2] < work.geometry[state, closest, 2]:
+            closest = end
+        end += 1
+    return end, closest
+
+
+def centre_line(work, state, a, b):
+    """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
+    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
+    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance == 0.0:
+        return 0.0, 1.0, 0.0
+    return dx / distance, dy / distance, distance
+
+
+def centre_view(scene, work, time, state, a, b):
+    """The PairView of two bodies, their gap being that of the equivalent spheres."""
+    nx, ny, distance = centre_line(work, state, a, b)
+    motion = work.motion
+    rate = nx * (motion[state, a, 3] - motion[state, b, 3])
+    rate += ny * (motion[state, a, 4] - motion[state, b, 4])
+    gap = distance - scene.bodies[a, EQUIVALENT_RADIUS] - scene.bodies[b, EQUIVALENT_RADIUS]
+    return pair_view(scene, time, a, b, gap, rate, distance)
+
+
+def surface_view(scene, work, time, state, row):
+    """The PairView of the two bodies of a listed pair, their gap being the pair's."""
+    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    _, _, distance = centre_line(work, state, a, b)
+    rate = normal_rate(work, state, row)
+    return pair_view(scene, time, a, b, work.geometry[state, row, 2], rate, distance)

@@ -1,0 +1,1 @@
+"""Pictures to masks: reading, background, threshold, regions, flocs that touch.  scikit-image."""

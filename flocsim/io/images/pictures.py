@@ -1,0 +1,154 @@
+"""Pictures → flocs: the image processing of the paper's section 2.1, made fit for uneven light."""
+
+import attrs
+import numpy as np
+
+from flocsim.errors import ImageError, UsageError
+from flocsim.io.images.background import (
+    light_surface,
+    low_pass,
+    noise_deviation,
+    smooth_surface,
+)
+from flocsim.io.images.reading import read_grey
+from flocsim.io.images.regions import Filters, Region, Rejection, filled, find_regions
+from flocsim.io.images.threshold import find_threshold
+
+__all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
+
+UNLIT = 0.04
+"""Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
+
+COARSE = 4
+"""Every fourth pixel tells whether flocs are dark or bright."""
+
+
+@attrs.frozen(eq=False)
+class Segmentation:
+    """What `segment` found.
+
+    foreground: (h, w) bool, everything past the threshold, holes filled, rejected regions too;
+    regions: the flocs; rejected: the others; flocs: "bright" or "dark"; threshold: the contrast,
+    against the background, that separates the two (0 = background, 1 = full range).
+    """
+
+    foreground: np.ndarray
+    regions: tuple
+    rejected: tuple
+    flocs: str
+    threshold: float
+
+    @property
+    def foreground_share(self):
+        """Share of the picture's pixels that are foreground [-]."""
+        return float(self.foreground.mean())
+
+    def rejected_by_reason(self):
+        """{reason: number of regions}, reasons in alphabetical order."""
+        reasons = [rejection.reason for rejection in self.rejected]
+        return {reason: reasons.count(reason) for reason in sorted(set(reasons))}
+
+
+def segment(
+    grey,
+    *,
+    flocs="auto",
+    noise_scale=1.0,
+    background_degree=6,
+    background=None,
+    saturated=0.001,
+    min_radius=4.0,
+    max_radius=np.inf,
+    max_blur=0.4,
+    neck=0.5,
+):
+    """Separate the flocs of a grey picture from its background.
+
+    In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
+    space, and of the background; contrast stretch between two thresholds, the median and the top
+    `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
+    (image_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
+    bright flocs: contrast = grey − background.
+
+    Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of
+    the smaller part (0: never).  Rejected are those that touch the border, with r_eq = √(area/π)
+    below `min_radius` or above `max_radius` [px], or whose edge is softer than `max_blur`·r_eq
+    (out of focus; inf: none).
+
+    grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast);
+    background: (h, w), for example the median of many frames, or None for a polynomial surface of
+    `background_degree`.  Returns a Segmentation; no floc is no error.  Raises ImageError for an
+    array that is no picture, UsageError for a wrong option.
+    """
+    grey = _checked(grey)
+    filters = Filters(min_radius, max_radius, max_blur, neck)
+    _check_options(flocs, noise_scale, background_degree, saturated, filters)
+    smooth = low_pass(grey, noise_scale)
+    light = None if background is None else low_pass(_matching(background, grey), noise_scale)
+    if flocs == "auto":
+        flocs = _guess_polarity(smooth, light)
+    contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
+    threshold = find_threshold(contrast, noise, saturated)
+    foreground = filled(contrast > threshold)
+    regions, rejected = find_regions(foreground, contrast, filters)
+    return Segmentation(foreground, regions, rejected, flocs, threshold)
+
+
+def _checked(grey):
+    grey = np.asarray(grey, dtype=float)
+    if grey.ndim != 2 or grey.size == 0 or not np.all(np.isfinite(grey)):
+        raise ImageError(
+            f"a picture is a filled (h, w) array of finite numbers, found shape {grey.shape}"
+        )
+    return grey
+
+
+def _matching(background, grey):
+    background = _checked(background)
+    if background.shape != grey.shape:
+        raise ImageError(
+            f"the background's shape {background.shape} is not the picture's {grey.shape}; "
+            "make it from frames of the same size"
+        )
+    return background
+
+
+def _check_options(flocs, noise_scale, background_degree, saturated, filters):
+    allowed = [
+        (flocs in ("auto", "bright", "dark"), "flocs", flocs, "'auto', 'bright' or 'dark'"),
+        (0 <= noise_scale < np.inf, "noise_scale", noise_scale, "at least 0 px"),
+        (background_degree in range(13), "background_degree", background_degree, "0 to 12"),
+        (0 <= saturated < 1, "saturated", saturated, "a share from 0 to below 1"),
+        (0 <= filters.min_radius < np.inf, "min_radius", filters.min_radius, "at least 0 px"),
+        (filters.max_radius > 0, "max_radius", filters.max_radius, "above 0 px"),
+        (filters.max_blur > 0, "max_blur", filters.max_blur, "a share of r_eq above 0"),
+        (0 <= filters.neck <= 1, "neck", filters.neck, "a share from 0 to 1"),
+    ]
+    for right, name, found, wanted in allowed:
+        if not right:
+            raise UsageError(f"{name} must be {wanted}, found {found!r}")
+
+
+def _guess_polarity(smooth, light):
+    """The side of the contrast's longer tail."""
+    coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
+    step = COARSE if coarse is not smooth else 1
+    surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
+    residual = coarse - surface
+    skewness = np.mean((residual - np.median(residual)) ** 3)
+    return "dark" if skewness < 0 else "bright"
+
+
+def _contrast(grey, smooth, light, flocs, noise_scale, degree):
+    """Contrast against the background, and the standard deviation of its noise."""
+    # White noise of deviation s is left with s/(2√π·scale) by the low pass, and the part that is
+    # taken out has nearly all of s.
+    left_over = 1.0 / max(2.0 * np.sqrt(np.pi) * noise_scale, 1.0)
+    if flocs == "bright":
+        surface = smooth_surface(smooth, degree) if light is None else light
+        return smooth - surface, left_over * noise_deviation(grey - smooth)
+    light = light_surface(smooth, degree) if light is None else light
+    floor = max(UNLIT * light.max(), np.finfo(float).tiny)
+    lit = np.maximum(light, floor)
+    contrast = np.where(light > floor, 1.0 - smooth / lit, 0.0)
+    return contrast, left_over * noise_deviation((grey - smooth) / lit)

@@ -1,0 +1,142 @@
+"""From a foreground to flocs: holes, labels, filters, focus; every region left out has a reason."""
+
+import attrs
+import numpy as np
+
+from flocsim.io.images.touching import split_touching
+
+EIGHT = np.ones((3, 3), int)
+"""Diagonal pixels belong together."""
+
+SHARP = 3.0
+"""An edge this soft [px] can be the lens and the pixels alone: no floc is left out for it."""
+
+
+@attrs.frozen(eq=False)
+class Region:
+    """One floc: 8-connected, holes filled.
+
+    label: number in the picture, counted from 1 from the top row down; centroid: (x, y) [px],
+    x right and y *down*, the first pixel's centre at (0, 0); bbox: (top, left, bottom, right)
+    [px], bottom and right exclusive; area [px]; equivalent_radius = √(area/π) [px]; mask: bool
+    array of the bbox widened by one pixel on every side; blur: softness of its edge [px]
+    (`blur_of`), NaN for a mask that came without a picture.
+    """
+
+    label: int
+    centroid: tuple
+    bbox: tuple
+    area: int
+    equivalent_radius: float
+    mask: np.ndarray
+    blur: float = float("nan")
+
+
+@attrs.frozen
+class Rejection:
+    """A region left out: centroid (x, y) [px, y down], area [px], radius [px], reason, blur."""
+
+    centroid: tuple
+    area: int
+    equivalent_radius: float
+    reason: str
+    blur: float = float("nan")
+
+
+@attrs.frozen
+class Filters:
+    """What a region must meet: radii [px], share of r_eq that its edge may be soft, the border.
+
+    neck: share of the smaller part's width up to which a neck parts two flocs, 0 for never.
+    """
+
+    min_radius: float = 4.0
+    max_radius: float = np.inf
+    max_blur: float = 0.4
+    neck: float = 0.5
+    clear_of_border: bool = True
+
+
+def filled(foreground):
+    """The foreground with its holes filled: background that no way leads to from the border."""
+    from scipy.ndimage import label
+
+    outside = label(np.pad(~foreground, 1, constant_values=True))[0]
+    return (outside != outside[0, 0])[1:-1, 1:-1]
+
+
+def find_regions(foreground, contrast, filters):
+    """(Regions, Rejections) of a bool array; `contrast`, of its shape, tells how sharp they are."""
+    from scipy.ndimage import find_objects, label
+
+    labels, count = label(foreground, EIGHT)
+    if filters.neck > 0:
+        count = split_touching(labels, find_objects(labels), filters.neck, filters.min_radius)
+    boxes = list(enumerate(find_objects(labels, count), start=1))
+    boxes.sort(key=lambda found: (found[1][0].start, found[1][1].start))
+    return sorted_out([(labels[box] == number, box) for number, box in boxes], contrast, filters)
+
+
+def sorted_out(masks, contrast, filters):
+    """(Regions, Rejections) of pairs (bool array, its box in the picture)."""
+    accepted, rejected = [], []
+    shape = None if contrast is None else contrast.shape
+    for mask, box in masks:
+        blur = float("nan") if contrast is None else blur_of(mask, box, contrast)
+        size = int(mask.sum()), float(np.sqrt(mask.sum() / np.pi))
+        reason = reason_to_reject(box, shape, size[1], blur, filters)
+        if reason:
+            rejected.append(Rejection(centroid_of(mask, box), *size, reason, blur))
+        else:
+            number = len(accepted) + 1
+            bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
+            accepted.append(
+                Region(number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
+            )
+    return tuple(accepted), tuple(rejected)
+
+
+def reason_to_reject(box, shape, radius, blur, filters):
+    """Why a region is no floc to measure, None if it is one."""
+    if radius < filters.min_radius:
+        return "too small"
+    if radius > filters.max_radius:
+        return "too large"
+    if filters.clear_of_border and touches_border(box, shape):
+        return "at the border"
+    if blur > max(SHARP, filters.max_blur * radius):
+        return "out of focus"
+    return None
+
+
+def touches_border(box, shape):
+    """Whether a box reaches the rim of a picture of this shape."""
+    return any(side.start == 0 or side.stop == size for side, size in zip(box, shape, strict=True))
+
+
+def centroid_of(mask, box):
+    """(x, y) [px] of a mask that lies in a box of the picture."""
+    rows, columns = np.nonzero(mask)
+    return float(columns.mean() + box[1].start), float(rows.mean() + box[0].start)
+
+
+def blur_of(mask, box, contrast):
+    """Softness of a region's edge [px]: contrast / (√(2π) · gradient at the outline).
+
+    The deviation σ of the Gaussian that would make a step as soft as the mean edge is; contrast is
+    the 90th percentile in the region.  A floc in focus has a few pixels, whatever its size.
+    """
+    from scipy.ndimage import binary_erosion
+
+    wide = tuple(
+        slice(max(side.start - 1, 0), min(side.stop + 1, size))
+        for side, size in zip(box, contrast.shape, strict=True)
+    )
+    near = contrast[wide]
+    if min(near.shape) < 2:
+        return 0.0
+    top, left = (side.start - out.start for side, out in zip(box, wide, strict=True))
+    edge = mask & ~binary_erosion(mask)
+    slope = np.hypot(*np.gradient(near))[top:, left:][: mask.shape[0], : mask.shape[1]][edge].mean()
+    inside = np.quantile(contrast[box][mask], 0.9)
+    return float(inside / max(np.sqrt(2.0 * np.pi) * slope, 1e-12))

@@ -1,0 +1,1 @@
+"""All figures.  The one room that loads matplotlib."""

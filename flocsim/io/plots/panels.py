@@ -1,0 +1,230 @@
+"""The paper's figures of probabilities against the number of vertices, from a `Results`."""
+
+import numpy as np
+
+from flocsim.io.confidence import clustered_proportion, proportion
+from flocsim.io.plots.style import (
+    CLASS_COLOURS,
+    CROWDED,
+    MARKERS,
+    dodge,
+    graded_colours,
+    house_style,
+    new_figure,
+    plain,
+    set_probability_axis,
+    set_vertex_axis,
+    type_title,
+    vertex_positions,
+)
+from flocsim.io.results.file import CLASSES
+
+PANELS_PER_ROW = 3
+PANEL_SIZE = (2.35, 2.15)
+LEGEND_WIDTH = 1.15
+LEGEND_ROWS = 9
+BARS = "\n(bars: 95 %)"
+CLASS_WORDS = {
+    "A": "A  inside, aggregated",
+    "B": "B  inside, departed",
+    "C": "C  outside, aggregated",
+    "D": "D  outside, departed",
+}
+LABELS = {
+    "pr_inside": r"$\Pr[C(d_c<D_0)]$",
+    "pr_a_given_inside": r"$\Pr[A\mid C(d_c<D_0)]$",
+    "pr_a_given_outside": r"$\Pr[A\mid C(d_c\geq D_0)]$",
+    "pr_a": r"$\Pr[A]$",
+    "classes": "probability of class",
+}
+NO_EVENTS = {
+    "pr_inside": "no collision",
+    "pr_a_given_inside": "no decided collision\ninside the zone",
+    "pr_a_given_outside": "no decided collision\noutside the zone",
+    "pr_a": "no decided collision",
+    "classes": "no decided collision",
+}
+
+
+def figure_4(results):
+    """Fig. 4: probability that a collision happens inside the attraction zone."""
+    return probability_figure(results, "pr_inside")
+
+
+def figure_5(results):
+    """Fig. 5: probability of aggregation after a collision inside the zone."""
+    return probability_figure(results, "pr_a_given_inside")
+
+
+def figure_6(results):
+    """Fig. 6: probability of aggregation after a collision outside the zone."""
+    return probability_figure(results, "pr_a_given_outside")
+
+
+def probability_figure(results, name):
+    """One panel per type, one line per delta, bars for the 95 % intervals, against N."""
+    with house_style():
+        figure, panels = panel_grid(len(results.types))
+        for number, axes in enumerate(panels):
+            draw_probability(axes, results, number, name)
+            axes.set_title(type_title(number, results.types[number]))
+        label_outer(panels, LABELS[name])
+        add_delta_legend(row_end(panels), results.delta)
+        return figure
+
+
+def figure_8(results):
+    """Fig. 8: probability of the classes A–D, the counts of all delta pooled, against N.
+
+    A replicate has the same flocs and orientations at all delta: a cluster, for the intervals.
+    """
+    with house_style():
+        figure, panels = panel_grid(len(results.types), legend_width=1.75)
+        for number, axes in enumerate(panels):
+            draw_classes(axes, results, number)
+            axes.set_title(type_title(number, results.types[number]))
+        label_outer(panels, LABELS["classes"])
+        add_class_legend(row_end(panels))
+        return figure
+
+
+def overview(results):
+    """All in one: zone, aggregation and classes (rows) of every type (columns)."""
+    rows = ("pr_inside", "pr_a", "classes")
+    with house_style():
+        count = len(results.types)
+        figure = new_figure(2.1 * count + 1.9, 5.4)
+        grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
+        for number in range(count):
+            for axes, name in zip(grid[:2, number], rows[:2], strict=True):
+                draw_probability(axes, results, number, name)
+            draw_classes(grid[2, number], results, number)
+            grid[0, number].set_title(type_title(number, results.types[number]))
+            grid[2, number].set_xlabel("vertices $N$")
+        for axes, name in zip(grid[:, 0], rows, strict=True):
+            axes.set_ylabel(LABELS[name])
+        add_delta_legend(grid[0, -1], results.delta)
+        add_class_legend(grid[2, -1])
+        return figure
+
+
+def panel_grid(count, legend_width=LEGEND_WIDTH):
+    """A figure with ``count`` equal panels, at most three a row, and room for a legend."""
+    columns = min(count, PANELS_PER_ROW)
+    rows = -(-count // PANELS_PER_ROW)
+    figure = new_figure(PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes in grid[count:]:
+        axes.set_visible(False)
+    for axes in grid[max(count - columns, 0) : count]:
+        axes.xaxis.set_tick_params(labelbottom=True)
+        axes.set_xlabel("vertices $N$")
+    return figure, list(grid[:count])
+
+
+def row_end(panels):
+    """The last panel of the first row."""
+    return panels[:PANELS_PER_ROW][-1]
+
+
+def label_outer(panels, label):
+    """The quantity's name at the first panel of every row."""
+    for axes in panels[::PANELS_PER_ROW]:
+        axes.set_ylabel(label)
+
+
+def draw_probability(axes, results, number, name):
+    """The lines of one type, one per delta; says so where there is nothing to show."""
+    bands = [results.probabilities[name + end][number] for end in ("", "_low", "_high")]
+    set_vertex_axis(axes, results.vertices)
+    set_probability_axis(axes)
+    colours = graded_colours(results.delta.size)
+    for index, colour in enumerate(colours[: results.delta.size]):
+        shift = dodge(index, results.delta.size)
+        style = line_style(colour, index, bands[0].size)
+        draw_line(axes, results.vertices, [band[:, index] for band in bands], shift, style)
+    note_if_empty(axes, bands[0], NO_EVENTS[name])
+
+
+def draw_classes(axes, results, number):
+    """The four classes of one type, counts pooled over delta."""
+    bands = class_bands(results, number)
+    set_vertex_axis(axes, results.vertices)
+    set_probability_axis(axes)
+    for index, name in enumerate(CLASSES):
+        style = line_style(CLASS_COLOURS[name], index, bands[0].size)
+        shift = dodge(index, len(CLASSES))
+        draw_line(axes, results.vertices, [band[:, index] for band in bands], shift, style)
+    note_if_empty(axes, bands[0], NO_EVENTS["classes"])
+
+
+def class_bands(results, number):
+    """(share, low, high) (vertices, class) of one type; Wilson's without the replicates."""
+    if results.replicates is None:
+        counts = results.probabilities["n_class"][number].sum(axis=1)
+        return proportion(counts, counts.sum(axis=1, keepdims=True))
+    outcome = results.replicates["outcome"][number]
+    m = (outcome < len(CLASSES)).sum(axis=1, dtype=float)[:, None]
+    s = np.stack([(outcome == code).sum(axis=1) for code in range(len(CLASSES))], axis=1)
+    terms = np.broadcast_arrays(s, m, s * s, s * m, m * m, m > 0.0)
+    return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
+
+
+def line_style(colour, index, points):
+    """Colour and marker of a line, finer in a panel of many points."""
+    size, width = (2.2, 0.8) if points > CROWDED else (4.0, 1.2)
+    marker = MARKERS[index % len(MARKERS)]
+    return {"color": colour, "marker": marker, "ms": size, "lw": width, "elinewidth": 0.6 * width}
+
+
+def draw_line(axes, vertices, bands, shift, style):
+    """Points with interval bars, joined in the order of N."""
+    order = np.argsort(vertices)
+    places = vertex_positions(vertices)[order] + shift
+    value, low, high = (np.asarray(band)[order] for band in bands)
+    reach = np.clip([value - low, high - value], 0.0, None)
+    axes.errorbar(places, value, reach, capsize=0, clip_on=False, **style)
+
+
+def note_if_empty(axes, values, text):
+    """An empty panel says why it is empty."""
+    if not np.any(np.isfinite(values)):
+        place = {"ha": "center", "va": "center", "transform": axes.transAxes}
+        axes.text(0.5, 0.5, text, color="0.4", **place)
+
+
+def add_delta_legend(axes, delta):
+    """The displacements, beside the panels they belong to."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=f"{share:g}")
+        for index, (share, colour) in enumerate(
+            zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
+        )
+    ]
+    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS)
+
+
+def add_class_legend(axes):
+    """What the four classes mean, beside the panels they belong to."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=CLASS_COLOURS[name], marker=MARKERS[index], label=plain(words))
+        for index, (name, words) in enumerate(CLASS_WORDS.items())
+    ]
+    place_legend(axes, handles, "class" + BARS)
+
+
+def place_legend(axes, handles, title):
+    """A legend outside, to the right of ``axes``."""
+    axes.legend(
+        handles=handles,
+        title=title,
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        borderaxespad=0.0,
+        ncols=-(-len(handles) // LEGEND_ROWS),
+        alignment="left",
+    )

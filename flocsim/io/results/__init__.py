@@ -1,0 +1,1 @@
+"""The results file of an ensemble: its schema, its layout in HDF5, reading and writing."""

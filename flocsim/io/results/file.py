@@ -1,0 +1,148 @@
+"""The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
+
+Layout (schema version 2). Every group holds its own coordinates as dimension scales, and every
+dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_meanings``:
+
+- ``probabilities``  (type, vertices, delta[, class]): counts, probabilities, ``_low``, ``_high``
+- ``pooled``         (type, vertices): probabilities over all displacements
+- ``differences``    (against, event, type, vertices, delta): between conditions, replicates paired
+- ``replicates``     (type, vertices, delta, replicate): what became of every single collision
+- ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
+- ``run``            scalars: config text, versions, machine, wall times
+
+All that may differ between two runs of one config is in ``run``, so `same_data` can compare the
+rest byte for byte. The file ends in a checksum behind the HDF5 data (see `flocsim.io.files`), is
+checked before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.layout`).
+"""
+
+import contextlib
+
+import numpy as np
+
+from flocsim.errors import FileError, UsageError
+from flocsim.io.files import checked_sealed, replace_by_blocks
+from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION, frame_of, numbers
+from flocsim.io.results.schema import (
+    CLASSES,
+    DIFFERENCES,
+    NOT_APPLICABLE,
+    OUTCOMES,
+    POOLED,
+    REPLICATES,
+    TABLE,
+    Results,
+)
+
+__all__ = [
+    "CLASSES",
+    "NOT_APPLICABLE",
+    "OUTCOMES",
+    "REPLICATES",
+    "TABLE",
+    "Results",
+    "read_results",
+    "same_data",
+    "write_results",
+]
+
+
+def write_results(path, results, columns=None):
+    """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
+
+    ``columns(name)`` gives the values of a column of the table of replicates as an iterator of
+    bytes, in the order of the file: for tables larger than the memory. Without it, they are taken
+    from ``results.replicates``.
+    """
+    columns = columns or (lambda name: [little_endian(results.replicates[name])])
+    frame = frame_of(results)
+    streams = [
+        (offset, length, numbers(results.count) if name == "replicate" else columns(name))
+        for offset, length, name in frame.streams
+    ]
+    replace_by_blocks(path, frame.image.length, frame.image.blocks(streams))
+
+
+def little_endian(array):
+    """The bytes of an array as they stand in the file."""
+    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
+
+
+def read_results(path, replicates=True):
+    """The Results in a file; FileError if it is absent, damaged, of another kind or version.
+
+    With ``replicates=False`` the table of replicates, which may be larger than the memory, stays
+    on the disk.
+    """
+    with opened(path) as file:
+        table, rows = file["probabilities"], file["replicates"]
+        return Results(
+            types=table["type"].asstr()[()],
+            vertices=table["vertices"][()],
+            delta=table["delta"][()],
+            replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
+            probabilities={name: table[name][()] for name in TABLE},
+            run={name: read_scalar(dataset) for name, dataset in file["run"].items()},
+            failures=rows["failure"].attrs["flag_meanings"].split(),
+            flocs=file["flocs/floc"].asstr()[()] if "flocs" in file else (),
+            pooled=read_group(file, "pooled", POOLED),
+            differences=read_group(file, "differences", DIFFERENCES),
+            count=len(rows["replicate"]),
+        )
+
+
+def read_group(file, name, schema):
+    """The arrays of a group that a file may lack."""
+    return {each: file[name][each][()] for each in schema} if name in file else {}
+
+
+def read_scalar(dataset):
+    """A number or a text."""
+    return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
+
+
+@contextlib.contextmanager
+def opened(path):
+    """An open h5py file of a known schema, once the checksum over all of it was found right."""
+    import h5py
+
+    with checked_sealed(path) as (data, _):
+        try:
+            with h5py.File(data, "r") as file:
+                check_schema(path, file.attrs)
+                yield file
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError) as error:
+            if isinstance(error, FileError):
+                raise
+            raise FileError(f"{path} holds no readable results: {error}; run it again") from error
+
+
+def check_schema(path, attributes):
+    """FileError unless the file is a results file of the version that this code knows."""
+    if attributes.get("format") != FORMAT:
+        raise FileError(f"{path} is not a results file: name one that flocsim ensemble wrote")
+    version = attributes.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise FileError(
+            f"{path} has results of schema version {version}, this flocsim reads "
+            f"{SCHEMA_VERSION}: read it with the version that wrote it"
+        )
+
+
+def same_data(path_a, path_b):
+    """Names of the datasets outside ``run`` whose bytes differ.
+
+    Coordinates included; a dataset that only one file has differs. Empty when all agree.
+    """
+    with opened(path_a) as a, opened(path_b) as b:
+        names = {f"{group}/{name}" for file in (a, b) for group in file if group != "run"
+                 for name in file[group]}  # fmt: skip
+        return sorted(
+            n for n in names if n not in a or n not in b or content(a[n]) != content(b[n])
+        )
+
+
+def content(dataset):
+    """What must agree for two datasets to be the same: shape, type and bytes."""
+    values = dataset[()]
+    stored = values.tolist() if values.dtype.kind == "O" else values.tobytes()
+    return values.shape, str(values.dtype), stored

@@ -1,0 +1,146 @@
+"""How a results file is laid out: its groups, their coordinates, and where large values go."""
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.results.schema import (
+    AXES,
+    CLASSES,
+    COORDINATES,
+    DIFFERENCES,
+    EVENTS,
+    FLAGS,
+    POOLED,
+    REPLICATES,
+    TABLE,
+)
+from flocsim.io.results.sparse_image import SparseImage
+
+FORMAT = "flocsim results"
+SCHEMA_VERSION = 2
+BLOCK_ROWS = 65_536
+
+
+@attrs.define
+class Frame:
+    """A results file but for the values of its large datasets.
+
+    ``streams``: (offset in the file, length [bytes], name) of each of those.
+    """
+
+    image: SparseImage = attrs.Factory(SparseImage)
+    streams: list = attrs.Factory(list)
+
+
+def frame_of(results):
+    """The Frame of Results, the same bytes whenever the results are."""
+    import h5py
+
+    frame = Frame()
+    with h5py.File(frame.image, "w") as file:
+        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
+        study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
+        axes = (*AXES, "class")
+        write_group(file, "probabilities", results.probabilities, TABLE, axes,
+                    study | {"class": list(CLASSES)})  # fmt: skip
+        if results.pooled:
+            write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)
+        if results.differences:
+            axes = ("against", "event", *AXES)
+            more = {"against": list(AXES), "event": list(EVENTS)}
+            write_group(file, "differences", results.differences, DIFFERENCES, axes, study | more)
+        if results.flocs:
+            write_coordinate(file.create_group("flocs"), "floc", list(results.flocs))
+        frame.streams = reserve_replicates(file, study, results)
+        # Last, so that its length moves no byte of the groups before it.
+        write_run(file.create_group("run"), results.run)
+    return frame
+
+
+def write_group(file, name, arrays, schema, axes, coordinates):
+    """One group: its coordinates, then every array of its schema attached to them."""
+    group = file.create_group(name)
+    for axis in axes:
+        write_coordinate(group, axis, coordinates[axis])
+    for variable, about in schema.items():
+        describe(group.create_dataset(variable, data=arrays[variable]), about, group, axes)
+
+
+def describe(dataset, about, group, axes):
+    """Unit, meaning and coordinates of a dataset."""
+    _, unit, text = about
+    dataset.attrs.update({"units": unit, "long_name": text})
+    for number, axis in zip(range(dataset.ndim), axes, strict=False):
+        dataset.dims[number].attach_scale(group[axis])
+
+
+def reserve_replicates(file, study, results):
+    """The group of replicates, all but its values; where in the file they go."""
+    group = file.create_group("replicates")
+    for axis in AXES:
+        write_coordinate(group, axis, study[axis])
+    flags = FLAGS | {"failure": (tuple(range(len(results.failures))), results.failures)}
+    shape = (*results.shape, results.count)
+    scale = empty_dataset(group, "replicate", (results.count,), "i8")
+    scale.make_scale("replicate")
+    describe_scale(scale, "replicate")
+    datasets = [scale]
+    for name, about in REPLICATES.items():
+        dataset = empty_dataset(group, name, shape, about[0])
+        describe(dataset, about, group, (*AXES, "replicate"))
+        if name in flags:
+            values, meanings = flags[name]
+            dataset.attrs["flag_values"] = np.array(values, "u1")
+            dataset.attrs["flag_meanings"] = " ".join(meanings)
+        datasets.append(dataset)
+    file.flush()
+    return [place_of(dataset) for dataset in datasets if dataset.nbytes]
+
+
+def empty_dataset(group, name, shape, kind):
+    """A dataset with its place in the file, whose values HDF5 does not write."""
+    import h5py
+
+    plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plan.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plan.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    little = np.dtype(kind).newbyteorder("<")
+    return group.create_dataset(name, shape, little, dcpl=plan)
+
+
+def place_of(dataset):
+    """(offset, length, name) of a dataset's values."""
+    return dataset.id.get_offset(), dataset.nbytes, dataset.name.rsplit("/", 1)[1]
+
+
+def write_coordinate(group, axis, values):
+    """A dimension scale; words are stored as variable-length UTF-8."""
+    import h5py
+
+    words = isinstance(values, list)
+    scale = group.create_dataset(axis, data=values, dtype=h5py.string_dtype() if words else None)
+    scale.make_scale(axis)
+    describe_scale(scale, axis)
+
+
+def describe_scale(scale, axis):
+    """Unit and meaning of a coordinate."""
+    unit, text = COORDINATES[axis]
+    scale.attrs.update({"units": unit, "long_name": text})
+
+
+def write_run(group, run):
+    """Scalars: text, whole numbers and floats; anything else is refused."""
+    for name, value in run.items():
+        value = value.item() if isinstance(value, np.generic) else value
+        if not isinstance(value, str | int | float):
+            raise UsageError(f"run/{name} must be text or a number, found {value!r}")
+        # A bool would become an HDF5 enumeration, which few readers know.
+        group[name] = int(value) if isinstance(value, bool) else value
+
+
+def numbers(count):
+    """The bytes of 0, 1, … as they stand in the file, a block at a time."""
+    for first in range(0, count, BLOCK_ROWS):
+        yield np.arange(first, min(first + BLOCK_ROWS, count), dtype="<i8").tobytes()

@@ -1,0 +1,104 @@
+"""The page of all that a results file holds, from the schema itself.
+
+Write it anew with `python -m flocsim.io.results.page > docs/results.md`.
+"""
+
+from flocsim.io.results.layout import SCHEMA_VERSION
+from flocsim.io.results.schema import (
+    COORDINATES,
+    DIFFERENCES,
+    FLAGS,
+    POOLED,
+    REPLICATES,
+    TABLE,
+)
+
+INTRODUCTION = f"""\
+# The results file
+
+HDF5, schema version {SCHEMA_VERSION}; a reader refuses versions that it does not know. Every group
+holds its own coordinates as dimension scales, every dataset `units` and `long_name`, every code
+`flag_values` and `flag_meanings`:
+
+```python
+import xarray
+
+table = xarray.open_dataset("results.h5", group="probabilities", engine="h5netcdf")
+table["pr_a"].sel(type="I", vertices=64, delta=0.5)
+```
+
+The file ends in a blake2b-256 checksum behind the HDF5 data, where HDF5 ignores it; flocsim checks
+it before HDF5 parses anything. All that may differ between two runs of one config is in the group
+`run`: the bytes of every other dataset are the same for any number of ranks, after any number of
+interruptions. (This page is made from the schema by `python -m flocsim.io.results.page`.)
+"""
+
+GROUPS = (
+    ("probabilities", "(type, vertices, delta), `class` A to D last where the name has it. "
+     "`_low` and `_high` bound Wilson's 95 % interval; NaN where there was no event.", TABLE),
+    ("pooled", "(type, vertices): all displacements together. A replicate has the same "
+     "orientations at every displacement, so its collisions are correlated; the interval is "
+     "Wilson's at the number of independent events that they are worth.", POOLED),
+    ("differences", "(against, event, type, vertices, delta): each condition minus the first along "
+     "the axis `against` (so 0 there itself). The same replicates in both: Newcombe's paired "
+     "interval (method 10).", DIFFERENCES),
+    ("replicates", "(type, vertices, delta, replicate): every single collision. `flocsim "
+     "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again.", REPLICATES),
+)  # fmt: skip
+
+RUN = """\
+## run
+
+Scalars. `config` (the file's text), `overrides` (JSON: what the command line laid over it),
+`seed`, `preset`; `identity` (JSON: all that the rows follow from, which a resumed run compares);
+`kernel_fingerprint`; versions of flocsim, Python, numpy, numba and h5py; `platform`, `processor`,
+`hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `history` (JSON: date and
+command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];
+`failed` (JSON: up to 1000 failed replicates with reasons).
+
+## flocs
+
+`floc`: the names of the flocs, in the order of `replicates/floc_i` and `floc_j`.
+"""
+
+
+def results_page():
+    """The whole page as Markdown text."""
+    parts = [INTRODUCTION]
+    for name, text, schema in GROUPS:
+        parts += [f"## {name}\n", f"{text}\n", table(schema)]
+    return "\n".join([*parts, RUN, "## Coordinates\n", coordinates()])
+
+
+def rows_of(heading, rows):
+    """Rows of cells as a Markdown table."""
+    shown = [[cell.replace("|", "\\|") for cell in cells] for cells in rows]
+    lines = [heading, ["---"] * len(heading), *shown]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n"
+
+
+def table(schema):
+    """A Markdown table of one group; bounds go with what they bound."""
+    rows = []
+    for name, (kind, unit, text) in schema.items():
+        if not name.endswith(("_low", "_high")):
+            bounded = f"{name}_low" in schema
+            shown = f"`{name}`" + (", `_low`, `_high`" if bounded else "")
+            rows.append([shown, kind, unit, text + codes(name)])
+    return rows_of(["dataset", "type", "unit", "meaning"], rows)
+
+
+def codes(name):
+    """What the codes of a dataset mean."""
+    if name not in FLAGS:
+        return ""
+    return ": " + ", ".join(f"{value} {word}" for value, word in zip(*FLAGS[name], strict=True))
+
+
+def coordinates():
+    """A Markdown table of the coordinates."""
+    return rows_of(["axis", "meaning"], [[f"`{k}`", text] for k, (_, text) in COORDINATES.items()])
+
+
+if __name__ == "__main__":
+    print(results_page(), end="")

@@ -1,0 +1,182 @@
+"""What a results file holds: outcome codes, the table of its arrays, and the checked container.
+
+The file itself is written and read by `flocsim.io.results.file`, which offers these names too.
+"""
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+
+OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed")
+"""Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone."""
+CLASSES = OUTCOMES[:4]
+NOT_APPLICABLE = 255
+"""In ``inside`` and ``crossed_zone``: the outlines never touched."""
+
+AXES = ("type", "vertices", "delta")
+
+REPLICATES = {  # name: (dtype, units, long name)
+    "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
+    "angle_j": ("f8", "rad", "orientation drawn for the approaching body j"),
+    "outcome": ("u1", "1", "outcome of the approach"),
+    "inside": ("u1", "1", "centre distance below D_0 at the collision"),
+    "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
+    "d_c_collision": ("f8", "m", "centre distance at the collision"),
+    "d_c_max": ("f8", "m", "largest centre distance after the collision"),
+    "d_c_last": ("f8", "m", "last centre distance"),
+    "t_collision": ("f8", "s", "time of the collision"),
+    "t_end": ("f8", "s", "time of the decision"),
+    "steps": ("i8", "1", "accepted integrator steps"),
+    "rejected": ("i8", "1", "rejected integrator steps"),
+    "error": ("f8", "m", "sum of the estimated position errors"),
+    "failure": ("u1", "1", "reason of an undecided or failed outcome"),
+    "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
+    "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
+}
+ROW_SIZE = sum(np.dtype(kind).itemsize for kind, _, _ in REPLICATES.values())
+"""Bytes of one replicate."""
+
+COUNTS = {
+    "n_total": "replicates",
+    "n_missed": "replicates whose outlines never touched",
+    "n_undecided": "replicates that ran out of time or steps",
+    "n_failed": "replicates that ended in an error",
+    "n_collided": "replicates whose outlines touched",
+    "n_inside": "collisions inside the attraction zone",
+    "n_class": "collisions of each class",
+}
+PROBABILITIES = {
+    "pr_inside": "Pr[inside | collision]",
+    "pr_a_given_inside": "Pr[aggregation | decided collision inside]",
+    "pr_a_given_outside": "Pr[aggregation | decided collision outside]",
+    "pr_a": "Pr[aggregation | decided collision]",
+    "pr_class": "Pr[class | decided collision]",
+}
+BOUNDS = {"": "", "_low": ", lower 95 % bound", "_high": ", upper 95 % bound"}
+TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
+    name + suffix: ("f8", "1", text + bound)
+    for name, text in PROBABILITIES.items()
+    for suffix, bound in BOUNDS.items()
+}
+POOLED = {
+    name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
+    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+    for suffix, bound in BOUNDS.items()
+} | {
+    f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
+    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+}
+DIFFERENCES = {
+    "n_pairs": ("i8", "1", "replicates that count in both conditions"),
+    "difference": ("f8", "1", "probability here minus that in the condition compared with"),
+    "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
+    "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
+}
+EVENTS = ("inside", "aggregated")
+"""Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
+FLAGS = {
+    "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
+    "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
+    "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
+}
+COORDINATES = {
+    "type": ("1", "collision type or pair of equivalent radii (i/j)"),
+    "vertices": ("1", "vertices N of each body; 1 is the equivalent sphere"),
+    "delta": ("1", "horizontal displacement of the centres as a share of delta_max"),
+    "class": (
+        "1",
+        "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
+    ),
+    "replicate": ("1", "replicate index"),
+    "floc": ("1", "name of the floc"),
+    "against": ("1", "compared with the condition that comes first along this axis"),
+    "event": ("1", "inside: of all collisions; aggregated: of the decided ones"),
+}
+
+
+@attrs.frozen(eq=False)
+class Results:
+    """All that one ensemble found, checked for names, shapes and exact conversion.
+
+    ``types`` names; ``vertices`` N [-]; ``delta`` shares of delta_max [-]; ``replicates`` the
+    arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where they were left
+    on the disk, with their ``count`` then; ``probabilities`` those of `TABLE`, each (type,
+    vertices, delta), with ``class`` A–D last where the name has it; ``run`` plain scalars;
+    ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
+    a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
+    the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
+    event, type, vertices, delta), or nothing.
+    Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
+    """
+
+    types: tuple = attrs.field(converter=lambda names: tuple(str(name) for name in names))
+    vertices: np.ndarray = attrs.field(converter=lambda counts: exact(counts, "i8", "vertices"))
+    delta: np.ndarray = attrs.field(converter=lambda shares: exact(shares, "f8", "delta"))
+    replicates: dict | None
+    probabilities: dict
+    run: dict = attrs.field(factory=dict)
+    failures: tuple = attrs.field(
+        default=("none",), converter=lambda words: tuple("_".join(str(w).split()) for w in words)
+    )
+    flocs: tuple = attrs.field(default=(), converter=tuple)
+    pooled: dict = attrs.field(factory=dict)
+    differences: dict = attrs.field(factory=dict)
+    count: int | None = None
+
+    def __attrs_post_init__(self):
+        shape = self.shape
+        tails = {name: (len(CLASSES),) for name in TABLE if "class" in name}
+        shapes = {name: shape + tails.get(name, ()) for name in TABLE}
+        self.check("probabilities", TABLE, shapes)
+        if self.pooled:
+            self.check("pooled", POOLED, dict.fromkeys(POOLED, shape[:2]))
+        if self.differences:
+            wanted = (len(AXES), len(EVENTS), *shape)
+            self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
+        if self.replicates is not None:
+            self.check_replicates()
+
+    def check(self, group, schema, shapes):
+        """Replace a group's arrays by themselves in the schema's order and types."""
+        checked = checked_arrays(group, getattr(self, group), schema, shapes)
+        object.__setattr__(self, group, checked)
+
+    def check_replicates(self):
+        """The table of replicates fits the rest."""
+        tail = np.shape(self.replicates.get("outcome", ()))[3:4]
+        self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, self.shape + tail))
+        object.__setattr__(self, "count", tail[0])
+        if np.any(self.replicates["failure"] >= len(self.failures)):
+            raise UsageError("replicates/failure holds a code without a word in failures")
+
+    @property
+    def shape(self):
+        """Numbers of types, vertex counts and displacements."""
+        return len(self.types), self.vertices.size, self.delta.size
+
+
+def exact(values, dtype, name):
+    """``values`` as an array of ``dtype``; UsageError if a value would change."""
+    try:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):
+            converted = given.astype(dtype)
+        same = np.array_equal(given, converted, equal_nan=converted.dtype.kind == "f")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise UsageError(f"{name} must hold numbers of type {dtype}: {error}") from error
+    if not same:
+        raise UsageError(f"{name} holds values that do not fit the type {dtype}")
+    return converted
+
+
+def checked_arrays(group, arrays, schema, shapes):
+    """The arrays of a group in the schema's order and types."""
+    if set(arrays) != set(schema):
+        strange = ", ".join(sorted(set(arrays) ^ set(schema)))
+        raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
+    checked = {name: exact(arrays[name], schema[name][0], f"{group}/{name}") for name in schema}
+    for name, array in checked.items():
+        if array.shape != shapes[name]:
+            raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shapes[name]}")
+    return checked

@@ -1,0 +1,1 @@
+"""Shape libraries, and what a fit tells its user."""

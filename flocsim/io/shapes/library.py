@@ -1,0 +1,247 @@
+"""The shape library: flocs fitted at several numbers of vertices, in one HDF5 file.
+
+Layout, schema version 1; n flocs, in the order in which they were written:
+
+    /                       attributes: kind = "flocsim shape library", schema_version = 1,
+                            and what the fits were made with, as far as given: method, …
+    /flocs/id               (n) text, picture and region, e.g. "023.png#7"; of several
+                            spheroradii each has a row, e.g. "023.png#7 r=2"
+    /flocs/image            (n) text, the picture's file name
+    /flocs/pixel_size       (n) [m]
+    /flocs/centroid         (n, 2) [px] x right, y down, in the picture
+    /flocs/area             (n) [px], pixels of the mask
+    /flocs/equivalent_radius(n) [px], √(area/π)
+    /flocs/spheroradius     (n) [px], asked for
+    /fits/N/vertices        (n, N, 2) [m] x right, y up, origin at the floc's centroid
+    /fits/N/radius          (n) [m], spheroradius; for N = 1 the circle's radius
+    /fits/N/relative_error  (n) [%], paper eq. 2
+
+for every N, so that between conditions nothing changes but N.  Every dataset has the attributes
+`units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
+"""
+
+import io
+
+import attrs
+import numpy as np
+
+from flocsim.errors import FileError, UsageError
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.io.files import read_sealed, replace_file, seal
+
+KIND = "flocsim shape library"
+SCHEMA_VERSION = 1
+
+FLOC_COLUMNS = {
+    # name: (attribute of ShapeEntry, type, units, long name)
+    "id": ("floc_id", str, "", "picture and region"),
+    "image": ("image", str, "", "file name of the picture"),
+    "pixel_size": ("pixel_size", float, "m", "length of a pixel's side"),
+    "centroid": ("centroid", float, "px", "centroid in the picture, x right and y down"),
+    "area": ("area", np.int64, "px", "pixels of the mask"),
+    "equivalent_radius": ("equivalent_radius", float, "px", "radius of the circle of equal area"),
+    "spheroradius": ("spheroradius", float, "px", "spheroradius asked for"),
+}
+
+FIT_COLUMNS = {
+    "vertices": ("m", "vertices around the floc's centroid, x right and y up"),
+    "radius": ("m", "spheroradius"),
+    "relative_error": ("percent", "pixels that differ, in percent of the mask's pixels"),
+}
+
+
+@attrs.frozen(eq=False)
+class StoredFit:
+    """One fit: vertices (N, 2) [m] about the floc's centroid, y up; radius [m]; RE [%]."""
+
+    vertices: np.ndarray
+    radius: float
+    relative_error: float
+
+    @property
+    def shape(self):
+        """The Sphere (N = 1) or SpheroPolygon [m], around its own centroid."""
+        if len(self.vertices) == 1:
+            return Sphere(self.radius)
+        return SpheroPolygon(self.vertices, self.radius)
+
+
+@attrs.frozen(eq=False)
+class ShapeEntry:
+    """One floc: where it comes from, its size in the picture, and its fits {N: StoredFit}.
+
+    floc_id: text such as "023.png#7"; pixel_size [m]; centroid (x, y) [px, y down]; area [px];
+    equivalent_radius and spheroradius [px].
+    """
+
+    floc_id: str
+    image: str
+    pixel_size: float
+    centroid: tuple
+    area: int
+    equivalent_radius: float
+    spheroradius: float
+    fits: dict
+
+
+def make_entry(image, region, fits, pixel_size, spheroradius, name_radius=False):
+    """The ShapeEntry of a picture's region (flocsim.io.images.pictures) and its fits {N: Fit} [px].
+
+    name_radius: its id names the spheroradius, for libraries with several of one floc.
+    """
+    top, left = region.bbox[:2]
+    # The mask has a margin of one pixel, and y counts downwards there.
+    centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
+    stored = {
+        int(count): StoredFit(
+            (fit.vertices - centroid) * pixel_size, fit.radius * pixel_size, fit.relative_error
+        )
+        for count, fit in fits.items()
+    }
+    floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
+    return ShapeEntry(
+        floc_id, image, float(pixel_size), region.centroid, region.area,
+        region.equivalent_radius, float(spheroradius), stored,
+    )  # fmt: skip
+
+
+def write_library(path, entries, settings=None):
+    """Write entries (ShapeEntry, all with fits at the same N) to `path`, whole or not at all.
+
+    settings: {name: text or number}, what the fits were made with.
+
+    Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
+    written.
+    """
+    entries = list(entries)
+    _check_entries(entries)
+    replace_file(path, seal(_encode(entries, settings or {})))
+
+
+def _check_entries(entries):
+    if not entries:
+        raise UsageError("a shape library needs at least one floc, found none")
+    ids = [entry.floc_id for entry in entries]
+    repeated = next((name for name in ids if ids.count(name) > 1), None)
+    if repeated is not None:
+        raise UsageError(f"floc id {repeated!r} occurs twice: give every floc its own")
+    if len({tuple(sorted(entry.fits)) for entry in entries}) > 1 or not entries[0].fits:
+        raise UsageError("every floc of a library needs fits at the same numbers of vertices")
+
+
+def _encode(entries, settings):
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w", track_order=False) as file:
+        file.attrs["kind"] = KIND
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        file.attrs.update(settings)
+        _write_flocs(file.create_group("flocs"), entries)
+        for count in sorted(entries[0].fits):
+            fits = [entry.fits[count] for entry in entries]
+            _write_fits(file.create_group(f"fits/{count}"), fits)
+    return image.getvalue()
+
+
+def _write_flocs(group, entries):
+    import h5py
+
+    for name, (attribute, kind, units, long_name) in FLOC_COLUMNS.items():
+        values = [getattr(entry, attribute) for entry in entries]
+        kind = h5py.string_dtype() if kind is str else kind
+        _write(group, name, np.array(values, dtype=kind), units, long_name)
+
+
+def _write_fits(group, fits):
+    for name, (units, long_name) in FIT_COLUMNS.items():
+        values = np.array([getattr(fit, name) for fit in fits], dtype=float)
+        _write(group, name, values, units, long_name)
+
+
+def _write(group, name, values, units, long_name):
+    dataset = group.create_dataset(name, data=values, track_times=False)
+    dataset.attrs["units"] = units
+    dataset.attrs["long_name"] = long_name
+
+
+def is_library(path):
+    """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
+    import h5py
+
+    try:
+        with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
+            return file.attrs.get("kind") == KIND
+    except OSError:
+        return False
+
+
+def read_settings(path):
+    """{name: value} of what the fits of a shape library were made with."""
+    import h5py
+
+    with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
+        return {k: v for k, v in file.attrs.items() if k not in ("kind", "schema_version")}
+
+
+def read_library(path):
+    """The flocs of a shape library, a list of ShapeEntry in the order of writing.
+
+    Raises FileError for a file that is missing, damaged, of another kind or another version.
+    """
+    import h5py
+
+    content = read_sealed(path)
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            _check_kind(path, file.attrs)
+            return _decode(file)
+    except FileError:
+        raise
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError) as problem:
+        reason = " ".join(str(problem).split())
+        raise FileError(
+            f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
+        ) from problem
+
+
+def _check_kind(path, attributes):
+    kind, version = attributes.get("kind"), attributes.get("schema_version")
+    if kind != KIND:
+        raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
+    if version != SCHEMA_VERSION:
+        raise FileError(
+            f"{path} has schema version {version}, this flocsim reads {SCHEMA_VERSION}: "
+            "make it again with flocsim fit"
+        )
+
+
+def _decode(file):
+    flocs = {name: _read_column(file["flocs"][name], kind) for name, (_, kind, *_)
+             in FLOC_COLUMNS.items()}  # fmt: skip
+    fits = {
+        int(count): {name: group[name][()] for name in FIT_COLUMNS}
+        for count, group in file["fits"].items()
+    }
+    return [_entry(flocs, fits, row) for row in range(len(flocs["id"]))]
+
+
+def _read_column(dataset, kind):
+    if kind is str:
+        return [str(text) for text in dataset.asstr()[()]]
+    return dataset[()].tolist()
+
+
+def _entry(flocs, fits, row):
+    values = {attribute: flocs[name][row] for name, (attribute, *_) in FLOC_COLUMNS.items()}
+    values["centroid"] = tuple(values["centroid"])
+    stored = {count: _stored(columns, row, count) for count, columns in sorted(fits.items())}
+    return ShapeEntry(**values, fits=stored)
+
+
+def _stored(columns, row, count):
+    vertices = columns["vertices"][row]
+    if vertices.shape != (count, 2) or not np.isfinite(vertices).all():
+        raise ValueError(f"vertices of floc {row} at N = {count} have shape {vertices.shape}")
+    return StoredFit(vertices, float(columns["radius"][row]), float(columns["relative_error"][row]))

@@ -1,0 +1,138 @@
+"""The binary collision scene: starts, limits, records."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flocsim.arrays import NOW
+from flocsim.ensembles.collision import memo as memo_at
+from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, Record, run_encounter
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.io.results.schema import OUTCOMES
+from tests.helpers.small_study import small_study
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The small study."""
+    return small_study(tmp_path_factory.mktemp("study"))
+
+
+def test_bodies_start_at_their_terminal_velocities_without_spin(study):
+    encounter = study.encounter(0, 16, draws(1, 0))
+    motion = encounter.start((0.3, 2.0), 0.5).motion[NOW]
+    for body in range(2):
+        radius = encounter.shapes[body].equivalent_radius
+        mass = 2.0 * math.pi * radius**2
+        fall = mass * 9.81 / (6.0 * math.pi * 8.9e-4 * radius)
+        np.testing.assert_allclose(motion[body, 3:], [0.0, -fall, 0.0], rtol=1e-9)
+    assert motion[:, 2].tolist() == [0.3, 2.0]
+
+
+def test_the_bodies_have_the_sizes_of_their_type(study):
+    for condition, radii in enumerate([(16.41e-6, 23.02e-6), (4.62e-6, 4.95e-6)]):
+        for vertices in (1, 4, 16):
+            shapes = study.encounter(condition, vertices, draws(1, 1)).shapes
+            found = [shape.equivalent_radius for shape in shapes]
+            assert found == pytest.approx(radii, rel=1e-12)
+            assert [len(shape.vertices) for shape in shapes] == [vertices, vertices]
+            if vertices > 1:
+                assert [shape.radius for shape in shapes] == pytest.approx([1e-6] * 2, rel=1e-9)
+
+
+def test_automatic_times_are_turn_times(study):
+    encounter = study.encounter(0, 1, draws(1, 0))
+    drift = math.hypot(*encounter.drift)
+    turn = (16.41e-6 + 23.02e-6) / drift
+    assert encounter.turn_time == pytest.approx(turn)
+    assert encounter.memo()[memo_at.REST_TIME] == pytest.approx(REST_TURNS * turn)
+    assert encounter.time_limit() == pytest.approx(LIMIT_TURNS * turn + 2e-6 / drift)
+
+
+def test_times_and_gaps_that_are_given(tmp_path):
+    given = {"rest_time": 0.5, "time_limit": 3.0, "escape_gap": "7 um", "start_gap": "3 um"}
+    encounter = small_study(tmp_path, {"scene": given}).encounter(0, 1, draws(1, 0))
+    memo = encounter.memo()
+    assert encounter.time_limit() == 3.0
+    assert (memo[memo_at.REST_TIME], memo[memo_at.ESCAPE]) == (0.5, 7e-6)
+    places = encounter.start((0.0, 0.0), 0.0).motion[NOW, :, 1]
+    assert places[1] - places[0] == pytest.approx(16.41e-6 + 23.02e-6 + 3e-6, rel=1e-9)
+
+
+def same_row(row, other):
+    """Whether two rows agree to the bit."""
+    return all(np.array_equal(row[name], other[name], equal_nan=True) for name in row)
+
+
+def test_a_replicate_repeats_to_the_bit_in_any_order(study):
+    first = study.run(0, 16, 0.0, 2)
+    study.run(1, 4, 1.0, 1)
+    assert same_row(study.run(0, 16, 0.0, 2), first)
+
+
+def recorded(study, rows):
+    """(row, arrays) of one replicate, recorded ``rows`` at a time."""
+    record = Record(rows)
+    return study.run(0, 16, 0.0, 0, record), record.arrays()
+
+
+def test_recording_changes_nothing_and_pieces_make_the_whole(study):
+    silent = study.run(0, 16, 0.0, 0)
+    row, whole = recorded(study, 4096)
+    again, pieces = recorded(study, 7)
+    assert same_row(row, silent)
+    assert same_row(again, silent)
+    for one, other in zip(whole, pieces, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_record_holds_every_step_with_the_instant_of_the_collision(study):
+    row, (times, position, velocity) = recorded(study, 4096)
+    assert len(times) == row["steps"] + 1
+    assert times[0] == 0.0
+    assert np.all(np.diff(times) > 0.0)
+    assert times[-1] == row["t_end"]
+    assert row["t_collision"] in times
+    distance = np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+    assert distance[times == row["t_collision"]] == row["d_c_collision"]
+    assert distance[-1] == row["d_c_last"]
+    assert distance[times >= row["t_collision"]].max() == row["d_c_max"]
+    assert velocity.shape == position.shape
+
+
+def test_before_they_meet_both_only_settle(study):
+    _, (times, position, velocity) = recorded(study, 4096)
+    fall = study.encounter(0, 16, draws(1, 0)).settling[1][0][1]
+    # 2 um apart the forces along the centres are weak: the first step shows settling alone.
+    assert velocity[1, 1, 1] == pytest.approx(fall, rel=1e-2)
+    assert position[1, 1, 2] == pytest.approx(orientations(draws(1, 0))[1], abs=1e-6)
+    assert times[1] < 1e-4
+
+
+def test_a_finer_tolerance_finds_the_same_collision(tmp_path):
+    coarse, fine = (
+        small_study(tmp_path, {"integrator": {"tolerance": tolerance}}).run(0, 16, 0.0, 0)
+        for tolerance in ("1 nm", "0.01 nm")
+    )
+    assert coarse["d_c_collision"] == pytest.approx(fine["d_c_collision"], abs=2e-9)
+    assert coarse["t_collision"] == pytest.approx(fine["t_collision"], rel=1e-3)
+    assert coarse["steps"] < fine["steps"]
+
+
+def test_the_run_starts_anew_from_the_encounter_every_time(study):
+    numbers = draws(1, 0)
+    encounter = study.encounter(0, 16, numbers)
+    rows = [
+        run_encounter(encounter, study.driver(encounter), orientations(numbers), 0.0, 10**5)
+        for _ in range(2)
+    ]
+    assert same_row(*rows)
+
+
+def test_contacts_that_never_pull_come_to_an_end(tmp_path):
+    """Resting contacts hang at the kink of such a law, where steps could end for ever."""
+    study = small_study(tmp_path, {"forces": {"contact": {"tension": False}}})
+    rows = [study.run(0, 16, 0.0, replicate) for replicate in range(10)]
+    assert max(row["steps"] for row in rows) < 20_000
+    assert not any(OUTCOMES[row["outcome"]] == "undecided" for row in rows)

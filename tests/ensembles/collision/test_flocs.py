@@ -1,0 +1,105 @@
+"""The flocs of a study: grown or read, chosen by size, resized exactly."""
+
+import numpy as np
+import pytest
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.ensembles.collision.flocs import Floc, Wardrobe, load_flocs, nearest_in_ratio
+from flocsim.ensembles.config.schema import ShapesConfig
+from flocsim.errors import ConfigError, FileError
+from tests.helpers.small_study import grown, write_star_library
+
+
+def test_synthetic_flocs_follow_from_the_seed():
+    shapes = ShapesConfig(vertices=(1, 4), pool=2)
+    first, again, other = (load_flocs(shapes, seed) for seed in (7, 7, 8))
+    assert [floc.name for floc in first] == ["synthetic#0", "synthetic#1"]
+    for floc, same, different in zip(first, again, other, strict=True):
+        assert list(floc.shapes) == [4]
+        np.testing.assert_array_equal(floc.shapes[4].vertices, same.shapes[4].vertices)
+        assert not np.array_equal(floc.shapes[4].vertices, different.shapes[4].vertices)
+
+
+def test_a_larger_pool_keeps_the_flocs_of_a_smaller_one():
+    few, more = grown(1, (1, 4, 16), 2), load_flocs(ShapesConfig(vertices=(4,), pool=3), 1)
+    for floc, same in zip(few, more, strict=False):
+        np.testing.assert_array_equal(floc.shapes[4].vertices, same.shapes[4].vertices)
+
+
+@pytest.fixture
+def library(tmp_path):
+    """A library of three stars with N = 4 and 8."""
+    write_star_library(tmp_path / "stars.h5", vertices=(4, 8))
+    return tmp_path / "stars.h5"
+
+
+def from_library(path, vertices):
+    """The flocs of a library for these N."""
+    return load_flocs(ShapesConfig(source="library", file=path, vertices=vertices), 1)
+
+
+def test_flocs_of_a_library_have_their_size_in_spheroradii(library):
+    flocs = from_library(library, (1, 4))
+    assert [floc.name for floc in flocs] == ["star 8", "star 16", "star 24"]
+    assert [floc.ratio for floc in flocs] == [8.0, 16.0, 24.0]
+    assert all(list(floc.shapes) == [4] for floc in flocs)
+
+
+def test_a_library_that_lacks_a_number_of_vertices(library):
+    with pytest.raises(ConfigError, match=r"asks for N = 16, but .* holds N = 4, 8: fit again"):
+        from_library(library, (4, 16))
+
+
+def test_a_library_that_is_gone(tmp_path):
+    with pytest.raises(FileError, match="could not be read"):
+        from_library(tmp_path / "gone.h5", (4,))
+
+
+def flocs_of(ratios):
+    """Flocs of these ratios, without shapes."""
+    return [Floc(str(ratio), ratio, {}) for ratio in ratios]
+
+
+def test_the_nearest_in_ratio_come_first():
+    flocs = flocs_of([4.0, 16.0, 8.0, 16.0])
+    assert nearest_in_ratio(flocs, 16.0, 3) == [1, 3, 2]
+    # As a ratio: 8 is as far from 16 as 32 is.
+    assert nearest_in_ratio(flocs_of([32.1, 8.0]), 16.0, 1) == [1]
+    assert nearest_in_ratio(flocs, 5.0, 100) == [0, 2, 1, 3]
+
+
+def test_the_two_bodies_are_two_flocs_where_there_are_two():
+    wardrobe = Wardrobe(flocs_of([10.0] * 5), 1e-6, 5)
+    numbers = np.random.default_rng(0).random((500, 4))
+    chosen = [wardrobe.choose(each, 1e-5, 2e-5) for each in numbers]
+    assert all(first != second for first, second in chosen)
+    assert set(chosen) == {(a, b) for a in range(5) for b in range(5) if a != b}
+    assert wardrobe.choose([0.0, 0.0, 0.999999, 0.999999], 1e-5, 2e-5) == (4, 3)
+
+
+def test_a_pool_of_one_serves_both_bodies():
+    wardrobe = Wardrobe(flocs_of([10.0]), 1e-6, 5)
+    assert wardrobe.choose([0.5] * 4, 1e-5, 2e-5) == (0, 0)
+
+
+def test_each_body_draws_from_flocs_of_its_own_size(library):
+    wardrobe = Wardrobe(from_library(library, (4,)), 1e-6, 1)
+    assert wardrobe.choose([0.5] * 4, 7e-6, 25e-6) == (0, 2)
+
+
+@pytest.mark.parametrize("size", [2e-6, 4.62e-6, 16.41e-6, 23.02e-6, 1e-4])
+def test_shapes_are_resized_exactly_and_once(size):
+    wardrobe = Wardrobe(grown(1, (1, 4, 16), 2), 1e-6, 2)
+    for vertices in (4, 16):
+        shape = wardrobe.shape(0, vertices, size)
+        assert isinstance(shape, SpheroPolygon)
+        assert shape.equivalent_radius == pytest.approx(size, rel=1e-12)
+        assert shape.radius == pytest.approx(1e-6, rel=1e-9)
+        assert wardrobe.shape(0, vertices, size) is shape
+
+
+def test_the_sphere_is_the_same_whatever_the_floc():
+    wardrobe = Wardrobe([], 1e-6, 2)
+    sphere = wardrobe.shape(None, 1, 5e-6)
+    assert isinstance(sphere, Sphere)
+    assert wardrobe.shape(7, 1, 5e-6) is sphere

@@ -1,0 +1,283 @@
+"""What is decided stays decided, and what cannot be decided says so."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+from shapely.geometry import Polygon
+
+from flocsim import SpheroPolygon
+from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
+from flocsim.ensembles.collision import bonds, outcomes
+from flocsim.ensembles.collision import memo as memo_at
+from flocsim.ensembles.collision.encounter import make_encounter, run_encounter
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import largest_displacement, place_pair
+from flocsim.errors import UsageError
+from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.integrators.base import Status
+from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from tests.helpers.small_study import small_study
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The small study with all three types, and a displacement between the others."""
+    scene = {"types": ["I", "II", "III"], "delta": [0.0, 0.25, 0.5, 1.0, 1.5]}
+    return small_study(tmp_path_factory.mktemp("study"), {"scene": scene, "replicates": 10})
+
+
+def outcome(row):
+    """The outcome's word."""
+    return OUTCOMES[row["outcome"]]
+
+
+def test_spheres_always_aggregate_inside(study):
+    for condition in range(3):
+        for share in (0.0, 0.25, 0.5, 1.0):
+            assert outcome(study.run(condition, 1, share, 0)) == "A"
+
+
+@attrs.frozen(eq=False)
+class Continued:
+    """A replicate that was run on: the first decision and its time, the widest gap of listed pairs
+    from then on, the gap of the outlines at the end, and how the run ended."""
+
+    decision: int
+    decided_at: float
+    widest: float
+    last: float
+    status: Status
+
+
+def go_on(study, condition, vertices, share, replicate, factor=11.0):
+    """(the row as decided, the replicate run on for ``factor`` times as long)."""
+    row = study.run(condition, vertices, share, replicate)
+    numbers = draws(study.config.seed, replicate)
+    encounter = study.encounter(condition, vertices, numbers)
+    work, memo = encounter.start(orientations(numbers), share), encounter.memo()
+    integrator, driver = encounter.system.integrator, study.driver(encounter)
+    clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
+    clock[UNTIL] = factor * row["t_end"]
+    decisions, widest, status = [], -math.inf, Status.STOPPED
+    while status == Status.STOPPED:
+        # The observer stops the run behind every step once it has decided.
+        status = Status(driver(encounter.scene, work, memo, clock, counts, np.zeros((0, 13))))
+        if status == Status.STOPPED:
+            decisions.append((int(counts[CODE]), float(clock[TIME])))
+            widest = max(widest, least_listed_gap(work))
+    last = outline_gap(encounter.scene, work)
+    return row, Continued(*decisions[0], widest, last, status)
+
+
+def escape_gap(study):
+    """The escape gap [m]."""
+    return study.config.scene.start_gap
+
+
+@pytest.mark.parametrize("vertices", [1, 4, 16])
+@pytest.mark.parametrize("condition", [0, 2], ids=["type I", "type III"])
+def test_no_decision_is_overturned_in_ten_times_the_time(study, condition, vertices):
+    decisions = set()
+    for replicate in range(2 if vertices == 1 else 6):
+        for share in (0.0, 0.5):
+            row, on = go_on(study, condition, vertices, share, replicate)
+            decisions.add(outcome(row))
+            assert on.status == Status.FINISHED
+            # Decisions fall at the ends of steps, and a later end of the run changes the steps.
+            assert on.decided_at < 3.0 * row["t_end"]
+            if row["outcome"] in (0, 2):
+                assert on.decision == BOUND
+                assert on.widest <= 0.0
+            elif row["outcome"] in (1, 3):
+                assert on.decision == DEPARTED
+                # A turning floc may brush against the other once more as it goes.
+                assert on.last > escape_gap(study)
+    assert decisions & {"A", "B", "C", "D"}
+
+
+def test_all_kinds_of_decision_were_put_to_that_test(study):
+    rows = [study.run(condition, n, share, k) for condition in (0, 2) for n in (4, 16)
+            for share in (0.0, 0.5) for k in range(6)]  # fmt: skip
+    assert {outcome(row) for row in rows} >= {"A", "B", "D"}
+
+
+def mirrored(shape):
+    """The shape with left and right exchanged."""
+    return SpheroPolygon(shape.vertices * [-1.0, 1.0], shape.radius)
+
+
+class Placed:
+    """An encounter that starts at given places, for `run_encounter`."""
+
+    def __init__(self, encounter, places):
+        """The places (2, 3) [m, m, rad] to start at."""
+        self.encounter, self.places = encounter, places
+
+    def __getattr__(self, name):
+        return getattr(self.encounter, name)
+
+    def start(self, angles, share):
+        """Work arrays at the places, at terminal velocity."""
+        velocity = np.zeros((2, 3))
+        for body in range(2):
+            velocity[body, :2] = self.encounter.settling[body][0]
+        return work_of(self.encounter.scene, self.places, velocity)
+
+
+def start_places(encounter, angles, share):
+    """The places at which an encounter starts."""
+    i, j = encounter.shapes
+    largest = largest_displacement("projected", i, angles[0], j, angles[1])
+    return place_pair((i, j), angles, share * largest, encounter.options.start_gap)
+
+
+@pytest.mark.parametrize("condition", [0, 1, 2])
+@pytest.mark.parametrize("image", ["mirror", "full turn"])
+def test_the_same_scene_seen_otherwise_has_the_same_outcome(study, condition, image):
+    driver = study.driver(study.encounter(0, 4, draws(1, 0)))
+    for replicate in range(5):
+        numbers = draws(study.config.seed, replicate)
+        angles = np.array(orientations(numbers))
+        encounter = study.encounter(condition, 16, numbers)
+        row = study.run(condition, 16, 0.5, replicate)
+        places = start_places(encounter, angles, 0.5)
+        if image == "mirror":
+            shapes = [mirrored(shape) for shape in encounter.shapes]
+            encounter = make_encounter(study.config, shapes, encounter.zone_distance)
+            places = places * [-1.0, 1.0, -1.0]
+        else:
+            places = places + [0.0, 0.0, 2.0 * np.pi]
+        other = run_encounter(Placed(encounter, places), driver, angles, 0.5, 10**6)
+        assert outcome(other) == outcome(row)
+        assert other["inside"] == row["inside"]
+        assert other["d_c_collision"] == pytest.approx(row["d_c_collision"], abs=1e-10, nan_ok=True)
+        assert other["t_collision"] == pytest.approx(row["t_collision"], rel=1e-4, nan_ok=True)
+
+
+def test_beyond_the_largest_displacement_all_miss(study):
+    for condition in range(3):
+        for vertices in (1, 4, 16):
+            row = study.run(condition, vertices, 1.5, 1)
+            assert outcome(row) == "missed"
+            assert row["inside"] == row["crossed_zone"] == NOT_APPLICABLE
+            assert np.isnan([row["d_c_collision"], row["d_c_max"], row["t_collision"]]).all()
+            assert np.isfinite([row["d_c_last"], row["t_end"]]).all()
+
+
+def test_what_is_written_down_of_a_collision_agrees_with_itself(study):
+    for condition in range(3):
+        zone = list(study.zones.values())[condition]
+        for replicate in range(8):
+            row = study.run(condition, 16, 0.25, replicate)
+            assert row["inside"] == (row["d_c_collision"] < zone)
+            assert outcome(row) in ("AB" if row["inside"] else "CD")
+            assert row["d_c_max"] >= max(row["d_c_collision"], row["d_c_last"])
+            assert 0.0 < row["t_collision"] <= row["t_end"]
+            if (row["d_c_last"] < zone) != row["inside"]:
+                assert row["crossed_zone"] == 1
+
+
+def test_the_zone_decides_the_class_but_not_the_motion(study, tmp_path):
+    near = small_study(tmp_path, {"zone": {"centre": "1 um"}})
+    far = small_study(tmp_path, {"zone": {"centre": "1 mm"}})
+    for replicate in range(3):
+        outside, inside = near.run(0, 16, 0.0, replicate), far.run(0, 16, 0.0, replicate)
+        assert (outside["inside"], inside["inside"]) == (0, 1)
+        assert {"C": "A", "D": "B"}[outcome(outside)] == outcome(inside)
+        assert (outside["t_end"], outside["steps"]) == (inside["t_end"], inside["steps"])
+
+
+def test_the_step_budget_ends_a_replicate_undecided(tmp_path):
+    row = small_study(tmp_path, {"integrator": {"max_steps": 5}}).run(0, 16, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("undecided", "step budget")
+    # Steps tried to end at a touch count, too.
+    assert 1 <= row["steps"] + row["rejected"] <= 5
+
+
+def test_the_time_limit_ends_a_replicate_undecided(tmp_path):
+    row = small_study(tmp_path, {"scene": {"time_limit": 2e-4}}).run(0, 16, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("undecided", "time limit")
+    assert row["t_end"] == pytest.approx(2e-4)
+    # Where it touched is known all the same.
+    assert row["inside"] in (0, 1)
+
+
+def test_contacts_too_soft_for_the_weight_fail(tmp_path):
+    soft = {"forces": {"contact": {"k_n": 1e-9, "k_t": 1e-10}}}
+    row = small_study(tmp_path, soft).run(0, 4, 0.0, 0)
+    assert (outcome(row), FAILURES[row["failure"]]) == ("failed", "too deep")
+
+
+def test_bodies_that_settle_alike_never_meet(tmp_path):
+    study = small_study(tmp_path, {"scene": {"pairs": [["10 um", "10 um"]]}})
+    with pytest.raises(UsageError, match="settle at the same speed and never meet") as caught:
+        study.run(0, 1, 0.0, 0)
+    assert "\n" not in str(caught.value)
+
+
+def test_bodies_of_one_size_meet_where_the_lower_one_is_held(tmp_path):
+    scene = {"pairs": [["10 um", "10 um"]], "receiver": "fixed"}
+    study = small_study(tmp_path, {"scene": scene})
+    assert outcome(study.run(0, 1, 0.0, 0)) == "A"
+    encounter = study.encounter(0, 1, draws(1, 0))
+    assert encounter.settling[0][1] == 0.0
+
+
+def test_the_gap_of_the_outlines_is_that_of_shapely(study):
+    rng = np.random.default_rng(5)
+    for replicate in range(3):
+        encounter = study.encounter(0, 16, draws(1, replicate))
+        reach = 1.2 * sum(shape.bounding_radius for shape in encounter.shapes)
+        for _ in range(10):
+            way, *angles = rng.uniform(0.0, 2.0 * np.pi, 3)
+            places = np.array(
+                [[0.0, 0.0, angles[0]], [reach * np.cos(way), reach * np.sin(way), angles[1]]]
+            )
+            cores = [
+                Polygon(1e6 * shape.placed_vertices(*place))
+                for shape, place in zip(encounter.shapes, places, strict=True)
+            ]
+            work = work_of(encounter.scene, places, np.zeros((2, 3)))
+            touching = sum(shape.radius for shape in encounter.shapes)
+            expected = 1e-6 * cores[0].distance(cores[1]) - touching
+            assert outline_gap(encounter.scene, work) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_pair_apart_and_parting_has_departed(study):
+    # The observer by itself, uncompiled: two spheres, the heavier one below and drifting on.
+    encounter = study.encounter(0, 1, draws(1, 0))
+    work, memo = encounter.start((0.0, 0.0), 0.0), encounter.memo()
+    contact = sum(shape.radius for shape in encounter.shapes)
+
+    def seen(gap, collided):
+        work.motion[NOW, 1, :2] = 0.0, -(contact + gap)
+        memo[memo_at.COLLIDED] = collided
+        return watch_pair(encounter.scene, work, memo, 0.0)
+
+    escape = memo[memo_at.ESCAPE]
+    assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
+    assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
+    work.motion[NOW, 1, 4] = 0.0
+    assert seen(1.01 * escape, 1.0) == 0
+
+
+def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
+    # It is at rest within itself as it swings through its lowest point; what it will do at the
+    # turning point, where the load is another, is not known yet.
+    encounter = study.encounter(0, 1, draws(1, 0))
+    work, memo = encounter.start((0.0, 0.0), 0.0), encounter.memo()
+    spin, reach = 300.0, 39e-6
+    work.motion[NOW] = 0.0
+    work.motion[NOW, :, 5] = spin
+    work.motion[NOW, 1, 1] = -reach
+    work.motion[NOW, 1, 3] = spin * reach
+    later = 2.0 * memo[memo_at.REST_TIME]
+    bonds.start_rest(work, memo, 0.0)
+    assert not bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)
+    # Without the swing it does.
+    work.motion[NOW, :, 3:] = 0.0
+    assert bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)

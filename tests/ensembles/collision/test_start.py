@@ -1,0 +1,174 @@
+"""Where a collision starts, measured with shapely: gaps, grazing and missing."""
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point, Polygon
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
+from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+
+GAP = 2e-6
+
+
+def star(rng):
+    """A star of 2 to 12 vertices with very unequal rays, or a sphere."""
+    count = int(rng.integers(1, 13))
+    size = rng.uniform(4e-6, 25e-6)
+    if count == 1:
+        return Sphere(size)
+    angles = (np.arange(count) + rng.uniform(-0.3, 0.3, count)) * 2.0 * np.pi / count
+    rays = size * rng.uniform(0.2, 1.0, count)
+    core = np.column_stack([rays * np.cos(angles), rays * np.sin(angles)])
+    return SpheroPolygon(core, rng.uniform(0.2e-6, 2e-6))
+
+
+def pairs(count):
+    """(shapes, angles) of random pairs."""
+    rng = np.random.default_rng(3)
+    return [((star(rng), star(rng)), rng.uniform(0.0, 2.0 * np.pi, 2)) for _ in range(count)]
+
+
+def core_of(shape, place):
+    """The placed core as a shapely geometry, in µm."""
+    points = 1e6 * shape.placed_vertices(*place)
+    kind = {1: Point, 2: LineString}.get(len(points), Polygon)
+    return kind(points[0] if len(points) == 1 else points)
+
+
+def gap_of(shapes, places):
+    """Distance of the two outlines [m], negative where they overlap."""
+    cores = [core_of(shape, place) for shape, place in zip(shapes, places, strict=True)]
+    return 1e-6 * cores[0].distance(cores[1]) - shapes[0].radius - shapes[1].radius
+
+
+def slide(shapes, angles, displacement, heights):
+    """Gaps as j goes straight down past i."""
+    i = (0.0, 0.0, angles[0])
+    return [gap_of(shapes, (i, (displacement, height, angles[1]))) for height in heights]
+
+
+def facing_heights(shapes, angles):
+    """Height of j at which the vertices that face each other are level, and heights around it."""
+    core_i = shapes[0].placed_vertices(angle=angles[0])
+    core_j = shapes[1].placed_vertices(angle=angles[1])
+    level = core_i[core_i[:, 0].argmax(), 1] - core_j[core_j[:, 0].argmin(), 1]
+    reach = sum(shape.bounding_radius for shape in shapes)
+    return level, np.linspace(-reach, reach, 200)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95])
+def test_the_outlines_start_a_gap_apart(share):
+    for shapes, angles in pairs(30):
+        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        places = place_pair(shapes, angles, share * largest, GAP)
+        assert gap_of(shapes, places) == pytest.approx(GAP, abs=2e-6 * GAP)
+        assert places[1, :2].tolist() == pytest.approx([share * largest, places[1, 1]])
+        assert places[:, 2].tolist() == list(angles)
+        # Nothing lies above: from the start upwards the pair only comes apart.
+        above = slide(shapes, angles, share * largest, places[1, 1] + np.linspace(1e-9, 5e-5, 20))
+        assert min(above) > GAP
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-4])
+def test_any_gap(gap):
+    for shapes, angles in pairs(10):
+        places = place_pair(shapes, angles, 0.0, gap)
+        assert gap_of(shapes, places) == pytest.approx(gap, rel=2e-6, abs=1e-15)
+
+
+def test_one_just_grazes():
+    for shapes, angles in pairs(40):
+        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        level, heights = facing_heights(shapes, angles)
+        assert slide(shapes, angles, largest, [level])[0] == pytest.approx(0.0, abs=1e-15)
+        assert min(slide(shapes, angles, 1.0001 * largest, [level, *heights])) > 0.0
+        assert slide(shapes, angles, 0.9999 * largest, [level])[0] < 0.0
+
+
+def test_a_displacement_of_one_starts_where_it_still_comes_near():
+    for shapes, angles in pairs(30):
+        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        assert gap_of(shapes, place_pair(shapes, angles, largest, GAP)) == pytest.approx(
+            GAP, abs=2e-6 * GAP
+        )
+
+
+def test_a_pair_that_passes_by_starts_clear_above():
+    for shapes, angles in pairs(30):
+        largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
+        places = place_pair(shapes, angles, 2.0 * largest, GAP)
+        assert gap_of(shapes, places) >= GAP
+        assert places[1, 1] >= largest
+
+
+def test_the_radius_rule_always_misses():
+    for shapes, angles in pairs(30):
+        largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
+        assert largest == sum(shape.bounding_radius for shape in shapes)
+        heights = facing_heights(shapes, angles)[1]
+        assert min(slide(shapes, angles, largest, heights)) > -1e-15
+
+
+def test_extents_are_those_of_the_outline():
+    for shapes, angles in pairs(20):
+        left, right = half_extents(shapes[0], angles[0])
+        bounds = core_of(shapes[0], (0.0, 0.0, angles[0])).bounds
+        assert right == pytest.approx(1e-6 * bounds[2] + shapes[0].radius, rel=1e-12)
+        assert left == pytest.approx(-1e-6 * bounds[0] + shapes[0].radius, rel=1e-12)
+
+
+def test_turning_by_half_swaps_the_extents():
+    for shapes, angles in pairs(20):
+        straight = half_extents(shapes[0], angles[0])
+        turned = half_extents(shapes[0], angles[0] + np.pi)
+        assert turned == pytest.approx(straight[::-1], rel=1e-12)
+
+
+def mirrored(shape):
+    """The shape with left and right exchanged."""
+    if len(shape.vertices) == 1:
+        return shape
+    return SpheroPolygon(shape.vertices * [-1.0, 1.0], shape.radius)
+
+
+def test_the_mirror_image_starts_as_the_mirror_image():
+    for shapes, angles in pairs(30):
+        displacement = 0.4 * sum(shape.bounding_radius for shape in shapes)
+        straight = place_pair(shapes, angles, displacement, GAP)
+        image = place_pair([mirrored(s) for s in shapes], -angles, -displacement, GAP)
+        np.testing.assert_allclose(image, straight * [-1.0, 1.0, -1.0], atol=1e-11)
+
+
+def ends_of(core):
+    """(starts, ends) of a core's edges; for a point, an edge too short to matter."""
+    return edges_of(core) if len(core) > 1 else (core, core + 1e-20)
+
+
+def core_distance(shapes, places):
+    """Smallest distance of a core point of one to the core of the other, by all pairs."""
+    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
+    tables = [distance_to_edges(points, *ends_of(core)) for points, core in (cores, cores[::-1])]
+    return min(table.min() for table in tables)
+
+
+def height_by_all_pairs(shapes, angles, displacement):
+    """The same way down, every distance taken from all pairs."""
+    contact = sum(shape.radius for shape in shapes)
+    clear = sum(shape.bounding_radius for shape in shapes) + GAP
+    height = np.sqrt(clear**2 - displacement**2)
+    left = np.inf
+    while left > 1e-6 * GAP:
+        places = np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
+        left = core_distance(shapes, places) - contact - GAP
+        if left > 1e-6 * GAP:
+            height -= left
+    return height
+
+
+def test_the_height_is_that_of_all_pairs():
+    for shapes, angles in pairs(40):
+        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
+        found = place_pair(shapes, angles, 0.6 * largest, GAP)[1, 1]
+        expected = height_by_all_pairs(shapes, angles, 0.6 * largest)
+        assert found == pytest.approx(expected, rel=1e-12)

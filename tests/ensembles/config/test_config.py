@@ -1,0 +1,216 @@
+"""The schema: its objects, the presets, the example and the page of all keys."""
+
+import argparse
+import math
+import tomllib
+from pathlib import Path
+
+import attrs
+import pytest
+
+from flocsim.body import Body
+from flocsim.commands import init
+from flocsim.constants import VACUUM_PERMITTIVITY
+from flocsim.ensembles.config.force_tables import FORCES
+from flocsim.ensembles.config.loader import TABLES, load_config
+from flocsim.ensembles.config.page import schema_page
+from flocsim.ensembles.config.presets import PRESETS
+from flocsim.ensembles.config.schema import (
+    TYPES,
+    BodiesConfig,
+    IntegratorConfig,
+    SceneConfig,
+    ShapesConfig,
+    ZoneConfig,
+)
+from flocsim.errors import ConfigError, FileError, UsageError
+from flocsim.geometry.shapes.sphere import Sphere
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def load_preset(tmp_path):
+    def load(name, more=""):
+        path = tmp_path / "study.toml"
+        path.write_text(f'preset = "{name}"\n{more}')
+        return load_config(path)
+
+    return load
+
+
+def force_of(config, name):
+    return config.forces[config.force_names.index(name)]
+
+
+def zone_number(config):
+    """S = H_A κ/(24π ε0 ε_r φ²); there are roots up to 4/e²."""
+    hamaker = force_of(config, "van_der_waals").hamaker
+    layer = force_of(config, "double_layer")
+    charge = VACUUM_PERMITTIVITY * layer.permittivity * layer.potential**2
+    return hamaker / layer.debye_length / (24.0 * math.pi * charge)
+
+
+def test_conditions_are_named_by_type_or_by_radii():
+    assert SceneConfig(types=("III", "I")).conditions == (
+        ("III", 4.62e-6, 4.95e-6),
+        ("I", 16.41e-6, 23.02e-6),
+    )
+    pairs = ((16.41e-6, 23.02e-6), (1e-6, 100e-6))
+    assert SceneConfig(pairs=pairs).conditions == (
+        ("16.41um-23.02um", *pairs[0]),
+        ("1um-100um", *pairs[1]),
+    )
+    assert [name for name, *_ in SceneConfig().conditions] == ["I", "II", "III"]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SceneConfig(delta=(0.5, 0.5)),
+        lambda: SceneConfig(delta_max="projekted"),
+        lambda: SceneConfig(start_gap=0.0),
+        lambda: SceneConfig(escape_gap="auto"),
+        lambda: ShapesConfig(vertices=(4, 3.0)),
+        lambda: ShapesConfig(vertices=(0,)),
+        lambda: ShapesConfig(pool=True),
+        lambda: ShapesConfig(fractal_dimension=2.0),
+        lambda: ShapesConfig(source="library"),
+        lambda: ShapesConfig(file="x.h5"),
+        lambda: BodiesConfig(),
+        lambda: BodiesConfig(surface_density=2.0, density=2650.0),
+        lambda: ZoneConfig(root="middle"),
+        lambda: ZoneConfig(distance=math.nan),
+        lambda: IntegratorConfig(name=" "),
+        lambda: IntegratorConfig(step=-1.0),
+    ],
+)
+def test_objects_made_in_python_are_checked_too(make):
+    with pytest.raises((ConfigError, ValueError)):
+        make()
+
+
+def test_the_zone_is_the_outer_root_unless_a_distance_is_given():
+    assert ZoneConfig().root == "outer"
+    assert ZoneConfig(distance=5e-6).root is None
+    assert ZoneConfig(centre=45e-6).root is None
+
+
+def test_tang2014_has_the_papers_zone_and_weights(load_preset):
+    config = load_preset("tang2014")
+    assert zone_number(config) == pytest.approx(0.086541, rel=1e-4)
+    assert config.zone.root == "outer"
+    assert config.body_options == {"surface_density": 2.0}
+    assert not config.fluid.buoyancy
+    contact = force_of(config, "contact")
+    assert (contact.k_n, contact.k_t, contact.damping_n) == (20.0, 2.0, "critical")
+
+
+def test_the_literal_preset_differs_by_its_debye_length_alone(load_preset):
+    config, literal = load_preset("tang2014"), load_preset("tang2014-literal")
+    assert zone_number(literal) == pytest.approx(1000.0 * zone_number(config))
+    layers = [force_of(c, "double_layer") for c in (config, literal)]
+    assert attrs.evolve(layers[1], debye_length=0.98e-6) == layers[0]
+    others = [[f for f in c.forces if f not in layers] for c in (config, literal)]
+    assert others[0] == others[1]
+    assert literal.zone == config.zone
+
+
+def test_si_gives_its_zone_since_there_is_no_root(load_preset):
+    config = load_preset("si")
+    assert zone_number(config) > 4.0 / math.e**2
+    assert config.zone == ZoneConfig(distance=1e-8)
+    assert config.body_options == {"density": 2650.0, "depth": "sphere"}
+    assert {force_of(config, name).gap for name in ("van_der_waals", "double_layer")} == {"surface"}
+
+
+def test_the_si_zone_ends_where_the_attraction_is_the_weight(load_preset):
+    config = load_preset("si")
+    receiving, falling = TYPES["I"]
+    body = Body(Sphere(falling), **config.body_options)
+    weight = 9.81 * body.areal_density * math.pi * falling**2 * (1.0 - 997.0 / 2650.0)
+    reduced = receiving * falling / (receiving + falling)
+    attraction = 4.7e-20 * reduced / (6.0 * config.zone.distance**2)
+    assert attraction == pytest.approx(weight, rel=0.1)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_runs_by_itself_and_can_be_overridden(load_preset, name):
+    assert load_preset(name).force_names == tuple(FORCES)
+    config = load_preset(name, "[forces.van_der_waals]\nhamaker = 3e-20\n[zone]\ncentre = 1e-5\n")
+    assert force_of(config, "van_der_waals").hamaker == 3e-20
+    assert config.zone == ZoneConfig(centre=1e-5)
+
+
+def parse_init(*arguments):
+    parser = argparse.ArgumentParser()
+    init.add_parser(parser.add_subparsers())
+    return parser.parse_args(["init", *arguments])
+
+
+def run_init(*arguments):
+    args = parse_init(*arguments)
+    return args.run(args)
+
+
+def test_init_writes_a_config_that_loads(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_init() == 0
+    assert "study.toml" in capsys.readouterr().out
+    config = load_config("study.toml")
+    assert (config.preset, config.replicates) == ("tang2014", 100)
+
+
+def test_init_never_overwrites_unasked(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("precious")
+    with pytest.raises(UsageError, match=r"exists already.*--force"):
+        run_init(str(path))
+    assert path.read_text() == "precious"
+    assert run_init(str(path), "--force") == 0
+    assert load_config(path).seed == 1
+
+
+def test_init_into_a_folder_that_is_missing(tmp_path):
+    with pytest.raises(FileError, match="could not be written"):
+        run_init(str(tmp_path / "no" / "study.toml"))
+
+
+def uncommented(text):
+    """The example with its commented settings switched on, table by table."""
+    body = text[text.index("# [bodies]") :]
+    return "\n".join(line.removeprefix("# ") for line in body.split("\n"))
+
+
+def test_commented_settings_of_the_example_are_valid_too(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import attrs\nfrom flocsim.forces import CentreForce\n\n\n@attrs.frozen\n"
+        "class Yukawa(CentreForce):\n    @staticmethod\n    def kernel(pair):\n        return 0.0\n"
+    )
+    text = uncommented(init.EXAMPLE)
+    text = text.replace("What follows", "# What follows").replace("\ndistance", "\n# distance")
+    text = text.replace("\ncentre", "\n# centre")
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    config = load_config(path)
+    assert config.fluid.buoyancy
+    assert config.force_names == ("van_der_waals", "double_layer", "contact", "mine")
+
+
+def test_the_page_of_all_keys_is_current():
+    page = (ROOT / "docs" / "config.md").read_text("utf-8")
+    assert page == schema_page(), "run: python -m flocsim.ensembles.config.page > docs/config.md"
+
+
+def test_the_page_names_every_key():
+    page = schema_page()
+    for table_class in [*TABLES.values(), *FORCES.values()]:
+        assert all(f"| `{key}` |" in page for key in attrs.fields_dict(table_class))
+
+
+def test_the_pages_defaults_are_valid_toml():
+    rows = [line.split(" | ") for line in schema_page().split("\n") if line.startswith("| `")]
+    defaults = [cells[2] for cells in rows if len(cells) == 4 and cells[2].startswith("`")]
+    assert len(defaults) > 20
+    for default in defaults:
+        tomllib.loads(f"key = {default.strip('`')}")

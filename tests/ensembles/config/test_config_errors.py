@@ -1,0 +1,180 @@
+"""Wrong config files: one line per problem, with the file, the line, the finding, the remedy."""
+
+import pytest
+
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.toml_text import key_lines
+from flocsim.errors import ConfigError
+from tests.helpers.config_files import VALID, load_text, problem_lines
+
+# One wrong entry laid into an otherwise valid file → what its line says.
+WRONG = {
+    'preset = "tang"': "preset must be 'tang2014', 'tang2014-literal' or 'si', found 'tang' (did",
+    "seed = true": "seed must be an integer from 0 to 9223372036854775807, found true",
+    "seed = -1": "found -1",
+    "replicates = 2.7": "replicates must be an integer from 1 to 1000000000, found 2.7",
+    "replicates = 0": "found 0",
+    "replicats = 3": "replicats: unknown key (did you mean 'replicates'?)",
+    "scene = 3": "scene must be a table [scene], found 3",
+    "forces = []": "forces must be tables [forces.NAME], found an empty list",
+    "[scene]\ndelta = [0.0, true]": "scene.delta[1] must be a finite number at least 0, found true",
+    "[scene]\ndelta = [0.5, 0.5]": "scene.delta[1] must differ from the others",
+    "[scene]\ndelta = [-0.5]": "scene.delta[0] must be a finite number at least 0, found -0.5",
+    "[scene]\ndelta = ['0.5 m']": "scene.delta[0] must be a finite number at least 0",
+    "[scene]\ndelta = []": "scene.delta must be a list of fractions such as [0.0, 0.5], found",
+    "[scene]\ndelta = 0.5": "scene.delta must be a list of fractions",
+    "[scene]\ntypes = ['I', 'IV']": "scene.types[1] must be 'I', 'II' or 'III', found 'IV'",
+    "[scene]\ntypes = ['I', 'I']": "scene.types[1] must differ",
+    "[scene]\npairs = [[1e-6]]": "scene.pairs[0] must be a list of 2 numbers [m], found a list",
+    "[scene]\npairs = [[1e-6, '3 kg']]": "scene.pairs[0][1] must be a length such as '16.41 um'",
+    "[scene]\npairs = [[16.41, 2e-5]]": "scene.pairs[0][0] must be a finite number above 0 and at "
+    "most 0.01 [m], found 16.41",
+    "[scene]\ntypes = ['I']\npairs = [[1e-6, 2e-6]]": "scene.pairs: excludes types, which is given",
+    "[scene]\nstart_gap = inf": "scene.start_gap must be a length such as '16.41 um', found inf",
+    "[scene]\nstart_gap = nan": "found nan",
+    "[scene]\nstart_gap = 0": "must be a finite number above 0 and at most 0.01 [m], found 0",
+    "[scene]\nstart_gap = '-2 um'": "[m], found '-2 um'",
+    "[scene]\nstart_gap = '2'": "found '2' (a number in quotes needs a unit)",
+    "[scene]\nstart_gap = '2 umm'": "found '2 umm' (unknown unit 'umm')",
+    "[scene]\nescape_gap = 'start gap'": "scene.escape_gap must be 'start_gap' or a length such as "
+    "'16.41 um', found 'start gap' (did you mean 'start_gap'?)",
+    "[scene]\nrest_time = '2 um'": "scene.rest_time must be 'auto' or a time such as '5 s', found",
+    "[scene]\ntime_limit = 1979-05-27": "found 1979-05-27",
+    "[scene.delta]\nx = 1": "scene.delta must be a list of fractions such as [0.0, 0.5], found a t",
+    "[shapes]\nvertices = [1, 3.0]": "[1] must be an integer from 1 to 512, found 3.0",
+    "[shapes]\nvertices = [513]": "found 513",
+    "[shapes]\nfile = 'x.h5'": 'shapes.file: goes with source = "library", but source is '
+    "'synthetic': remove it",
+    "[shapes]\nsource = 'library'": 'shapes: source = "library" needs file',
+    "[shapes]\nsource = 'library'\nfile = '.'\npool = 1": "is no ordinary file",
+    "[shapes]\nsource = 'library'\nfile = ''": "shapes.file must be a string that is not blank",
+    "[shapes]\nfractal_dimension = 2": "at least 1.2 and at most 1.95, found 2",
+    "[shapes]\npool = " + "9" * 40: "found a number of more than 30 digits",
+    "[bodies]\ndensity = 1\nsurface_density = 1": "bodies.density: excludes surface_density",
+    "[bodies]\ndepth = '5 um'": "bodies: needs either surface_density [kg/m^2], or density",
+    "[bodies]\ndensity = 1e400": "must be a density such as '2650 kg/m^3', found inf",
+    "[bodies]\ndensity = " + "9" * 400: "bodies.density must be a density",
+    "[fluid]\nbuoyancy = 1": "fluid.buoyancy must be true or false, found 1",
+    "[fluid]\nbuoyancy = true": "fluid.buoyancy: true needs bodies.density, but",
+    "[fluid]\nbuoyancy = true\n[bodies]\ndensity = 500": "bodies.density: 500 kg/m^3 does not sink",
+    "[fluid]\nvelocity = [1.0]": "fluid.velocity must be a list of 2 numbers",
+    "[fluid]\ngradient = [0, 0, nan, 0]": "fluid.gradient[2] must be",
+    "[forces.van_der_waals]\nhamaker = '3 kg'": "forces.van_der_waals.hamaker must be an "
+    "energy such as '1e-18 J', found '3 kg'",
+    "[forces.van_der_waals]\ngap = 'surfac'": "'surface', found 'surfac' (did you mean 'surface'?)",
+    "[forces.contact]\nk_nn = 3": "forces.contact.k_nn: unknown key (did you mean 'k_n'?); known:",
+    "[forces.contact]\ndamping_n = 'critcal'": "must be 'critical' or a rate such as '1e6 1/s'",
+    "[forces.contact]\nfriction = 'some'": "forces.contact.friction must be 'none' or a finite",
+    "[forces]\ngravity = true": "forces.gravity must be a table [forces.gravity] or false, found t",
+    "[forces]\ngravty = false": "forces.gravty must be a table [forces.gravty] or false, found "
+    "false (did you mean 'gravity'?)",
+    "[forces.gravty]": "forces.gravty: unknown force (did you mean 'gravity'?); known: 'gravity', ",
+    "[forces.gravity]\nclass = 'own:Yukawa'": "forces.gravity.class: unknown key; known: g",
+    "[forces.mine]\nclass = 3": "forces.mine.class must be a string 'module:Class', found 3",
+    "[forces.mine]\nclass = 'own'": "forces.mine.class must be 'module:Class' such as",
+    "[forces.mine]\nclass = 'no_such:A'": "forces.mine.class: there is no module 'no_such', "
+    "neither no_such.py nor installed",
+    "[zone]\nroot = 'middle'": "zone.root must be 'inner' or 'outer', found 'middle'",
+    "[zone]\nroot = 'inner'\ncentre = 1e-5": "zone.centre: excludes root, which is given too",
+    "[zone]\ndistance = -1e-9": "must be a finite number at least 0 [m], found -1e-09",
+    "[integrator]\nmax_steps = 1e6": "integrator.max_steps must be an integer",
+    "[integrator]\nname = 3": "integrator.name must be a string that is not blank, found 3",
+    "[output]\nfile = '''a\nb'''": r"output.file must be a string that is not blank, found 'a\nb'",
+    "[output]\n'a\\nb \" c' = 3": "output.'a",
+}
+
+
+@pytest.mark.parametrize(("entry", "message"), WRONG.items())
+def test_one_wrong_entry_is_one_line_with_its_number(tmp_path, entry, message):
+    preset = "" if entry.startswith("preset") else 'preset = "tang2014"\n'
+    [line] = problem_lines(tmp_path, preset + entry + "\n")
+    place, _, text = line.partition(": ")
+    assert message in text
+    assert place.startswith("study.toml:")
+    assert 1 <= int(place.split(":")[1]) <= len(entry.split("\n")) + 1
+
+
+def test_all_problems_at_once_in_the_order_of_the_file(tmp_path):
+    text = VALID.replace("seed = 3", "seed = 3.0").replace("    0.5,", "    'x',")
+    text = text.replace('"1e-20 J"', '"3 kg"').replace("friction = 0.3", "fricton = 0.3")
+    lines = problem_lines(tmp_path, text)
+    assert [line.split(" ")[0] for line in lines] == [
+        f"study.toml:{1 + text[: text.index(found)].count(chr(10))}:"
+        for found in ("seed", "delta", "contact", "hamaker")
+    ]
+    assert "scene.delta[1]" in lines[1]
+    assert "(did you mean 'friction'?)" in lines[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", ["bodies: needs either surface_density", "forces: there are none: add"]),
+        ("[bodies]\nsurface_density = 2\n", ["forces: there are none: add [forces.gravity]"]),
+        ("[forces.drag]\n", ["bodies: needs either surface_density"]),
+        ('preset = "ti"\n', ["preset must be"]),
+    ],
+)
+def test_what_is_missing_is_said(tmp_path, text, said):
+    lines = problem_lines(tmp_path, text)
+    assert len(lines) == len(said)
+    assert all(part in line for part, line in zip(said, lines, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"seed = 1\nseed = 2\n", ":2: not valid TOML: Cannot overwrite a value"),
+        (b"seed = \n", ":1: not valid TOML: Invalid value (column 8)"),
+        (b"\xff\xfe\x00", "byte 0 is not UTF-8 text"),
+        (b"\x89HDF\r\n\x1a\n", "byte 0 is not UTF-8 text"),
+        (b"a = " + b"[" * 10**4, "nested too deeply"),
+        (b"a = " + b"1" * 5000, "not valid TOML"),
+        (b"#" * 2 * 10**6, "larger than 1 MB"),
+    ],
+)
+def test_a_file_that_is_no_config(tmp_path, content, said):
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError) as caught:
+        load_config(path)
+    assert said in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["no.toml", ".", "no/no.toml", "a\0b", "x" * 5000])
+def test_a_path_without_a_file(tmp_path, name):
+    with pytest.raises(ConfigError) as caught:
+        load_config(tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_windows_files_load(tmp_path):
+    path = tmp_path / "windows.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + VALID.replace("\n", "\r\n").encode())
+    assert load_config(path).scene == load_text(tmp_path, VALID).scene
+    path.write_bytes(b'preset = "si"\r\n\r\nseed = 1.5\r\n')
+    with pytest.raises(ConfigError, match=r"windows.toml:3: seed must be"):
+        load_config(path)
+
+
+def test_lines_of_keys_in_every_style_of_toml():
+    text = 'a.b = 1\n"c d" = """\nx = 3\n[y]\n"""\n\n'
+    text += '[t . "u"] # [v]\nk = {l = [\n1], m = 2}\n[[w]]\nn=1'
+    lines = key_lines(text)
+    assert lines[("a", "b")] == 1
+    assert lines[("c d",)] == 2
+    assert lines[("t", "u")] == 7
+    assert lines[("t", "u", "k")] == lines[("t", "u", "k", "m")] == 8
+    assert lines[("w", "n")] == 11
+    assert ("x",) not in lines and ("y",) not in lines
+
+
+@pytest.mark.parametrize(("comma", "line"), [(", # row\n", 3003), (" # row\n,", 2)])
+def test_a_list_of_very_many_lines_is_soon_told(tmp_path, comma, line):
+    rows = comma.join(f'["{i} um", "{i + 1} um"]' for i in range(1, 3001))
+    text = f'preset = "si"\n[scene]\npairs = [{rows}]\nreceiver = 3\n'
+    assert problem_lines(tmp_path, text) == [
+        f"study.toml:{line}: scene.receiver must be 'free' or 'fixed', found 3"
+    ]

@@ -1,0 +1,204 @@
+"""Counts, probabilities and intervals against closed forms, and what must not change them."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from flocsim.ensembles.estimates.statistics import probabilities, tabulate, wilson
+from flocsim.ensembles.report import format_table
+from flocsim.errors import UsageError
+from flocsim.io.results.file import NOT_APPLICABLE
+from tests.helpers.synthetic_results import draw_outcomes, make_results
+
+Z = 1.959963984540054
+COUNTS = ("n_total", "n_missed", "n_undecided", "n_failed", "n_collided", "n_inside", "n_class")
+
+
+@pytest.mark.parametrize("n", [1, 7, 50, 4000])
+def test_wilson_bounds_solve_the_score_equation(n):
+    k = np.arange(n + 1)
+    for bound in wilson(k, n):
+        np.testing.assert_allclose((k / n - bound) ** 2, Z**2 * bound * (1 - bound) / n, atol=1e-13)
+
+
+def test_wilson_in_closed_form_at_the_ends():
+    low, high = wilson([0, 10], [10, 10])
+    np.testing.assert_allclose(high[0], Z**2 / (10 + Z**2), rtol=1e-12)
+    np.testing.assert_allclose(low[1], 10 / (10 + Z**2), rtol=1e-12)
+    assert low[0] == 0.0 and high[1] == 1.0
+
+
+def test_wilson_mirrors_success_and_failure():
+    k = np.arange(31)
+    low, high = wilson(k, 30)
+    mirrored_low, mirrored_high = wilson(30 - k, 30)
+    np.testing.assert_allclose(low, 1 - mirrored_high, atol=1e-15)
+    np.testing.assert_allclose(high, 1 - mirrored_low, atol=1e-15)
+
+
+def test_wilson_takes_any_confidence():
+    low, high = wilson(3, 10, confidence=0.99)
+    for bound in (low, high):
+        z_squared = (0.3 - bound) ** 2 * 10 / (bound * (1 - bound))
+        assert math.isclose(math.sqrt(z_squared), 2.5758293035489004, rel_tol=1e-12)
+
+
+def test_wilson_is_nan_without_trials():
+    low, high = wilson([0, 1], [0, 2])
+    assert np.isnan([low[0], high[0]]).all()
+    assert np.isfinite([low[1], high[1]]).all()
+
+
+@pytest.mark.parametrize(("n", "published"), [(20, 0.953), (100, 0.950), (1000, 0.950)])
+def test_wilson_coverage_averaged_over_p(n, published):
+    p = np.linspace(0.1, 0.9, 3001)
+    k = np.arange(n + 1)
+    low, high = wilson(k, n)
+    covers = (low[:, None] <= p) & (p <= high[:, None])
+    coverage = (binom.pmf(k[:, None], n, p) * covers).sum(axis=0).mean()
+    assert coverage == pytest.approx(published, abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials"), [(-1, 5), (6, 5), (0.5, 5), (1, math.nan), (1, math.inf), ("a", 5)]
+)
+def test_wilson_refuses_what_cannot_be_counts(successes, trials):
+    with pytest.raises(UsageError):
+        wilson(successes, trials)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0, 95, math.nan])
+def test_wilson_refuses_impossible_confidence(confidence):
+    with pytest.raises(UsageError, match="confidence"):
+        wilson(1, 2, confidence)
+
+
+def test_every_count_and_probability_of_a_small_case():
+    #           A  A  A  B  C  D  D  missed        undecided in, out, apart     failed in, apart
+    outcome = [[0, 0, 0, 1, 2, 3, 3, 4, 5, 5, 5, 6, 6]]
+    inside = [[1, 1, 1, 1, 0, 0, 0, 255, 1, 0, 255, 1, 255]]
+    table = tabulate(outcome, inside)
+    counts = {name: table[name][0].tolist() for name in COUNTS}
+    assert counts == {
+        "n_total": 13,
+        "n_missed": 1,
+        "n_undecided": 3,
+        "n_failed": 2,
+        "n_collided": 10,
+        "n_inside": 6,
+        "n_class": [3, 1, 1, 2],
+    }
+    assert table["pr_inside"][0] == 6 / 10
+    assert table["pr_a_given_inside"][0] == 3 / 4
+    assert table["pr_a_given_outside"][0] == 1 / 3
+    assert table["pr_a"][0] == 4 / 7
+    np.testing.assert_array_equal(table["pr_class"][0], np.array([3, 1, 1, 2]) / 7)
+    assert (table["pr_a_low"][0], table["pr_a_high"][0]) == wilson(4, 7)
+    assert (table["pr_inside_low"][0], table["pr_inside_high"][0]) == wilson(6, 10)
+
+
+def test_counts_are_whole_numbers_that_add_up():
+    table = make_results().probabilities
+    for name in COUNTS:
+        assert table[name].dtype == np.int64
+    ends = table["n_missed"] + table["n_undecided"] + table["n_failed"]
+    np.testing.assert_array_equal(table["n_total"], ends + table["n_class"].sum(axis=-1))
+
+
+def test_no_events_give_nan_not_zero():
+    table = tabulate(np.full((1, 5), 4), np.full((1, 5), NOT_APPLICABLE))
+    for name in [name for name in table if name.startswith("pr_")]:
+        assert np.isnan(table[name]).all(), name
+
+
+def test_order_of_replicates_changes_nothing():
+    rng = np.random.default_rng(1)
+    outcome, inside = draw_outcomes(rng, (2, 3, 2, 40))
+    shuffled = rng.permutation(40)
+    before, after = (
+        tabulate(outcome, inside),
+        tabulate(outcome[..., shuffled], inside[..., shuffled]),
+    )
+    for name in before:
+        np.testing.assert_array_equal(before[name], after[name])
+
+
+def test_counts_of_two_halves_pool_to_the_whole():
+    outcome, inside = draw_outcomes(np.random.default_rng(2), (2, 3, 2, 50))
+    whole = tabulate(outcome, inside)
+    parts = [tabulate(outcome[..., k], inside[..., k]) for k in (slice(17), slice(17, None))]
+    pooled = {name: parts[0][name] + parts[1][name] for name in COUNTS}
+    pooled |= probabilities(pooled)
+    for name in whole:
+        np.testing.assert_array_equal(whole[name], pooled[name])
+
+
+def test_swapping_inside_and_outside_mirrors_the_table():
+    outcome, inside = draw_outcomes(np.random.default_rng(3), (2, 2, 2, 50))
+    swapped = np.choose(outcome, [2, 3, 0, 1, 4, 5, 6])
+    other = np.where(inside == NOT_APPLICABLE, inside, 1 - inside)
+    before, after = tabulate(outcome, inside), tabulate(swapped, other)
+    np.testing.assert_array_equal(before["pr_a_given_inside"], after["pr_a_given_outside"])
+    np.testing.assert_array_equal(before["pr_a"], after["pr_a"])
+    np.testing.assert_allclose(before["pr_inside"], 1 - after["pr_inside"], atol=1e-15)
+
+
+def test_inside_equals_a_plus_b_when_all_collisions_are_decided():
+    outcome, inside = draw_outcomes(np.random.default_rng(4), (3, 4, 5, 60))
+    decided = outcome < 4
+    table = tabulate(np.where(decided, outcome, 4), np.where(decided, inside, NOT_APPLICABLE))
+    np.testing.assert_allclose(table["pr_inside"], table["pr_class"][..., :2].sum(axis=-1))
+    np.testing.assert_allclose(table["pr_class"].sum(axis=-1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "inside"), [(0, 0), (1, 255), (2, 1), (3, 255), (4, 0), (4, 1), (7, 1), (5, 2)]
+)
+def test_contradictions_are_refused_with_their_place(outcome, inside):
+    with pytest.raises(UsageError, match=r"at \(0, 1\) is impossible \(1 such"):
+        tabulate([[0, outcome]], [[1, inside]])
+
+
+def test_shapes_must_agree():
+    with pytest.raises(UsageError, match="one shape"):
+        tabulate([[0, 1]], [[1]])
+
+
+@pytest.mark.parametrize("count", [0, 9, 60, 99_999])
+def test_table_is_aligned_and_narrow(count):
+    results = make_results(count=60)
+    table = dict(results.probabilities)
+    for name in COUNTS:
+        table[name] = np.minimum(table[name] * count, count)
+    text = format_table(results.types, results.vertices, results.delta, table)
+    lines = text.splitlines()
+    rows = [line for line in lines[2:] if not line.startswith("type")]
+    assert len(rows) == 3 * 4 * 5
+    assert max(map(len, lines)) <= 110
+    assert len({len(row) for row in rows}) == 1
+    assert text.isascii()
+
+
+def test_table_tells_the_numbers():
+    outcome = np.array([0] * 6 + [3] * 3 + [4]).reshape(1, 1, 1, 10)
+    inside = np.select([outcome == 0, outcome == 3], [1, 0], NOT_APPLICABLE)
+    text = format_table(["II"], [16], [0.25], tabulate(outcome, inside))
+    row = text.splitlines()[-1]
+    assert " ".join(row.split()) == (
+        "16 0.25 10 9 6 .667 [.354, .879] .667 [.354, .879] 6 0 0 3 1 0 0"
+    )
+    assert "type II" in text
+
+
+def test_table_shows_a_dash_without_events():
+    table = tabulate(np.full((1, 1, 1, 2), 4), np.full((1, 1, 1, 2), NOT_APPLICABLE))
+    row = format_table(["I"], [4], [1.0], table).splitlines()[-1]
+    assert " ".join(row.split()) == "4 1 2 0 0 - - 0 0 0 0 2 0 0"
+
+
+def test_table_tells_certainty_from_rounding():
+    outcome = np.zeros((1, 1, 1, 40), dtype=int)
+    text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1))
+    assert text.count("1.00 [.912, 1.00]") == 2

@@ -1,0 +1,88 @@
+"""Handing out: every replicate once, whoever asks, however much is given back; and intervals."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flocsim.ensembles.chunks import MOST_ROWS
+from flocsim.ensembles.parallel.dealer import Dealer, chunk_seconds
+from flocsim.ensembles.storage.index_ranges import merged, missing, total
+
+INTERVALS = st.lists(
+    st.tuples(st.integers(0, 30), st.integers(0, 10)).map(lambda pair: (pair[0], sum(pair)))
+)
+
+
+def numbers(intervals):
+    """The numbers in intervals, each as often as it is there."""
+    return [number for first, stop in intervals for number in range(first, stop)]
+
+
+@given(INTERVALS)
+def test_a_union_has_each_number_once_in_order(intervals):
+    assert numbers(merged(intervals)) == sorted(set(numbers(intervals)))
+    assert total(merged(intervals)) == len(set(numbers(intervals)))
+
+
+@given(INTERVALS, st.integers(0, 20), st.integers(0, 30))
+def test_what_is_missing_and_what_is_there_make_the_whole(intervals, first, length):
+    union, stop = merged(intervals), first + length
+    gaps = numbers(missing(union, first, stop))
+    there = [number for number in numbers(union) if first <= number < stop]
+    assert sorted([*gaps, *there]) == list(range(first, stop))
+
+
+@given(
+    st.lists(INTERVALS, min_size=1, max_size=4), st.integers(1, 9), st.integers(1, 40),
+    st.integers(0, 10**6),
+)  # fmt: skip
+def test_what_is_missing_is_handed_out_once(done, size, replicates, seed):
+    rng = np.random.default_rng(seed)
+    done = [missing(missing(merged(each), 0, replicates), 0, replicates) for each in done]
+    borders = sorted({replicates // 3 or 1, replicates // 2 or 1, replicates})
+    dealer = Dealer.of(done, borders, size)
+    todo = {(c, k) for c, each in enumerate(done) for k in range(replicates)}
+    todo -= {(c, k) for c, each in enumerate(done) for k in numbers(each)}
+    assert dealer.left == len(todo)
+    held, run, ended = [], [], list(dealer.finished_stages())
+    while True:
+        while len(held) < size and (chunk := dealer.take()) is not None:
+            held.append(chunk)
+        if not held:
+            break
+        chunk = held.pop(rng.integers(len(held)))
+        count = int(rng.integers(0, chunk.stop - chunk.first + 1))
+        run += [(chunk.condition, chunk.first + k) for k in range(count)]
+        dealer.give_back(chunk, count)
+        ended += dealer.finished_stages()
+    assert sorted(run) == sorted(todo)
+    assert (dealer.left, ended) == (0, borders)
+
+
+def test_chunks_grow_small_towards_the_end():
+    dealer = Dealer.of([[], []], [10**6], 8)
+    sizes = []
+    while (chunk := dealer.take()) is not None:
+        sizes.append(chunk.stop - chunk.first)
+    assert sizes[0] == MOST_ROWS
+    assert sizes[-1] == 1
+    assert sum(sizes) == 2 * 10**6
+    assert len(sizes) < 400
+
+
+def test_an_earlier_stage_comes_first_and_an_end_stops_the_rest():
+    dealer = Dealer.of([[]], [4, 8], 1)
+    first = [dealer.take() for _ in range(8)]
+    assert [chunk.first for chunk in first if chunk] == list(range(8))
+    for chunk in first[:4]:
+        dealer.give_back(chunk, 1)
+    assert list(dealer.finished_stages()) == [4]
+    dealer.end_at(4)
+    dealer.give_back(first[5], 0)  # what comes late is no harm
+    assert (dealer.take(), dealer.left, dealer.final) == (None, 0, 4)
+
+
+@pytest.mark.parametrize(("size", "seconds"), [(1, 0.25), (100, 0.25), (10_000, 10.0)])
+def test_the_time_of_a_chunk_grows_with_the_ranks(size, seconds):
+    assert chunk_seconds(size) == seconds

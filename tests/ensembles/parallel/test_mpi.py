@@ -1,0 +1,300 @@
+"""Jobs under a real mpirun: the same results, one message, no hang."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from flocsim.ensembles.parallel import team
+from flocsim.ensembles.parallel.team import Alone, find_team, launched_rank, launched_size
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.small_study import (
+    BESIDE_PYTHON,
+    SMALL,
+    command,
+    mpirun,
+    run_command,
+    write_small,
+)
+
+LAUNCHER = (*team.LAUNCHER_SIZES, *team.LAUNCHER_RANKS)
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory):
+    """The folder of the small study, run without a launcher."""
+    folder = tmp_path_factory.mktemp("mpi")
+    write_small(folder)
+    done = run_command(folder, "small.toml", "--output", "serial.h5", "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    return folder
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_any_number_of_ranks_gives_the_same_bytes(serial, ranks):
+    name = f"ranks{ranks}.h5"
+    done = run_command(serial, "small.toml", "--output", name, ranks=ranks)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"on {ranks} rank" in done.stdout
+    # One rank speaks.
+    assert done.stdout.count("36 replicates: ") == 1
+    assert same_data(serial / name, serial / "serial.h5") == []
+    assert read_results(serial / name).run["ranks"] == ranks
+
+
+PROBE = """\
+import sys
+from flocsim.ensembles.cli import main
+code = main(["small.toml", "--output", "probe.h5", "--quiet"])
+print(sorted(name for name in sys.modules if name.split(".")[0] == "mpi4py"))
+sys.exit(code)
+"""
+
+
+def test_without_threads_in_mpi_rank_0_answers_between_two_replicates(serial):
+    env = os.environ | {"MPI4PY_RC_THREAD_LEVEL": "funneled"}
+    done = run_command(serial, "small.toml", "--output", "slow.h5", "--quiet", ranks=3, env=env)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert same_data(serial / "slow.h5", serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
+    name = f"jobs{jobs}.h5"
+    done = run_command(serial, "small.toml", "--output", name, "--jobs", jobs)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"on {jobs} ranks" in done.stdout
+    assert same_data(serial / name, serial / "serial.h5") == []
+
+
+@pytest.mark.parametrize(
+    ("words", "ranks", "said"),
+    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one of the two")],
+)
+def test_jobs_that_cannot_be_are_refused(serial, words, ranks, said):
+    done = run_command(serial, "small.toml", *words, ranks=ranks)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_without_a_launcher_mpi_is_not_even_imported(serial):
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE], cwd=serial, capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+
+
+FAILS_LATE = """\
+import os
+import attrs
+from flocsim.ensembles.study import Study
+from flocsim.forces import CentreForce
+
+
+def run(study, *place, **more):
+    raise MemoryError
+
+
+if os.environ["PMI_RANK"] == "1":
+    Study.compile = lambda study, kinds: None
+    Study.run = run
+
+
+@attrs.frozen
+class Late(CentreForce):
+    absent = "it only brings the trouble along"
+
+    @staticmethod
+    def kernel(pair):
+        return 0.0
+"""
+
+YUKAWA = """\
+import math
+
+import attrs
+from flocsim.fields import quantity
+from flocsim.forces import CentreForce
+
+SIGN = 1.0
+
+
+@attrs.frozen
+class Yukawa(CentreForce):
+    strength: float = quantity("N", at_least=0.0)
+    length: float = quantity("m", above=0.0)
+
+    @staticmethod
+    def kernel(pair, strength, length):
+        return SIGN * strength * math.exp(-pair.gap / length)
+"""
+
+FAILS_EARLY = (
+    'import os\nif os.environ.get("PMI_RANK") == "1":\n    raise RuntimeError("no licence")\n'
+)
+
+
+def with_force(folder, source, name):
+    """A config with a force of the module's in the folder."""
+    (folder / "mine.py").write_text(source)
+    text = f'[forces.mine]\nclass = "mine:{name}"\n'
+    return write_small(folder, SMALL + text, vertices="[1]")
+
+
+def test_a_rank_that_fails_half_way_ends_the_whole_job(tmp_path):
+    with_force(tmp_path, FAILS_LATE, "Late")
+    began = time.monotonic()
+    done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
+    assert time.monotonic() - began < 15.0
+    assert done.returncode == 70
+    assert "flocsim: rank 1: out of memory: ask for fewer ranks on a machine" in done.stderr
+    assert not (tmp_path / "small.h5").exists()
+
+
+FAILS_SOON = FAILS_LATE.replace("lambda study, kinds: None", "run")
+"""A rank 1 that fails at once, while rank 0 compiles."""
+
+
+def test_a_rank_that_fails_while_another_compiles_does_not_wait_for_it(tmp_path):
+    with_force(tmp_path, FAILS_SOON, "Late")
+    write_small(tmp_path, (tmp_path / "small.toml").read_text(), vertices="[1, 4]")
+    began = time.monotonic()
+    done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
+    assert time.monotonic() - began < 15.0
+    assert done.returncode == 70
+    assert "flocsim: rank 1: out of memory" in done.stderr
+
+
+def test_a_config_that_one_rank_cannot_load_stops_all(tmp_path):
+    with_force(tmp_path, FAILS_EARLY + YUKAWA, "Yukawa")
+    text = (tmp_path / "small.toml").read_text() + 'strength = "1 nN"\nlength = "1 um"\n'
+    (tmp_path / "small.toml").write_text(text)
+    done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "mine.py:3: RuntimeError: no licence" in line
+
+
+WRONG = [
+    (["nowhere.toml"], {}, 2, "nowhere.toml: there is no such file"),
+    (["small.toml"], {"seed": "="}, 2, "small.toml:2: not valid TOML"),
+    (["small.toml"], {"types": '["IV"]'}, 2, "scene.types"),
+    (["small.toml"], {"preset": '"tang2014-literal"'}, 2, "no attraction zone"),
+    (["small.toml", "--output", "no/folder.h5"], {}, 74, "no/folder.h5 could not be written"),
+]
+
+
+@pytest.mark.parametrize(("words", "changes", "code", "said"), WRONG)
+def test_what_is_wrong_is_said_by_one_rank_in_one_line(tmp_path, words, changes, code, said):
+    write_small(tmp_path, **changes)
+    done = run_command(tmp_path, *words, ranks=2, timeout=60)
+    assert (done.returncode, done.stdout) == (code, "")
+    [line] = done.stderr.splitlines()
+    assert said in line
+
+
+def test_wrong_arguments_and_help_are_printed_once(tmp_path):
+    done = run_command(tmp_path, "--bogus", ranks=2, timeout=60)
+    assert (done.returncode, done.stderr.count("error: ")) == (2, 1)
+    done = run_command(tmp_path, "--help", ranks=2, timeout=60)
+    assert (done.returncode, done.stdout.count("--dry-run  ")) == (0, 1)
+
+
+@pytest.mark.parametrize("ranks", [None, 2])
+def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
+    words = ["small.toml", "--replicates", "100000", "--output", f"late{ranks}.h5"]
+    job = subprocess.Popen(
+        command(*words, ranks=ranks),
+        cwd=serial, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    said = [job.stdout.readline(), job.stdout.readline()]
+    assert "compiled or loaded" in said[1]
+    began = time.monotonic()
+    os.killpg(job.pid, signal.SIGINT)
+    _, errors = job.communicate(timeout=30)
+    assert time.monotonic() - began < 5.0
+    assert job.returncode == 75
+    assert "stopped by SIGINT: " in errors
+    assert "Traceback" not in errors
+    assert not (serial / f"late{ranks}.h5").exists()
+    again = ["small.toml", "--output", f"late{ranks}.h5"]
+    done = run_command(serial, *again, timeout=60)
+    assert done.returncode == 2
+    assert "holds an unfinished run: go on with it by --resume" in done.stderr
+    done = run_command(serial, *again, "--resume", "--jobs", 2, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert same_data(serial / f"late{ranks}.h5", serial / "serial.h5") == []
+
+
+def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):
+    text = SMALL + '[forces.mine]\nclass = "mine:Yukawa"\nstrength = "1 nN"\nlength = "1 um"\n'
+    write_small(tmp_path, text, vertices="[1]", types='["III"]', delta="[0.0]")
+    classes = []
+    for sign in ("1.0", "-1."):
+        # Of the same length, within the same second: only the content tells the two apart.
+        (tmp_path / "mine.py").write_text(YUKAWA.replace("1.0", sign, 1))
+        done = run_command(tmp_path, "small.toml", "--quiet", ranks=2, timeout=200)
+        assert (done.returncode, done.stderr) == (0, "")
+        table = read_results(tmp_path / "small.h5").probabilities
+        classes.append((int(table["n_missed"].sum()), int(table["n_class"][..., 0].sum())))
+    # Repelled by 1 nN the light spheres never touch; attracted they stick.
+    assert classes == [(3, 0), (0, 3)]
+
+
+def test_a_launcher_of_another_kind_is_found_out(tmp_path, monkeypatch):
+    mpirun()
+    write_small(tmp_path)
+    env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0"}
+    done = run_command(tmp_path, "small.toml", env=env, timeout=60)
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "the launcher started 2 ranks but MPI counts 1" in line
+
+
+def test_mpi_that_cannot_be_loaded_says_what_to_install(tmp_path):
+    write_small(tmp_path)
+    (tmp_path / "mpi4py.py").write_text("raise RuntimeError('cannot load MPI library')\n")
+    env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0", "PYTHONPATH": str(tmp_path)}
+    done = run_command(tmp_path, "small.toml", env=env, timeout=60)
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "mpi4py cannot be loaded (cannot load MPI library): install flocsim[mpi]" in line
+
+
+@pytest.fixture
+def no_launcher(monkeypatch):
+    """An environment without any launcher's variables."""
+    for name in LAUNCHER:
+        monkeypatch.delenv(name, raising=False)
+    return monkeypatch
+
+
+def test_who_launched_this_process(no_launcher):
+    assert (launched_size(), launched_rank()) == (0, 0)
+    no_launcher.setenv("PMI_RANK", "3")
+    assert (launched_size(), launched_rank()) == (None, 3)
+    no_launcher.setenv("PMI_SIZE", "4")
+    assert launched_size() == 4
+
+
+def test_one_rank_works_alone(no_launcher):
+    assert isinstance(find_team(), Alone)
+    no_launcher.setenv("PMI_SIZE", "1")
+    assert isinstance(find_team(), Alone)
+
+
+def test_a_team_of_one():
+    alone = Alone()
+    alone.wait()
+    assert (alone.gather(5), alone.share(5), alone.collect(5)) == ([5], 5, [5])
+    with pytest.raises(SystemExit) as caught:
+        alone.abort(70)
+    assert caught.value.code == 70
+
+
+def test_the_launcher_beside_this_python_is_the_one_that_is_tested():
+    assert mpirun() == str(BESIDE_PYTHON / "mpirun")

@@ -1,0 +1,288 @@
+"""Stopped, damaged, extended: what exists is used, what is missing is run, nothing else is."""
+
+import json
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim.ensembles import runner
+from flocsim.ensembles.parallel import worker
+from flocsim.ensembles.parallel.desk import Desk, TooManyFailures
+from flocsim.ensembles.parallel.team import Alone
+from flocsim.ensembles.runner import Told, run_to_file
+from flocsim.ensembles.storage import identity
+from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
+from flocsim.errors import FileError, UsageError
+from flocsim.interruption import STOPPED
+from flocsim.io.journal.records import encode
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.small_study import small_config
+
+SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch):
+    """Chunks of one replicate or two, so that there are many."""
+    monkeypatch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The results file of an undisturbed run of 2 × 1 × 2 × 20 replicates."""
+    folder = tmp_path_factory.mktemp("whole")
+    run_to_file(small_config(folder, SPHERES), Alone(), folder / "r.h5", NEW)
+    return folder / "r.h5"
+
+
+def go_on(folder, mode=RESUME, overrides=None, **more):
+    """Run the study of spheres in the folder; how it Ended."""
+    config = small_config(folder, SPHERES | (overrides or {}) | more)
+    return run_to_file(config, Alone(), folder / "r.h5", mode)
+
+
+def stop_after(monkeypatch, chunks):
+    """Let a signal come after so many chunks."""
+    seen = []
+
+    def take_in(desk, done, original=Desk.take_in):
+        original(desk, done)
+        seen.append(done)
+        if len(seen) == chunks:
+            desk.halted = desk.stopped = True
+
+    monkeypatch.setattr(Desk, "take_in", take_in)
+
+
+@pytest.fixture
+def stopped(tmp_path, monkeypatch):
+    """A folder with a study that was stopped after 30 of its 80 replicates."""
+    with monkeypatch.context() as patch:
+        stop_after(patch, 30)
+        ended = go_on(tmp_path, NEW)
+    assert (ended.code, ended.kept) == (STOPPED, 30)
+    assert [path.name for path in tmp_path.glob("r.h5*")] == ["r.h5.journal"]
+    return tmp_path
+
+
+def test_a_stopped_run_goes_on_to_the_same_bytes(stopped, whole):
+    ended = go_on(stopped)
+    assert (ended.code, ended.computed) == (0, 50)
+    assert same_data(stopped / "r.h5", whole) == []
+    assert not (stopped / "r.h5.journal").exists()
+    run = read_results(stopped / "r.h5").run
+    assert (run["sessions"], run["computed"]) == (2, 50)
+
+
+def test_it_may_be_stopped_as_often_as_one_likes(tmp_path, monkeypatch, whole):
+    for _ in range(6):
+        with monkeypatch.context() as patch:
+            stop_after(patch, 13)
+            go_on(tmp_path)
+    assert go_on(tmp_path).computed == 2
+    assert same_data(tmp_path / "r.h5", whole) == []
+
+
+def test_an_unfinished_run_is_in_the_way_of_a_new_one(stopped, whole):
+    with pytest.raises(Told, match=r"r.h5.journal holds an unfinished run: go on .* --resume"):
+        go_on(stopped, NEW)
+    assert go_on(stopped, RESTART).computed == 80
+    assert same_data(stopped / "r.h5", whole) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"seed": 2}, "seed is 1 in the file, 2 now"),
+        ({"forces": {"contact": {"k_n": 30.0}}}, "forces.contact.k_n is 20.0 in the file, 30.0"),
+        ({"forces": {"gravity": {"g": 9.8}}}, "forces.gravity.g is 9.81 in the file, 9.8 now"),
+        ({"integrator": {"tolerance": 1e-8}}, "integrator.tolerance is 1e-09 in the file, 1e-08"),
+        ({"scene": {"receiver": "fixed"}}, 'scene.receiver is "free" in the file, "fixed" now'),
+        ({"shapes": {"vertices": [1], "radius": 5e-7}}, "shapes.radius is 1e-06 in the file"),
+    ],
+)
+@pytest.mark.parametrize("finished", [False, True])
+def test_another_study_is_refused(request, tmp_path, whole, change, said, finished):
+    folder = tmp_path if finished else request.getfixturevalue("stopped")
+    if finished:
+        (folder / "r.h5").write_bytes(whole.read_bytes())
+    before = {path: path.read_bytes() for path in folder.glob("r.h5*")}
+    with pytest.raises(Told, match="is of another study") as caught:
+        go_on(folder, overrides=change)
+    assert isinstance(caught.value.args[0], UsageError)
+    assert said in str(caught.value)
+    assert {path: path.read_bytes() for path in folder.glob("r.h5*")} == before
+
+
+def test_other_physics_are_refused(stopped, monkeypatch):
+    monkeypatch.setattr(identity, "physics_digest", lambda: "edited")
+    with pytest.raises(Told, match="flocsim's own code has changed"):
+        go_on(stopped)
+
+
+def test_the_digest_of_the_physics_sees_code_and_nothing_else():
+    source = 'def f(x):\n    """Words."""\n    return 2.0 * x  # why\n'
+    same = 'def f(x):\n    """Other words."""\n\n    return 2.0 * (x)\n'
+    assert identity.essence(source) == identity.essence(same)
+    assert identity.essence(source) != identity.essence(source.replace("2.0", "3.0"))
+
+
+def test_other_flocs_are_refused(tmp_path, monkeypatch):
+    config = small_config(tmp_path, {"shapes": {"vertices": [4]}, "replicates": 1})
+    run_to_file(config, Alone(), tmp_path / "r.h5", NEW)
+    original = runner.flocs_of
+
+    def grown(config):
+        first, *others = original(config)
+        return [attrs.evolve(first, ratio=first.ratio * 1.01), *others]
+
+    monkeypatch.setattr(runner, "flocs_of", grown)
+    with pytest.raises(Told, match="the flocs with N = 4 have changed"):
+        run_to_file(config, Alone(), tmp_path / "r.h5", RESUME)
+
+
+def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):
+    path = stopped / "r.h5.journal"
+    data = bytearray(path.read_bytes())
+    data[data.rindex(b"\x93FLOCREC") - 1] ^= 4  # the last byte of the last chunk but one
+    path.write_bytes(data)
+    assert go_on(stopped).computed == 51
+    said = capsys.readouterr().err
+    assert "r.h5.journal: damaged from byte " in said
+    assert "(type I, N = 1, delta " in said
+    assert same_data(stopped / "r.h5", whole) == []
+
+
+def test_a_journal_cut_anywhere_goes_on(stopped, whole):
+    path = stopped / "r.h5.journal"
+    data = path.read_bytes()
+    for size in (0, 5, 100, len(data) // 2, len(data) - 1):
+        (stopped / "r.h5").unlink(missing_ok=True)
+        path.write_bytes(data[:size])
+        go_on(stopped)
+        assert same_data(stopped / "r.h5", whole) == []
+
+
+def test_chunks_without_a_session_to_vouch_for_them_are_run_again(stopped, whole, capsys):
+    path = stopped / "r.h5.journal"
+    other = {"short": "other", "identity": {"seed": 1}, "layout": ""}
+    data = path.read_bytes()
+    first = data.index(b"\x93FLOCREC", 1)
+    assert encode(1, other)[:8] == data[:8]
+    path.write_bytes(data[first:].replace(b"nothing", b"nothing"))
+    # Of this very study they are believed by their own digest.
+    assert go_on(stopped).computed == 50
+    assert same_data(stopped / "r.h5", whole) == []
+
+
+def test_what_is_no_journal_is_not_written_over(tmp_path):
+    (tmp_path / "r.h5.journal").write_text("Dear diary,\n")
+    with pytest.raises(Told, match="is no journal of flocsim") as caught:
+        go_on(tmp_path)
+    assert isinstance(caught.value.args[0], FileError)
+    assert (tmp_path / "r.h5.journal").read_text() == "Dear diary,\n"
+
+
+def test_a_refused_start_leaves_no_journal_behind(tmp_path, whole):
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    with pytest.raises(Told):
+        go_on(tmp_path, seed=9)
+    assert not (tmp_path / "r.h5.journal").exists()
+
+
+def extended(tmp_path, whole, **more):
+    """(how many were run, results) of a finished study that is extended, against a fresh one."""
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    ended = go_on(tmp_path, overrides=more)
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    go_on(fresh, NEW, overrides=more)
+    assert same_data(tmp_path / "r.h5", fresh / "r.h5") == []
+    return ended.computed
+
+
+@pytest.mark.parametrize(
+    ("more", "computed"),
+    [
+        ({"replicates": 25}, 20),
+        ({"replicates": 12}, 0),
+        ({"scene": {"types": ["I", "III"], "delta": [0.0, 0.5, 1.0]}}, 40),
+        ({"scene": {"types": ["III", "II"], "delta": [1.0]}}, 20),
+        ({"shapes": {"vertices": [1, 4]}}, 80),
+    ],
+)
+def test_a_finished_study_is_extended(tmp_path, whole, more, computed):
+    assert extended(tmp_path, whole, **more) == computed
+
+
+def test_a_finished_study_stays_as_it_is(tmp_path, whole):
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    ended = go_on(tmp_path)
+    assert (ended.computed, ended.results.count) == (0, 20)
+    assert (tmp_path / "r.h5").read_bytes() == whole.read_bytes()
+    assert not (tmp_path / "r.h5.journal").exists()
+
+
+def test_a_results_file_tells_of_all_runs_that_it_took(tmp_path, whole):
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    go_on(tmp_path, replicates=21)
+    go_on(tmp_path, replicates=22)
+    run = read_results(tmp_path / "r.h5").run
+    assert run["sessions"] == 3
+    first = json.loads(run["history"])[0]
+    assert first["date"] == read_results(whole).run["date"]
+
+
+def failing(monkeypatch, *replicates):
+    """Let these replicates raise."""
+    original = runner.Study.run
+
+    def run(study, condition, vertices, share, replicate, **more):
+        if replicate in replicates:
+            raise ZeroDivisionError("in a force of one's own")
+        return original(study, condition, vertices, share, replicate, **more)
+
+    monkeypatch.setattr(runner.Study, "run", run)
+
+
+def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(
+    tmp_path, monkeypatch, whole
+):
+    failing(monkeypatch, 7)
+    go_on(tmp_path, NEW)
+    results = read_results(tmp_path / "r.h5")
+    assert np.all(results.probabilities["n_failed"] == 1)
+    assert np.all(results.replicates["outcome"][..., 7] == 6)
+    assert results.failures[results.replicates["failure"][0, 0, 0, 7]] == "exception"
+    for name in ("angle_i", "outcome", "t_end"):
+        others = np.delete(results.replicates[name], 7, axis=-1)
+        expected = np.delete(read_results(whole).replicates[name], 7, axis=-1)
+        np.testing.assert_array_equal(others, expected)
+    assert '"why": "ZeroDivisionError: in a force of one\'s own"' in results.run["failed"]
+
+
+def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path, monkeypatch):
+    failing(monkeypatch, *range(3, 20))
+    with pytest.raises(Told, match="ZeroDivisionError") as caught:
+        go_on(tmp_path, NEW)
+    assert isinstance(caught.value.args[0], TooManyFailures)
+    assert "flocsim trajectory CONFIG --scene I,1,0.0 --replicate 3" in str(caught.value)
+    assert caught.value.args[0].exit_code == 70
+    # What was computed is still there, and a larger share may be allowed.
+    monkeypatch.undo()
+    assert go_on(tmp_path, overrides={"stop": {"failed": 0.5}}).computed < 77
+
+
+def test_a_number_that_is_none_counts_as_a_failure(tmp_path, monkeypatch):
+    original = runner.Study.run
+
+    def run(study, condition, vertices, share, replicate, **more):
+        row = original(study, condition, vertices, share, replicate, **more)
+        return row | {"t_end": float("nan")} if replicate == 2 else row
+
+    monkeypatch.setattr(runner.Study, "run", run)
+    go_on(tmp_path, NEW)
+    results = read_results(tmp_path / "r.h5")
+    assert results.probabilities["n_failed"].sum() == 4
+    assert "not finite" in results.run["failed"]

@@ -1,0 +1,165 @@
+"""Every claim holds on results made to fit it, and fails where just it is broken."""
+
+import numpy as np
+import pytest
+
+from examples.tang2014.claims import check_claims
+from examples.tang2014.claims.robust import contradicting
+from examples.tang2014.claims.table import claims_table, verdicts_table
+from tests.helpers.paper_like import DELTA, TYPES, VERTICES, paper_fits, paper_results, relabelled
+
+
+def verdicts(results=None, entries=None):
+    """{number: verdict}."""
+    return {each.number: each.verdict for each in check_claims(results, entries)}
+
+
+def failing(results=None, entries=None):
+    """The numbers of the claims that fail."""
+    return {number for number, verdict in verdicts(results, entries).items() if verdict == "fails"}
+
+
+def test_all_claims_hold_where_made_to():
+    found = verdicts(paper_results(), paper_fits())
+    assert list(found) == list(range(1, 19))
+    assert set(found.values()) == {"holds"}, found
+
+
+def test_without_data_nothing_is_decided():
+    assert set(verdicts().values()) == {"undecided"}
+
+
+def sphere_departs(outcome, inside):
+    outcome[0, 0, 0, 5] = 1
+
+
+def small_outside(outcome, inside):
+    outcome[2, 1, 4, 7], inside[2, 1, 4, 7] = 3, 0
+
+
+def no_class_c(outcome, inside):
+    chosen = outcome[0, -1, 0]
+    chosen[chosen == 2] = 3
+
+
+def undecided_collision(outcome, inside):
+    outcome[1, 1, 1, 0] = 5
+
+
+def bound_outside(outcome, inside):
+    outcome[:2, 1:][outcome[:2, 1:] == 3] = 2
+
+
+def all_depart_outside(outcome, inside):
+    outcome[:2, 1:][outcome[:2, 1:] == 2] = 3
+
+
+@pytest.mark.parametrize(
+    ("change", "broken"),
+    [
+        (sphere_departs, {6}),
+        (small_outside, {7, 10}),
+        (no_class_c, {11}),
+        (undecided_collision, set()),
+        (bound_outside, {11, 15, 16, 17}),
+        (all_depart_outside, {11, 15, 17}),
+    ],
+)
+def test_a_claim_fails_where_it_is_broken(change, broken):
+    assert failing(paper_results(change)) == broken
+
+
+def test_the_replicates_that_contradict_are_found():
+    results = paper_results(small_outside)
+    for number, places in ((6, []), (7, [[2, 1, 4, 7]]), (9, []), (10, [[2, 1, 4, 7]])):
+        assert np.argwhere(contradicting(results, number)).tolist() == places
+
+
+@pytest.mark.parametrize(
+    ("names", "broken"),
+    [
+        ({"vertices": (1, *VERTICES[:0:-1])}, {12, 13, 15, 17, 18}),
+        ({"delta": DELTA[::-1]}, {11, 12, 13, 15}),
+        ({"types": ("II", "I", "III")}, {8, 14, 15, 17, 18}),
+        ({"types": ("I", "III", "II")}, {7, 8, 10, 12, 14}),
+    ],
+)
+def test_claims_see_what_is_where(names, broken):
+    assert failing(relabelled(paper_results(), **names)) == broken
+
+
+def test_a_collision_without_a_class_is_seen():
+    results = paper_results()
+    results.replicates["outcome"][1, 1, 1, 0] = 4
+    assert 9 in failing(results)
+
+
+def test_a_class_that_disagrees_with_its_side_is_seen():
+    results = paper_results()
+    results.replicates["inside"][2, 1, 0, 0] = 0
+    assert 9 in failing(results)
+
+
+def test_contradicting_replicates_are_named():
+    findings = check_claims(paper_results(small_outside))
+    assert findings[6].parts[0].note == "1 against: III N=4 δ=1 replicate 7"
+
+
+@pytest.mark.parametrize(
+    ("entries", "broken"),
+    [
+        (paper_fits(sphere=20.0), {1}),
+        (paper_fits(sphere=1.0), {1, 2}),
+        (paper_fits(scale=30.0), {2, 5}),
+        (paper_fits(scale=0.0), {3, 4}),
+        (paper_fits(scale=-1.0), {3, 4}),
+    ],
+)
+def test_claims_about_fits_fail_where_broken(entries, broken):
+    assert failing(entries=entries) == broken
+
+
+def test_one_spheroradius_leaves_its_claim_open():
+    found = check_claims(entries=paper_fits(radii=(1.0,)))
+    assert found[2].verdict == "undecided"
+    assert "--radius 1,2,4" in found[2].note
+
+
+def first_replicates(count):
+    """The Results of just these, which are as random as all."""
+    results = paper_results()
+    replicates = {name: array[..., :count] for name, array in results.replicates.items()}
+    return relabelled(results, replicates=replicates)
+
+
+def test_few_replicates_leave_weak_effects_open():
+    found = verdicts(first_replicates(30))
+    assert "fails" not in found.values()
+    assert {13, 17} <= {number for number, verdict in found.items() if verdict == "undecided"}
+
+
+def test_too_few_replicates_decide_nothing():
+    assert set(verdicts(first_replicates(29)).values()) == {"undecided"}
+
+
+def test_the_same_results_give_the_same_table():
+    tables = [claims_table(check_claims(paper_results(), paper_fits())) for _ in range(2)]
+    assert tables[0] == tables[1]
+    assert len({line.count(" | ") for line in tables[0].splitlines()}) == 1
+
+
+def test_the_table_of_readings_has_a_column_each():
+    readings = {"one": check_claims(paper_results()), "other": check_claims(None, paper_fits())}
+    lines = verdicts_table(readings).splitlines()
+    assert lines[0] == "| claim | one | other |"
+    assert lines[2].endswith("| - | holds |")
+    assert len(lines) == 2 + 18
+
+
+def test_missing_types_are_said():
+    results = relabelled(paper_results(), types=("I", "II", "16um-23um"))
+    notes = {each.number: each.note for each in check_claims(results)}
+    assert "III" in notes[7]
+    assert "III" in notes[14]
+    assert TYPES[2] == "III"
+    assert np.isfinite(results.probabilities["pr_a"]).all()

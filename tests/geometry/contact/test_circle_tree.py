@@ -1,0 +1,212 @@
+"""The hierarchy of circles: it must keep all that is near, and find the smallest distance."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flocsim import Body, Fluid, Sphere, SpheroPolygon
+from flocsim.arrays import CANDIDATES, work_of
+from flocsim.body import scene_of
+from flocsim.composer import compose
+from flocsim.geometry.contact.circle_tree import (
+    START,
+    at_leaves,
+    core_distance,
+    descended,
+    level_runs,
+    outlines_of,
+    passed,
+    plan_of,
+    reversed_pose,
+    run_of,
+    side_of,
+    tree_of,
+)
+from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
+from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+
+COUNTS = (1, 2, 3, 4, 5, 7, 16, 33, 64, 512)
+
+
+@cache
+def shape(points, seed):
+    """A core of that many points: a star with deep bays, a sliver or a comb, of any size."""
+    rng = np.random.default_rng([points, seed])
+    size = 1e-5 * 10.0 ** rng.uniform(-1.5, 1.0)
+    radius = size * rng.uniform(0.02, 0.2)
+    if points == 1:
+        return Sphere(size)
+    if points == 2:
+        return SpheroPolygon([[-size, 0.0], [size, 0.0]], radius)
+    angles = (np.arange(points) + rng.uniform(-0.4, 0.4, points)) * 2.0 * np.pi / points
+    rays = size * rng.uniform(0.15, 1.0, points) if seed % 3 else np.full(points, size)
+    core = rays[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    if seed % 4 == 1:
+        core = core * (1.0, 0.02)
+    return SpheroPolygon(core, radius)
+
+
+def numbers_for(counts):
+    """Strategy of what `placed` needs: points and seed of two shapes, three angles, a distance."""
+    kinds = [st.tuples(st.sampled_from(counts), st.integers(0, 11)) for _ in range(2)]
+    return st.tuples(*kinds, *[st.floats(-7.0, 7.0) for _ in range(3)], st.floats(0.2, 1.5))
+
+
+numbers = numbers_for(COUNTS)
+fewer = numbers_for([count for count in COUNTS if count <= 64])
+ROOM = 2 * 64 * 64
+"""For all pairs of two shapes of the fewer points."""
+
+
+def placed(drawn):
+    """(two shapes, their places (2, 3)), near each other as a rule, at times one in the other.
+
+    Shapes are made here, not while hypothesis draws: it gives up on what is slow to draw.
+    """
+    *kinds, heading, angle, turn, share = drawn
+    shapes = [shape(*kind) for kind in kinds]
+    distance = share * sum(shape.bounding_radius for shape in shapes)
+    x, y = distance * math.cos(heading), distance * math.sin(heading)
+    return shapes, np.array([[1e-6, -2e-6, angle], [x + 1e-6, y - 2e-6, turn]])
+
+
+def arrays(shapes, places, capacity=4):
+    """Scene and work arrays of two bodies."""
+    scene = scene_of([Body(shape, surface_density=2.0) for shape in shapes], Fluid(), [-1.0])
+    return scene, work_of(scene, places, np.zeros((2, 3)), capacity=capacity)
+
+
+def one_way_distances(shapes, places, a, b):
+    """Distances (points of a, edges of b) by all pairs; a sphere is one edge against a sphere."""
+    points, core = (shapes[k].placed_vertices(*places[k]) for k in (a, b))
+    starts, ends = edges_of(core)
+    if len(points) == len(core) == 1:
+        return np.hypot(*(points - core).T)[:, None]
+    return distance_to_edges(points, starts, ends)
+
+
+def all_distances(shapes, places):
+    """{(vertex's body, edge's body): distances}; two spheres are one pair."""
+    ways = (
+        ((1, 0),) if len(shapes[0].vertices) == len(shapes[1].vertices) == 1 else ((0, 1), (1, 0))
+    )
+    return {way: one_way_distances(shapes, places, *way) for way in ways}
+
+
+def least_of(distances):
+    """The smallest of all distances."""
+    return min(table.min() for table in distances.values() if table.size)
+
+
+def listed(scene, work, cutoff, a=1, b=0):
+    """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
+    work.tally[CANDIDATES] = 0
+    assert compose(list_polygons, {})(scene, work, a, b, cutoff)
+    rows = work.candidates[: work.tally[CANDIDATES]]
+    first = scene.first
+    return [
+        (int(a), int(b), int(point - first[a]), int(start - first[b]))
+        for a, point, b, start in rows[:, :4]
+    ]
+
+
+@given(numbers, st.floats(0.0, 1.0))
+@settings(max_examples=100)
+def test_just_the_pairs_nearer_than_the_cut_off_are_listed(drawn, share):
+    shapes, places = placed(drawn)
+    distances = all_distances(shapes, places)
+    contact = sum(shape.radius for shape in shapes)
+    furthest = max(table.max() for table in distances.values() if table.size)
+    cutoff = (least_of(distances) + share**4 * (furthest - least_of(distances))) - contact
+    grain = 1e-12 * (furthest + np.abs(places[:, :2]).max())
+    room = sum(np.count_nonzero(table < contact + cutoff + grain) for table in distances.values())
+    found = listed(*arrays(shapes, places, room), cutoff)
+    assert len(set(found)) == len(found)
+    for way, table in distances.items():
+        chosen = np.zeros(table.shape, dtype=bool)
+        for key in found:
+            if key[:2] == way:
+                chosen[key[2:]] = True
+        assert not np.any(chosen & (table >= contact + cutoff + grain))
+        assert np.all(chosen | (table >= contact + cutoff - grain))
+
+
+@given(fewer, st.floats(0.0, 1e-6))
+@settings(max_examples=60)
+def test_the_list_does_not_depend_on_which_body_is_named_first(drawn, cutoff):
+    shapes, places = placed(drawn)
+    scene, work = arrays(shapes, places, capacity=ROOM)
+    spheres = all(len(shape.vertices) == 1 for shape in shapes)
+    one, other = listed(scene, work, cutoff, 1, 0), listed(scene, work, cutoff, 0, 1)
+    if not spheres:
+        assert set(one) == set(other)
+    assert len(one) == len(other)
+
+
+@given(fewer, fewer)
+@settings(max_examples=60)
+def test_the_order_of_the_list_does_not_depend_on_the_place(drawn, other):
+    shapes, places = placed(drawn)
+    elsewhere = placed((*drawn[:2], *other[2:]))[1]
+    lists = [listed(*arrays(shapes, where, ROOM), 1e-6) for where in (places, elsewhere)]
+    common = set(lists[0]) & set(lists[1])
+    assert [key for key in lists[0] if key in common] == [key for key in lists[1] if key in common]
+
+
+@given(numbers)
+@settings(max_examples=250)
+def test_the_gap_is_that_of_all_pairs(drawn):
+    shapes, places = placed(drawn)
+    scene, work = arrays(shapes, places)
+    gap = compose(gap_between, {})
+    expected = least_of(all_distances(shapes, places)) - sum(shape.radius for shape in shapes)
+    grain = 1e-15 * max(shape.bounding_radius for shape in shapes) + 1e-15 * np.abs(places).max()
+    for a, b in ((0, 1), (1, 0)):
+        assert gap(scene, work, a, b) == pytest.approx(expected, rel=1e-12, abs=10 * grain)
+
+
+@given(numbers)
+@settings(max_examples=100)
+def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
+    scene, work = arrays(*placed(drawn))
+    pose = pose_of(work, 0, 1)
+    assert reversed_pose(pose) == pytest.approx(pose_of(work, 1, 0), rel=1e-9, abs=1e-17)
+    assert core_distance(scene, 0, 1, pose) == pytest.approx(
+        core_distance(scene, 1, 0, reversed_pose(pose)), rel=1e-9, abs=1e-18
+    )
+
+
+@pytest.mark.parametrize("points", COUNTS)
+def test_every_circle_holds_its_run_and_the_leaves_hold_all_points_once(points):
+    core = shape(points, 2).vertices
+    tree = tree_of(core)
+    depth = int(tree[0, 0])
+    for level in range(depth + 1):
+        circles = tree[1 << level : 2 << level]
+        runs = core[level_runs(points, level)]
+        away = np.hypot(*np.moveaxis(runs - circles[:, None, :2], -1, 0))
+        assert (away <= circles[:, 2:]).all()
+    outlines = outlines_of([shape(4, 1), shape(points, 2)])
+    side = side_of(outlines, 1)
+    runs = [run_of(side, leaf) for leaf in range(side[3], 2 * side[3])]
+    assert [point for run in runs for point in range(*run)] == list(range(4, 4 + points))
+
+
+@pytest.mark.parametrize("points", [(1, 1), (1, 16), (64, 2), (16, 16), (5, 512)])
+def test_the_walk_meets_every_pair_of_leaves_once(points):
+    outlines = outlines_of([shape(count, 4) for count in points])
+    sides = [side_of(outlines, body) for body in (0, 1)]
+    plan = plan_of(outlines.tree, *sides)
+    walk, met = START, []
+    while walk[0] > 0:
+        if at_leaves(plan, walk):
+            met.append(walk[:2])
+            walk = passed(plan, walk)
+        else:
+            walk = descended(plan, walk)
+    leaves = [range(side[3], 2 * side[3]) for side in sides]
+    assert sorted(met) == [(i, j) for i in leaves[0] for j in leaves[1]]

@@ -1,0 +1,153 @@
+"""Tangential displacements: what a contact that rolls on keeps, and when it is forgotten."""
+
+import numpy as np
+import pytest
+
+from flocsim import Body, Sphere, SpheroPolygon
+from flocsim.arrays import CANDIDATES, CLOSED, NOW, SLIP_RATES, work_of
+from flocsim.body import Fluid, scene_of
+from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.slip_transfer import hand_over
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.rhs.forces import rate_slips
+
+OVERLAP, RADIUS, BALL = 5e-8, 1e-6, 2e-6
+
+
+def slab(corners, height=4e-6):
+    """A bar with a flat top along the x axis, the top divided at the given places."""
+    top = [[x, 0.0] for x in sorted(corners, reverse=True)]
+    ends = [[min(corners), -height], [max(corners), -height]]
+    shape = SpheroPolygon(np.array(ends + top), RADIUS)
+    return Body(shape, tuple(shape.centroid), surface_density=2.0)
+
+
+def resting_on(slab_body, body, x, height, speed):
+    """Scene and work arrays of a body at (x, height) that moves along the slab's top."""
+    scene = scene_of([slab_body, body], Fluid(), [])
+    position = np.array([[*slab_body.position, 0.0], [x, height, body.angle]])
+    velocity = np.array([[0.0, 0.0, 0.0], [speed, 0.0, 0.0]])
+    work = work_of(scene, position, velocity)
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    return scene, work
+
+
+def pull(work):
+    """Σ ξ t_x over the closed pairs, as it acts on body 1 [m]."""
+    total = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        side = 1.0 if work.candidates[row, 0] == 1 else -1.0
+        total -= side * work.slip[NOW, row] * -work.geometry[NOW, row, 1]
+    return total
+
+
+def slide(scene, work, length, passing_on=hand_over, steps=400):
+    """Carry body 1 along x, its contacts with it; the pull after every step."""
+    step = length / steps / work.motion[NOW, 1, 3]
+    pulls = []
+    for _ in range(steps):
+        set_modes(scene, work)
+        rate_slips(work, NOW, 0)
+        closed = work.candidates[:, CLOSED] == 1
+        work.slip[NOW, closed] += step * work.slip[SLIP_RATES, closed]
+        work.motion[NOW, 1, 0] += length / steps
+        locate_contacts(scene, work, NOW)
+        passing_on(work)
+        if spent(scene, work, NOW) > 0.5:
+            assert list_candidates(scene, work)
+            locate_contacts(scene, work, NOW)
+        pulls.append(pull(work))
+    return np.array(pulls)
+
+
+CORNERS = [-10e-6, -4e-6, -3e-6, -2.9e-6, 1e-6, 6e-6, 12e-6]
+
+
+def ball_on(corners):
+    ball = Body(Sphere(BALL), surface_density=2.0)
+    return resting_on(slab(corners), ball, -7e-6, RADIUS + BALL - OVERLAP, 1e-3)
+
+
+def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
+    length, steps = 16e-6, 400
+    pulls = slide(*ball_on(CORNERS), length, steps=steps)
+    # At a corner several pairs act at once, each with its own spring.
+    assert np.abs(np.diff(pulls)).max() <= 4.0 * length / steps
+    assert np.all(np.diff(pulls) < 0.0)
+    dropped = slide(*ball_on(CORNERS), length, passing_on=forget, steps=steps)
+    assert np.abs(np.diff(dropped)).max() > 20.0 * length / steps
+
+
+def forget(work):
+    """What no hand-over would do: an opening pair loses its displacement."""
+    opened = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
+    work.slip[NOW, : work.tally[CANDIDATES]][opened] = 0.0
+
+
+def test_on_one_undivided_edge_the_pull_is_the_distance():
+    pulls = slide(*ball_on([-10e-6, 12e-6]), 16e-6)
+    assert pulls[-1] == pytest.approx(-16e-6, rel=1e-9)
+
+
+def test_the_displacement_vanishes_with_the_last_pair():
+    scene, work = ball_on([-10e-6, 12e-6])
+    slide(scene, work, 1e-6)
+    assert pull(work) != 0.0
+    work.motion[NOW, 1, 1] += 2.0 * OVERLAP
+    locate_contacts(scene, work, NOW)
+    hand_over(work)
+    assert not work.slip[NOW].any()
+    work.motion[NOW, 1, 1] -= 2.0 * OVERLAP
+    locate_contacts(scene, work, NOW)
+    assert pull(work) == 0.0
+
+
+def square_on_slab(tilt):
+    """A square that stands on the slab with two corners; tilted, on one."""
+    square = SpheroPolygon(2e-6 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), RADIUS)
+    body = Body(square, angle=tilt, surface_density=2.0)
+    lowest = square.placed_vertices(angle=tilt)[:, 1].min()
+    return resting_on(slab([-10e-6, 10e-6]), body, 0.0, 2 * RADIUS - OVERLAP - lowest, 1e-3)
+
+
+def test_what_one_corner_loses_another_carries_on_and_only_along_its_own_tangent():
+    scene, work = square_on_slab(0.0)
+    slide(scene, work, 1e-7, steps=10)
+    before = pull(work)
+    closed = np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0)
+    # Turned a little about its centre, the square stands on one corner less.
+    work.motion[NOW, 1, 2] = 0.03
+    locate_contacts(scene, work, NOW)
+    assert 0 < np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0) < closed
+    hand_over(work)
+    assert pull(work) == pytest.approx(before, rel=1e-9)
+
+
+def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
+    ball = Body(Sphere(BALL), surface_density=2.0)
+    bodies = [slab([-10e-6, 12e-6]), ball, ball]
+    scene = scene_of(bodies, Fluid(), [])
+    height = RADIUS + BALL
+    position = np.array([
+        [*bodies[0].position, 0.0], [0.0, height + OVERLAP, 0.0], [3.9e-6, height - OVERLAP, 0.0],
+    ])  # fmt: skip
+    work = work_of(scene, position, np.zeros((3, 3)))
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    gap = work.geometry[NOW, : work.tally[CANDIDATES], 2]
+    opened = int(np.flatnonzero(gap >= 0.0)[0])
+    work.slip[NOW, opened] = 1e-9
+    hand_over(work)
+    assert not work.slip[NOW].any()
+
+
+def test_listing_anew_keeps_every_displacement():
+    scene, work = square_on_slab(0.0)
+    slide(scene, work, 1e-7, steps=10)
+    before = pull(work)
+    for _ in range(3):
+        assert list_candidates(scene, work)
+        locate_contacts(scene, work, NOW)
+        assert pull(work) == before

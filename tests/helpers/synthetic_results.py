@@ -1,0 +1,61 @@
+"""Made-up results with the trends of the paper, for tests of files, tables and figures."""
+
+import numpy as np
+
+from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.io.results.file import NOT_APPLICABLE, Results
+
+FAILURES = ("none", "overlap_too_deep", "step_budget")
+
+
+def draw_outcomes(rng, shape):
+    """Outcome and inside of random approaches: type 0 worst, the last type always inside."""
+    t, v, d, _ = np.indices(shape)
+    size = np.maximum(np.array(shape), 2)
+    badness = v / (size[1] - 1) * (0.5 + 0.5 * d / (size[2] - 1))
+    inside = rng.random(shape) > badness * (1 - t / (size[0] - 1))
+    aggregated = rng.random(shape) > badness * np.where(inside, 0.5, 1.0)
+    outcome = np.where(inside, np.where(aggregated, 0, 1), np.where(aggregated, 2, 3))
+    ending = rng.random(shape)
+    missed = ending < 0.05
+    outcome = np.select([missed, ending < 0.07, ending < 0.08], [4, 5, 6], outcome)
+    return outcome, np.where(missed, NOT_APPLICABLE, inside)
+
+
+def make_results(
+    types=("I", "II", "III"),
+    vertices=(1, 4, 16, 64),
+    delta=(0.0, 0.25, 0.5, 0.75, 1.0),
+    count=60,
+    seed=7,
+    run=None,
+):
+    """A complete Results of random numbers; the same arguments give the same one."""
+    rng = np.random.default_rng(seed)
+    shape = (len(types), len(vertices), len(delta), count)
+    outcome, inside = draw_outcomes(rng, shape)
+    collided = inside != NOT_APPLICABLE
+    lengths = np.where(collided, rng.uniform(30e-6, 50e-6, (3, *shape)), np.nan)
+    times = np.where(collided, rng.uniform(0.0, 0.1, shape), np.nan)
+    failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
+    replicates = {
+        "angle_i": rng.uniform(0.0, 2.0 * np.pi, shape),
+        "angle_j": rng.uniform(0.0, 2.0 * np.pi, shape),
+        "outcome": outcome,
+        "inside": inside,
+        "crossed_zone": np.where(collided, rng.integers(0, 2, shape), NOT_APPLICABLE),
+        "d_c_collision": lengths[0],
+        "d_c_max": lengths[1],
+        "d_c_last": lengths[2],
+        "t_collision": times,
+        "t_end": rng.uniform(0.1, 2.0, shape),
+        "steps": rng.integers(100, 3000, shape),
+        "rejected": rng.integers(0, 50, shape),
+        "error": rng.uniform(0.0, 1e-8, shape),
+        "failure": failure,
+        "floc_i": rng.integers(0, 4, shape),
+        "floc_j": rng.integers(0, 4, shape),
+    }
+    run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
+    table = tabulate(outcome, inside)
+    return Results(types, vertices, delta, replicates, table, run, FAILURES)

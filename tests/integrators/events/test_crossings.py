@@ -1,0 +1,164 @@
+"""Switches: where in a step a pair touches, parts, or becomes the closest of its bodies."""
+
+import math
+from functools import cache
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim import Body, Fluid, Sphere
+from flocsim import hooks as slots
+from flocsim.arrays import CANDIDATES, CLOSEST, NEW, NOW, SCRATCH, work_of
+from flocsim.body import scene_of
+from flocsim.composer import compose
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate, look_at
+from flocsim.integrators.events.modes import set_modes
+from tests.helpers.fast_scene import bodies_of
+from tests.helpers.methods import by_adaptive
+from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, head_on, star, watched
+from tests.reference.samples import scene_of as random_scene
+
+GRAIN = 1e-13
+RADIUS = 5e-6
+SCENES = range(30)
+
+
+def far_reach(parameters):
+    """A surface force that reaches everywhere, so that the closest pair is flagged."""
+    return 1.0
+
+
+REACHING = {slots.surface_reach: far_reach}
+
+
+def stepped(bodies, change, velocities, reaching=False):
+    """Scene and work arrays at the start of a step of 1 s that changes the places by so much."""
+    scene = scene_of(bodies, Fluid(), [])
+    start = np.array([[*body.position, body.angle] for body in bodies])
+    work = work_of(scene, start, velocities[0], capacity=4096)
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    compose(set_modes, REACHING if reaching else {}, jit=False)(scene, work)
+    work.motion[NEW] = np.hstack([start + change, velocities[1]])
+    locate_contacts(scene, work, NEW)
+    return scene, work
+
+
+def passing(depth, half=1e-7, along=0.5):
+    """A sphere that passes another on a straight line and dips into it by a depth."""
+    height = 2.0 * RADIUS - depth
+    still = Body(Sphere(RADIUS), surface_density=2.0)
+    flying = attrs.evolve(still, position=(-2.0 * half * along, height))
+    change = np.array([[0.0, 0.0, 0.0], [2.0 * half, 0.0, 0.0]])
+    return stepped([still, flying], change, (change, change))
+
+
+@pytest.mark.parametrize("along", [0.05, 0.2, 0.5, 0.83, 0.95])
+@pytest.mark.parametrize("depth", [1e-12, 3e-13, 1e-10])
+def test_a_graze_inside_one_step_is_found(depth, along):
+    """Open at both ends of the step, and overlapping by a picometre in between."""
+    half = 4.0 * math.sqrt(4.0 * RADIUS * depth) / min(along, 1.0 - along) / 2.0
+    scene, work = passing(depth, half, along)
+    assert work.geometry[NOW, 0, 2] > 0.0 < work.geometry[NEW, 0, 2]
+    share = first_switch(scene, work, 1.0, GRAIN, GRAIN)
+    assert share < along
+    assert -GRAIN <= look_at(scene, work, 1.0, share, 0, -1) < 0.0
+    # Earlier, the outlines are apart.
+    enters = along - math.sqrt(4.0 * RADIUS * depth) / (2.0 * half)
+    assert share == pytest.approx(enters, abs=0.05 * along)
+
+
+@pytest.mark.parametrize("depth", [-1e-12, -1e-15, 0.5 * GRAIN])
+def test_a_near_miss_is_none(depth):
+    assert first_switch(*passing(depth), 1.0, GRAIN, GRAIN) == NEVER
+
+
+def fly_by(depth, integrator):
+    """A whole run of one sphere past another, in steps far longer than the touch lasts."""
+    left, right = head_on(0.05, 0.0)
+    left = attrs.evolve(left, position=(-2e-6, 2.0 * RADIUS - depth))
+    right = attrs.evolve(right, position=(0.0, 0.0))
+    return watched(PolygonSystem([left, right], [ELASTIC, Spring()], integrator), 8e-5)
+
+
+@by_adaptive
+def test_no_graze_is_missed_in_a_run(integrator):
+    for tolerance in (1e-9, 1e-10):
+        setting = attrs.evolve(integrator, tolerance=tolerance)
+        grazes = [fly_by(depth, setting).contacts for depth in (1e-10, 2e-12, -1e-12, -1e-10)]
+        assert grazes == [1, 1, 0, 0]
+
+
+def wandering(seed, reaching=False):
+    """A random scene whose bodies move and turn by some of the skin in one step."""
+    rng = np.random.default_rng([seed, 3])
+    bodies = bodies_of(random_scene(seed), surface_density=2.0)
+    size = [3e-7, 3e-7, 3e-2]
+    change = rng.normal(size=(len(bodies), 3)) * size
+    velocities = [change + 0.7 * rng.normal(size=change.shape) * size for _ in range(2)]
+    return stepped(bodies, change, velocities, reaching)
+
+
+def closest_of(work, row):
+    """The row of the same two bodies that is flagged as closest."""
+    bodies = set(work.candidates[row, [0, 2]])
+    rows = range(work.tally[CANDIDATES])
+    return next(
+        k for k in rows if work.candidates[k, CLOSEST] and set(work.candidates[k, [0, 2]]) == bodies
+    )
+
+
+def worst_margin(scene, work, shares, reaching):
+    """The least of all that must not become negative, at every share [m]."""
+    rows = range(work.tally[CANDIDATES])
+    closed = work.geometry[NOW, : len(rows), 2] < 0.0
+    rivals = [closest_of(work, row) for row in rows] if reaching else []
+    worst = []
+    for share in shares:
+        interpolate(work, 1.0, share)
+        locate_contacts(scene, work, SCRATCH)
+        gaps = work.geometry[SCRATCH, : len(rows), 2]
+        least = np.where(closed, -gaps, gaps).min(initial=math.inf)
+        worst.append(min(least, (gaps - gaps[rivals]).min(initial=math.inf) if reaching else least))
+    return np.array(worst)
+
+
+@cache
+def found(seed, reaching):
+    """Scene, work arrays, and the share at which the first switch is found."""
+    scene, work = wandering(seed, reaching)
+    find = compose(first_switch, REACHING if reaching else {}, jit=False)
+    return scene, work, find(scene, work, 1.0, GRAIN, GRAIN)
+
+
+@pytest.mark.parametrize("reaching", [False, True], ids=["touch", "closest"])
+@pytest.mark.parametrize("seed", SCENES)
+def test_the_first_switch_is_located_to_the_grain(seed, reaching):
+    scene, work, share = found(seed, reaching)
+    before = np.linspace(0.0, min(share, 1.0), 200)
+    assert worst_margin(scene, work, before, reaching).min() >= -GRAIN
+    if share < 1.0:
+        assert -GRAIN <= worst_margin(scene, work, [share], reaching)[0] < 0.0
+
+
+def test_these_scenes_switch_in_every_way():
+    touch, closest = ([found(seed, reaching)[2] for seed in SCENES] for reaching in (False, True))
+    assert sum(share < 1.0 for share in touch) > 8
+    assert NEVER in touch
+    assert any(a < b for a, b in zip(closest, touch, strict=True))
+
+
+@by_adaptive
+def test_a_run_that_ends_steps_at_switches_is_as_smooth_as_its_forces(integrator):
+    """A turning star on a sphere: pairs open and close; no step near them is rejected for long."""
+    bodies = [
+        Body(star(), (0.0, 0.0), 0.3, (0.02, 0.0), 4e3, surface_density=2.0),
+        Body(Sphere(4e-6), (14e-6, 1e-6), velocity=(-0.05, 0.0), surface_density=2.0),
+    ]
+    end = watched(PolygonSystem(bodies, [ELASTIC, Spring(1e-2)], integrator), 1e-3)
+    assert end.status.name == "FINISHED"
+    assert end.contacts >= 3
+    assert end.rejected < 0.5 * end.steps

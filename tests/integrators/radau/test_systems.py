@@ -1,0 +1,86 @@
+"""Elimination in place against numpy."""
+
+import numpy as np
+import pytest
+
+from flocsim.integrators.radau.systems import factorise, solve
+
+
+def systems(matrix, load, which=0):
+    """Two systems in the layout of `linear`, one of them the given one, the other at random."""
+    size = len(load)
+    made = np.random.default_rng(size).normal(size=(2, size, size + 2)).astype(complex)
+    made[which, :, :size], made[which, :, size] = matrix, load
+    return made
+
+
+def solved(matrix, load, which=0):
+    """The solution by `linear`; None where it finds the matrix singular."""
+    system = systems(matrix, load, which)
+    if not factorise(system, which):
+        return None
+    solve(system, which)
+    return system[which, :, len(load)]
+
+
+def random_complex(rng, *shape):
+    return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 6, 9, 15])
+@pytest.mark.parametrize("which", [0, 1])
+def test_random_systems_agree_with_numpy(size, which):
+    rng = np.random.default_rng(size)
+    for _ in range(20):
+        matrix, load = random_complex(rng, size, size), random_complex(rng, size)
+        expected = np.linalg.solve(matrix, load)
+        grain = np.linalg.cond(matrix) * np.finfo(float).eps * np.abs(expected).max()
+        assert np.abs(solved(matrix, load, which) - expected).max() <= 10.0 * grain
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_other_system_is_left_alone(which):
+    rng = np.random.default_rng(7)
+    system = systems(random_complex(rng, 6, 6), random_complex(rng, 6), which)
+    before = system[1 - which].copy()
+    assert factorise(system, which)
+    solve(system, which)
+    assert np.array_equal(system[1 - which], before)
+
+
+def test_a_factorised_system_serves_many_loads():
+    rng = np.random.default_rng(8)
+    matrix = random_complex(rng, 9, 9)
+    system = systems(matrix, np.zeros(9))
+    assert factorise(system, 0)
+    for _ in range(5):
+        load = random_complex(rng, 9)
+        system[0, :, 9] = load
+        solve(system, 0)
+        assert np.abs(matrix @ system[0, :, 9] - load).max() < 1e-11
+
+
+def test_a_real_system_has_a_real_solution():
+    rng = np.random.default_rng(9)
+    matrix, load = rng.normal(size=(6, 6)), rng.normal(size=6)
+    assert not solved(matrix, load).imag.any()
+
+
+def test_zero_on_the_diagonal_needs_pivoting():
+    assert solved([[0.0, 2.0], [3.0, 0.0]], [4.0, 9.0]).tolist() == [3.0, 2.0]
+
+
+def test_rows_of_masses_and_inertias_lie_many_orders_apart():
+    """Kilograms beside kg m²: the solution stays exact to its own scale."""
+    rng = np.random.default_rng(3)
+    scales = np.array([1e-10, 1e-10, 1e-21])
+    matrix = np.diag(scales) + 0.1 * np.sqrt(np.outer(scales, scales)) * rng.normal(size=(3, 3))
+    exact = np.array([1e-3, -2e-3, 50.0])
+    assert solved(matrix, matrix @ exact).real == pytest.approx(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.zeros((2, 2)), [[1.0, 2.0], [2.0, 4.0]], [[np.nan, 1.0], [1.0, 1.0]]]
+)
+def test_singular_and_undefined_systems_are_refused(matrix):
+    assert solved(np.array(matrix), np.array([1.0, 1.0])) is None

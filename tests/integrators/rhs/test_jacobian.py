@@ -1,0 +1,169 @@
+"""STIFFNESS and DAMPING against central differences of the forces, on random scenes.
+
+The flags of the pairs stay, and tangential displacements move along with the bodies, as they do
+inside a step. Stiffness is compared at rest: what turning does to the rates is left out of it.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from flocsim import Body
+from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST, NOW, STIFFNESS
+from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.integrators.rhs.views import tangential_rate
+from tests.helpers.fast_cases import FORCES, GAPS, random_case
+from tests.helpers.fast_scene import FastScene
+from tests.helpers.trial_scenes import (
+    Hertz,
+    Lubrication,
+    PolygonSystem,
+    Spring,
+    Trap,
+    head_on,
+    star,
+)
+
+SCENES = range(40)
+ALL = {gap: tuple(name for name in FORCES if not name.endswith(gap)) for gap in GAPS}
+
+
+def forces_in_first(scene, work):
+    """Forces in state FIRST by the flags that are there."""
+    locate_and_rate(scene, work, FIRST, FIRST)
+    sum_forces(scene, work, 0.0, FIRST, FIRST)
+
+
+def derivatives_now(scene, work):
+    """Both matrices in state NOW."""
+    assemble_jacobian(scene, work, 0.0, 1.0)
+
+
+class Differences:
+    """A scene whose forces are differenced coordinate by coordinate."""
+
+    def __init__(self, system, slips=None, moving=True):
+        """List, flag and locate the pairs of a system where its bodies are."""
+        self.fast = FastScene(system, jit=False)
+        self.fast.loads(slips)
+        self.scene, self.work = self.fast.scene, self.fast.work
+        if not moving:
+            self.work.motion[NOW, :, 3:] = 0.0
+        self.evaluate = system.compose(entry=forces_in_first, jit=False)
+        self.assemble = system.compose(entry=derivatives_now, jit=False)
+
+    @property
+    def lever(self):
+        """How far the outlines move for a unit of each coordinate (3n,)."""
+        return (self.scene.bodies[:, BOUNDING_RADIUS, None] ** [0, 0, 1]).ravel()
+
+    def carried(self, body, axis):
+        """Change of every pair's displacement for a unit of a coordinate."""
+        work = self.work
+        kept = work.motion[NOW, :, 3:].copy()
+        work.motion[NOW, :, 3:] = 0.0
+        work.motion[NOW, body, 3 + axis] = 1.0
+        rows = range(work.tally[CANDIDATES])
+        rates = [tangential_rate(work, NOW, row) * work.candidates[row, CLOSED] for row in rows]
+        work.motion[NOW, :, 3:] = kept
+        return np.array(rates)
+
+    def loads(self, body, axis, by):
+        """All forces (3n,) with one coordinate (axis 0–2) or velocity (3–5) changed."""
+        work = self.work
+        work.motion[FIRST] = work.motion[NOW]
+        work.motion[FIRST, body, axis] += by
+        work.slip[FIRST] = work.slip[NOW]
+        if axis < 3:
+            work.slip[FIRST, : work.tally[CANDIDATES]] += by * self.carried(body, axis)
+        self.evaluate(self.scene, work)
+        return work.rates[FIRST, :, 3:].ravel().copy()
+
+    def measured(self, part, size):
+        """Minus the derivatives by places (part 0) or velocities (part 3), per metre of outline."""
+        columns = []
+        for k, lever in enumerate(self.lever):
+            by = size / lever
+            ends = [self.loads(k // 3, k % 3 + part, sign * by) for sign in (1.0, -1.0)]
+            columns.append((ends[1] - ends[0]) / (2.0 * by))
+        return self.scaled(np.array(columns).T)
+
+    def scaled(self, matrix):
+        """Torques as forces at the outline, angles as its displacements."""
+        return matrix / self.lever / self.lever[:, None]
+
+    def assembled(self, which):
+        """The matrix that the implicit methods use."""
+        self.assemble(self.scene, self.work)
+        return self.scaled(self.work.jacobian[which])
+
+    def miss(self, which, size):
+        """The largest difference, as a share of the largest entry."""
+        found = self.measured(3 if which == DAMPING else 0, size)
+        scale = np.abs(found).max()
+        return np.abs(self.assembled(which) - found).max() / scale if scale > 0.0 else 0.0
+
+
+@cache
+def differences(seed, names, moving):
+    case = random_case(seed)
+    slips = case.slips if "contact" in names else None
+    return Differences(case.system(*names), slips, moving)
+
+
+ARMS = 2e-3
+"""Left out of STIFFNESS: the point of a tangential force shifts with the overlap."""
+
+
+@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("gap", GAPS)
+def test_stiffness_of_all_forces_together(seed, gap):
+    assert differences(seed, ALL[gap], False).miss(STIFFNESS, 1e-12) < ARMS
+
+
+@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("gap", GAPS)
+def test_damping_of_all_forces_together(seed, gap):
+    assert differences(seed, ALL[gap], True).miss(DAMPING, 1e-6) < 1e-5
+
+
+@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("name", [name for name in FORCES if name != "gravity"])
+def test_stiffness_of_every_force_alone(seed, name):
+    allowed = ARMS if name == "contact" else 1e-6
+    assert differences(seed, (name,), False).miss(STIFFNESS, 1e-12) < allowed
+
+
+@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("name", ["drag", "contact"])
+def test_damping_of_every_force_alone(seed, name):
+    assert differences(seed, (name,), True).miss(DAMPING, 1e-6) < 1e-5
+
+
+def own_scene():
+    """Every kind of a user's own force, without derivatives of its own, at work at once."""
+    left, right = head_on(0.05, -2e-7)
+    forces = [Trap(0.02, 1e-13), Spring(5e-3, -2e-6), Lubrication(), Hertz(1e4, 20.0, 2.0)]
+    ragged = Body(star(), (3e-6, 13e-6), 0.4, (0.0, -0.05), 300.0, surface_density=2.0)
+    return PolygonSystem([left, right, ragged], forces)
+
+
+@pytest.mark.parametrize(
+    ("which", "moving", "size"), [(STIFFNESS, False, 1e-12), (DAMPING, True, 1e-6)]
+)
+def test_forces_of_a_user_are_differenced(which, moving, size):
+    assert Differences(own_scene(), moving=moving).miss(which, size) < 2e-3
+
+
+def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
+    """Newton's third law in every column of both matrices."""
+    for seed in SCENES:
+        found = differences(seed, ("contact",), True)
+        found.assemble(found.scene, found.work)
+        for which in (STIFFNESS, DAMPING):
+            matrix = found.work.jacobian[which]
+            total = matrix.reshape(-1, 3, matrix.shape[1]).sum(axis=0)[:2]
+            scale = np.abs(matrix / found.lever)[np.arange(len(matrix)) % 3 < 2].max()
+            assert np.abs(total / found.lever).max() <= 1e-12 * scale

@@ -1,0 +1,91 @@
+"""Masks given directly: every format, labels, and what is no mask."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flocsim.errors import ImageError
+from flocsim.io.images.masks import read_masks, segment_mask
+
+MASK = np.zeros((30, 40), np.uint8)
+MASK[0:10, 3:15] = MASK[15:28, 20:36] = 1
+HOLED = MASK.copy()
+HOLED[20:23, 25:28] = 0
+
+
+def areas(path):
+    """Areas of the flocs of every mask in a file, by the mask's name."""
+    return {name: [r.area for r in segment_mask(mask).regions] for name, mask in read_masks(path)}
+
+
+@pytest.mark.parametrize("name", ["m.png", "m.tif", "m.bmp", "m.jpg"])
+@pytest.mark.parametrize("inside", [1, 255])
+def test_pictures_of_two_values_are_masks(tmp_path, name, inside):
+    if name == "m.jpg" and inside == 1:
+        inside = 200
+    Image.fromarray(MASK * inside).save(
+        tmp_path / name, **({"quality": 95} if "jpg" in name else {})
+    )
+    assert areas(tmp_path / name) == {name: [120, 208]}
+
+
+def test_bits_colours_and_holes(tmp_path):
+    Image.fromarray(HOLED.astype(bool)).save(tmp_path / "bits.png")
+    Image.fromarray(np.dstack([HOLED * 255] * 3)).save(tmp_path / "colour.png")
+    assert areas(tmp_path / "bits.png") == {"bits.png": [120, 208]}
+    assert areas(tmp_path / "colour.png") == {"colour.png": [120, 208]}
+
+
+def test_labels_keep_touching_flocs_apart(tmp_path):
+    labels = np.zeros((20, 30), np.uint16)
+    labels[2:12, 2:12], labels[2:12, 12:25] = 300, 7
+    Image.fromarray(labels).save(tmp_path / "labels.png")
+    np.save(tmp_path / "labels.npy", labels)
+    assert sorted(areas(tmp_path / "labels.png")["labels.png"]) == [100, 130]
+    assert sorted(areas(tmp_path / "labels.npy")["labels.npy"]) == [100, 130]
+
+
+def test_a_label_in_two_places_is_two_flocs():
+    labels = np.zeros((20, 40), int)
+    labels[2:12, 2:12] = labels[2:12, 15:28] = 4
+    labels[2:12, 28:38] = 9
+    found = segment_mask(labels).regions
+    assert [(r.area, r.bbox) for r in found] == [
+        (100, (2, 2, 12, 12)), (130, (2, 15, 12, 28)), (100, (2, 28, 12, 38))
+    ]  # fmt: skip
+    assert found[1].centroid == (21.0, 6.5)
+
+
+def test_an_empty_mask_has_no_flocs():
+    assert segment_mask(np.zeros((5, 5), int)).regions == ()
+
+
+def test_archives_plain_and_packed(tmp_path):
+    np.savez(tmp_path / "plain.npz", a=MASK, b=MASK.astype(bool))
+    assert areas(tmp_path / "plain.npz") == {"plain.npz:a": [120, 208], "plain.npz:b": [120, 208]}
+    np.savez(tmp_path / "packed.npz", m0=np.packbits(MASK), shapes=np.array([MASK.shape]))
+    assert areas(tmp_path / "packed.npz") == {"packed.npz:m0": [120, 208]}
+
+
+def test_small_and_large_masks_are_rejected_with_the_reason():
+    found = segment_mask(MASK.astype(int), min_radius=7)
+    assert [r.area for r in found.regions] == [208]
+    assert found.rejected_by_reason() == {"too small": 1}
+    assert segment_mask(MASK.astype(int), max_radius=7).rejected_by_reason() == {"too large": 1}
+
+
+@pytest.mark.parametrize(
+    "content", [np.linspace(0, 1, 12).reshape(3, 4), np.zeros(5), np.arange(-2, 4).reshape(2, 3)]
+)
+def test_arrays_that_are_no_masks_are_refused(tmp_path, content):
+    np.save(tmp_path / "m.npy", content)
+    with pytest.raises(ImageError, match=r"m\.npy.*mask"):
+        read_masks(tmp_path / "m.npy")
+
+
+def test_damaged_and_absent_files_are_told(tmp_path):
+    (tmp_path / "m.npz").write_bytes(b"PK no archive")
+    with pytest.raises(ImageError, match="NumPy"):
+        read_masks(tmp_path / "m.npz")
+    with pytest.raises(ImageError, match="no such"):
+        read_masks(tmp_path / "absent.npy")

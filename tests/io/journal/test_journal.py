@@ -1,0 +1,166 @@
+"""The journal: records whole or not at all, every damage found, nothing wrong believed."""
+
+import errno
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flocsim.errors import FileError
+from flocsim.io.files import replace_by_blocks, seal
+from flocsim.io.journal import journal as module
+from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
+from flocsim.io.journal.records import CHUNK, MARK, SESSION, Damage, Record, encode, scan
+
+RECORDS = [
+    encode(SESSION, {"short": "abc"}),
+    encode(CHUNK, {"first": 0, "type": "κ"}, bytes(range(256)) * 3),
+    encode(CHUNK, {"first": 1}, MARK + b"data that look like a head"),
+    encode(CHUNK, {"first": 2}, b""),
+]
+WHOLE = b"".join(RECORDS)
+
+
+def read(data):
+    """What a scan finds in bytes."""
+    return list(scan(io.BytesIO(data)))
+
+
+def firsts(found):
+    """The chunks among what was found."""
+    return [r.description["first"] for r in found if isinstance(r, Record) and r.kind == CHUNK]
+
+
+def test_what_is_written_is_read():
+    found = read(WHOLE)
+    assert [record.kind for record in found] == [SESSION, CHUNK, CHUNK, CHUNK]
+    assert found[1].description == {"first": 0, "type": "κ"}
+    for record in found[1:]:
+        assert WHOLE[record.offset :][: record.length] in RECORDS[firsts([record])[0] + 1]
+
+
+@given(st.integers(0, len(WHOLE) - 1), st.integers(0, 7))
+def test_any_flipped_bit_is_found_and_costs_one_record(place, bit):
+    data = bytearray(WHOLE)
+    data[place] ^= 1 << bit
+    found = read(bytes(data))
+    damaged = [each for each in found if isinstance(each, Damage)]
+    assert damaged
+    assert len([each for each in found if isinstance(each, Record)]) == 3
+    assert all(each.start <= place < each.stop or len(damaged) > 1 for each in damaged)
+
+
+@given(st.integers(0, len(WHOLE)))
+def test_what_is_cut_off_costs_what_it_cuts(place):
+    found = read(WHOLE[:place])
+    ends = [sum(map(len, RECORDS[: k + 1])) for k in range(4)]
+    assert len([each for each in found if isinstance(each, Record)]) == sum(
+        end <= place for end in ends
+    )
+    assert any(isinstance(each, Damage) for each in found) == (place not in [0, *ends])
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_can_be_scanned(data):
+    stops = [each.stop for each in read(data) if isinstance(each, Damage)]
+    assert stops == ([len(data)] if data else []) or MARK in data
+
+
+def test_a_damaged_chunk_is_named():
+    data = bytearray(WHOLE)
+    data[len(RECORDS[0]) + len(RECORDS[1]) - 1] ^= 1
+    [damage] = [each for each in read(bytes(data)) if isinstance(each, Damage)]
+    assert damage.description["first"] == 0
+    assert (damage.start, damage.stop) == (len(RECORDS[0]), len(RECORDS[0]) + len(RECORDS[1]))
+
+
+def written(folder, data):
+    """A journal file with these bytes."""
+    path = folder / "r.h5.journal"
+    path.write_bytes(data)
+    return path
+
+
+def test_a_half_written_record_is_cut_off_by_the_next(tmp_path):
+    path = written(tmp_path, WHOLE[:-5])
+    journal = Journal(path)
+    assert (len(journal.records), len(journal.damage)) == (3, 1)
+    offset = journal.append(RECORDS[1])
+    assert offset == sum(map(len, RECORDS[:3]))
+    assert journal.read(offset, len(RECORDS[1])) == RECORDS[1]
+    journal.close()
+    assert firsts(read(path.read_bytes())) == [0, 1, 0]
+
+
+def test_damage_in_the_middle_stays_where_it_is(tmp_path):
+    data = bytearray(WHOLE)
+    data[len(RECORDS[0]) + 100] ^= 1
+    journal = Journal(written(tmp_path, bytes(data)))
+    journal.append(RECORDS[1])
+    journal.close()
+    assert journal.path.read_bytes() == bytes(data) + RECORDS[1]
+
+
+class FullDisk(io.BytesIO):
+    """A file that takes a few bytes more, then none."""
+
+    def write(self, data):
+        """Half of it the first time."""
+        if self.tell() > 10:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(bytes(data)[:20])
+
+
+def test_a_full_disk_leaves_the_journal_as_it_was(tmp_path):
+    journal = Journal(tmp_path / "r.h5.journal")
+    journal.file.close()
+    journal.file = FullDisk()
+    with pytest.raises(FileError, match="No space left") as caught:
+        journal.append(RECORDS[1])
+    assert caught.value.exit_code == 74
+    assert journal.file.getvalue() == b""
+    assert journal.end == 0
+
+
+def test_two_jobs_do_not_write_one_journal(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LOCK_SECONDS", 0.1)
+    first = Journal(tmp_path / "r.h5.journal")
+    with pytest.raises(FileError, match="being written by another job"):
+        Journal(tmp_path / "r.h5.journal")
+    first.close()
+    Journal(tmp_path / "r.h5.journal").remove()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_journal_that_cannot_be_opened_is_told(tmp_path):
+    with pytest.raises(FileError, match="could not be written"):
+        Journal(tmp_path / "missing" / "r.h5.journal")
+    (tmp_path / "r.h5").symlink_to(tmp_path / "elsewhere.h5")
+    assert journal_path(tmp_path / "r.h5") == tmp_path / "elsewhere.h5.journal"
+
+
+def test_a_journal_in_memory_reads_what_it_was_given():
+    journal = MemoryJournal()
+    assert [journal.append(record) for record in RECORDS[:2]] == [0, len(RECORDS[0])]
+    assert journal.read(len(RECORDS[0]), len(RECORDS[1])) == RECORDS[1]
+
+
+def test_a_file_written_by_blocks_is_the_file_written_at_once(tmp_path):
+    blocks = [b"\x89HDF\r\n\x1a\n", b"abc" * 1000, b""]
+    data = b"".join(blocks)
+    replace_by_blocks(tmp_path / "a.h5", len(data), iter(blocks))
+    assert (tmp_path / "a.h5").read_bytes() == seal(data)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_blocks_that_fail_leave_the_old_file(tmp_path):
+    def failing():
+        yield b"abc"
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "a.h5").write_bytes(b"old")
+    with pytest.raises(FileError, match="No space left"):
+        replace_by_blocks(tmp_path / "a.h5", 100, failing())
+    assert (tmp_path / "a.h5").read_bytes() == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

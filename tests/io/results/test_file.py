@@ -1,0 +1,291 @@
+"""The results file: round trip, equal bytes, xarray, and every way in which a file can be wrong."""
+
+import errno
+import io
+import os
+import re
+
+import attrs
+import h5py
+import numpy as np
+import pytest
+
+from flocsim.errors import FileError, UsageError
+from flocsim.io import files
+from flocsim.io.provenance import provenance
+from flocsim.io.results.file import (
+    OUTCOMES,
+    REPLICATES,
+    TABLE,
+    read_results,
+    same_data,
+    write_results,
+)
+from tests.helpers.synthetic_results import FAILURES, make_results
+
+SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A small results file and what is in it."""
+    results = make_results(**SMALL)
+    write_results(tmp_path / "results.h5", results)
+    return tmp_path / "results.h5", results
+
+
+def reseal(path, change):
+    """Change a file by h5py and seal it again, as another version of the program might write."""
+    image = io.BytesIO(files.read_sealed(path))
+    with h5py.File(image, "r+") as file:
+        change(file)
+    files.replace_file(path, files.seal(image.getvalue()))
+
+
+def test_what_is_written_is_read(written):
+    path, results = written
+    copy = read_results(path)
+    assert copy.types == results.types
+    assert copy.run == results.run
+    assert copy.failures == FAILURES
+    np.testing.assert_array_equal(copy.vertices, results.vertices)
+    np.testing.assert_array_equal(copy.delta, results.delta)
+    for group in ("replicates", "probabilities"):
+        for name, array in getattr(results, group).items():
+            stored = getattr(copy, group)[name]
+            assert stored.dtype == array.dtype
+            np.testing.assert_array_equal(stored, array)
+
+
+def test_equal_results_give_equal_data_whatever_the_run(tmp_path, written):
+    path, _ = written
+    run = {"wall_time": 99.0, "config": "preset = 'si'\n" * 5000, "ranks": 4}
+    write_results(tmp_path / "again.h5", make_results(**SMALL, run=run))
+    assert same_data(path, tmp_path / "again.h5") == []
+    assert path.read_bytes() != (tmp_path / "again.h5").read_bytes()
+
+
+def test_same_results_and_run_give_the_same_file(tmp_path, written):
+    path, results = written
+    write_results(tmp_path / "again.h5", results)
+    assert path.read_bytes() == (tmp_path / "again.h5").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["replicates/d_c_max", "replicates/outcome", "replicates/failure"])
+def test_a_single_changed_bit_is_named(written, tmp_path, name):
+    path, results = written
+    group, variable = name.split("/")
+    getattr(results, group)[variable].reshape(-1).view("u1")[0] ^= 1
+    write_results(tmp_path / "other.h5", results)
+    assert same_data(path, tmp_path / "other.h5") == [name]
+
+
+def test_differing_coordinates_and_shapes_are_named(written, tmp_path):
+    path, results = written
+    write_results(tmp_path / "other.h5", attrs.evolve(results, types=("I", "II")))
+    assert same_data(path, tmp_path / "other.h5") == ["probabilities/type", "replicates/type"]
+    write_results(tmp_path / "other.h5", make_results(**SMALL | {"count": 6}))
+    assert "replicates/steps" in same_data(path, tmp_path / "other.h5")
+
+
+def test_same_data_tells_nan_payloads_and_zero_signs(written, tmp_path):
+    path, results = written
+    results.replicates["error"][...] = 0.0
+    write_results(path, results)
+    results.replicates["error"][...] = -0.0
+    write_results(tmp_path / "other.h5", results)
+    assert same_data(path, tmp_path / "other.h5") == ["replicates/error"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_xarray_opens_each_group_with_named_coordinates(written):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    path, results = written
+    with xarray.open_dataset(path, group="probabilities", engine="h5netcdf") as table:
+        assert table["pr_class"].dims == ("type", "vertices", "delta", "class")
+        chosen = table["n_class"].sel(type="I", vertices=8, delta=0.7)
+        assert chosen.sel({"class": "B"}) == results.probabilities["n_class"][0, 1, 1, 1]
+        assert set(table.data_vars) == set(TABLE)
+    with xarray.open_dataset(path, group="replicates", engine="h5netcdf") as replicates:
+        outcome = replicates["outcome"]
+        assert outcome.dims == ("type", "vertices", "delta", "replicate")
+        assert outcome.dtype == np.uint8
+        assert tuple(outcome.attrs["flag_meanings"].split()) == OUTCOMES
+        assert outcome.attrs["flag_values"].tolist() == list(range(7))
+        assert replicates["t_end"].attrs["units"] == "s"
+        assert replicates["t_end"].dtype == float
+        assert set(replicates.data_vars) == set(REPLICATES)
+    with xarray.open_dataset(path, group="run", engine="h5netcdf") as run:
+        assert run["preset"] == "tang2014"
+
+
+def test_every_dataset_tells_its_unit_and_meaning(written):
+    with h5py.File(written[0]) as file:
+        for group in ("probabilities", "replicates"):
+            for dataset in file[group].values():
+                assert dataset.attrs["units"]
+                assert dataset.attrs["long_name"]
+
+
+def test_no_temporary_file_stays_and_the_mode_is_the_usual_one(written):
+    path, _ = written
+    assert [entry.name for entry in path.parent.iterdir()] == ["results.h5"]
+    (path.parent / "usual").touch()
+    assert path.stat().st_mode == (path.parent / "usual").stat().st_mode
+
+
+def test_a_link_is_written_through(tmp_path, written):
+    path, results = written
+    (tmp_path / "link.h5").symlink_to(path)
+    write_results(tmp_path / "link.h5", attrs.evolve(results, run={"new": 1}))
+    assert (tmp_path / "link.h5").is_symlink()
+    assert read_results(path).run == {"new": 1}
+
+
+@pytest.mark.parametrize("place", ["missing/r.h5", "file/r.h5", "folder", "x" * 300, "nul\0.h5"])
+def test_unwritable_places_are_told(tmp_path, place):
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(FileError, match=re.escape(place)) as caught:
+        write_results(tmp_path / place, make_results(**SMALL))
+    assert caught.value.exit_code == 74
+    assert "\n" not in str(caught.value)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_what_is_no_ordinary_file_is_neither_replaced_nor_read(tmp_path):
+    # A pipe of our own, never a real device: a broken guard would really replace it.
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(FileError, match="not an ordinary file"):
+        write_results(tmp_path / "pipe.h5", make_results(**SMALL))
+    assert (tmp_path / "pipe.h5").is_fifo()
+    with pytest.raises(FileError, match="not an ordinary file"):
+        read_results(tmp_path / "pipe.h5")
+
+
+@pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left"), KeyboardInterrupt()])
+def test_a_failed_write_leaves_the_old_file_and_no_rest(written, monkeypatch, failure):
+    path, results = written
+    before = path.read_bytes()
+
+    def fail(descriptor):
+        raise failure
+
+    monkeypatch.setattr(files.os, "fsync", fail)
+    expected = FileError if isinstance(failure, OSError) else KeyboardInterrupt
+    with pytest.raises(expected):
+        write_results(path, attrs.evolve(results, run={}))
+    assert path.read_bytes() == before
+    assert [entry.name for entry in path.parent.iterdir()] == ["results.h5"]
+
+
+@pytest.mark.parametrize(
+    ("content", "finding"),
+    [
+        (b"", "not an HDF5 file"),
+        (b"type,vertices\nI,4\n", "not an HDF5 file"),
+        (files.HDF5_SIGNATURE, "checksum"),
+        (files.seal(files.HDF5_SIGNATURE + b"junk"), "no readable results"),
+    ],
+)
+def test_files_of_another_kind_are_refused(tmp_path, content, finding):
+    path = tmp_path / "strange.h5"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=finding) as caught:
+        read_results(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_absent_files_and_folders_are_refused(tmp_path):
+    with pytest.raises(FileError, match="No such file"):
+        read_results(tmp_path / "absent.h5")
+    with pytest.raises(FileError, match="not an ordinary file"):
+        read_results(tmp_path)
+
+
+def test_foreign_hdf5_is_refused(tmp_path):
+    path = tmp_path / "foreign.h5"
+    with h5py.File(path, "w") as file:
+        file["x"] = 1.0
+    with pytest.raises(FileError, match="another kind"):
+        read_results(path)
+    path.write_bytes(files.seal(path.read_bytes()))
+    with pytest.raises(FileError, match="not a results file"):
+        read_results(path)
+
+
+def test_cut_and_damaged_files_are_refused(written):
+    path, _ = written
+    data = path.read_bytes()
+    places = np.random.default_rng(5).integers(0, len(data), 60)
+    for place in places:
+        path.write_bytes(data[:place])
+        with pytest.raises(FileError):
+            read_results(path)
+        damaged = bytearray(data)
+        damaged[place] ^= 0x10
+        path.write_bytes(damaged)
+        with pytest.raises(FileError):
+            read_results(path)
+
+
+@pytest.mark.parametrize("version", [0, 1, 3, "1.5"])
+def test_other_versions_are_refused(written, version):
+    path, _ = written
+    reseal(path, lambda file: file.attrs.create("schema_version", version))
+    with pytest.raises(FileError, match=f"schema version {version}"):
+        read_results(path)
+
+
+def test_a_missing_dataset_is_told(written):
+    path, _ = written
+    reseal(path, lambda file: file.__delitem__("replicates/steps"))
+    with pytest.raises(FileError, match="steps"):
+        read_results(path)
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "value", "finding"),
+    [
+        ("replicates", "steps", None, "steps"),
+        ("replicates", "extra", 1, "extra"),
+        ("replicates", "steps", np.zeros((2, 2, 2, 4), int), "shape"),
+        ("replicates", "steps", np.full((2, 2, 2, 5), 0.5), "do not fit"),
+        ("replicates", "outcome", np.full((2, 2, 2, 5), -1), "do not fit"),
+        ("replicates", "steps", np.full((2, 2, 2, 5), np.nan), "do not fit"),
+        ("replicates", "failure", np.full((2, 2, 2, 5), 3), "failure"),
+        ("probabilities", "pr_a", np.zeros((2, 2)), "shape"),
+        ("probabilities", "pr_a", [["a"]], "numbers"),
+    ],
+)
+def test_wrong_arrays_are_refused(group, name, value, finding):
+    results = make_results(**SMALL)
+    arrays = dict(getattr(results, group)) | {name: value}
+    if value is None:
+        del arrays[name]
+    with pytest.raises(UsageError, match=finding):
+        attrs.evolve(results, **{group: arrays})
+
+
+def test_run_takes_scalars_only(tmp_path):
+    with pytest.raises(UsageError, match="run/list"):
+        write_results(tmp_path / "r.h5", make_results(**SMALL, run={"list": [1]}))
+    assert not list(tmp_path.iterdir())
+
+
+def test_provenance_can_be_stored_whatever_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["flocsim", "ensemble", "na\udcffme with blank.toml"])
+    facts = provenance('preset = "tang2014"\n# κ', 3, "abc")
+    write_results(tmp_path / "r.h5", make_results(**SMALL, run=facts))
+    stored = read_results(tmp_path / "r.h5").run
+    assert stored == facts
+    assert stored["config"] == 'preset = "tang2014"\n# κ'
+    assert (stored["seed"], stored["kernel_fingerprint"]) == (3, "abc")
+    assert stored["numpy_version"] == np.__version__
+    assert stored["h5py_version"] == h5py.__version__
+    assert stored["command"] == "flocsim ensemble 'na?me with blank.toml'"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00", stored["date"])

@@ -1,0 +1,145 @@
+"""The shape library: what is written is read, and nothing else is."""
+
+import h5py
+import numpy as np
+import pytest
+
+from flocsim.errors import FileError, UsageError
+from flocsim.geometry.fit import fit_mask
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.io.files import read_sealed, seal
+from flocsim.io.images.pictures import segment
+from flocsim.io.shapes.library import make_entry, read_library, write_library
+
+PIXEL = 0.95e-6
+
+
+def picture():
+    """Two bright flocs on black: an L and a disk."""
+    grey = np.zeros((60, 80))
+    grey[10:40, 10:18] = grey[32:40, 10:35] = 0.9
+    y, x = np.mgrid[:60, :80]
+    grey[np.hypot(x - 60, y - 25) < 9] = 0.9
+    return grey
+
+
+@pytest.fixture(scope="module")
+def entries():
+    regions = segment(picture(), noise_scale=0).regions
+    return [
+        make_entry(
+            "é 1.png", region, {n: fit_mask(region.mask, vertices=n) for n in (1, 2, 6)}, PIXEL, 1.0
+        )
+        for region in regions
+    ]
+
+
+def test_entries_survive_the_file(tmp_path, entries):
+    write_library(tmp_path / "s.h5", entries)
+    read = read_library(tmp_path / "s.h5")
+    assert [entry.floc_id for entry in read] == ["é 1.png#1", "é 1.png#2"]
+    for old, new in zip(entries, read, strict=True):
+        for name in ("image", "pixel_size", "centroid", "area", "equivalent_radius",
+                     "spheroradius"):  # fmt: skip
+            assert getattr(new, name) == getattr(old, name)
+        assert list(new.fits) == [1, 2, 6]
+        for n, fit in new.fits.items():
+            assert np.array_equal(fit.vertices, old.fits[n].vertices)
+            assert (fit.radius, fit.relative_error) == (
+                old.fits[n].radius, old.fits[n].relative_error
+            )  # fmt: skip
+
+
+def test_shapes_are_in_metres_around_the_centroid_of_the_floc(entries):
+    for entry in entries:
+        assert isinstance(entry.fits[1].shape, Sphere)
+        assert entry.fits[1].shape.area == pytest.approx(entry.area * PIXEL**2)
+        assert np.allclose(entry.fits[1].vertices, 0, atol=1e-15)
+        shape = entry.fits[6].shape
+        assert shape.area == pytest.approx(entry.area * PIXEL**2, rel=0.05)
+        # The fit covers the floc, so the two centroids agree to a fraction of a pixel.
+        assert np.hypot(*shape.centroid) < 0.5 * PIXEL
+
+
+def test_the_same_entries_give_the_same_bytes(tmp_path, entries):
+    for name in ("a.h5", "b.h5"):
+        write_library(tmp_path / name, entries)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_every_dataset_says_its_units(tmp_path, entries):
+    write_library(tmp_path / "s.h5", entries)
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file["fits/6/vertices"].attrs["units"] == "m"
+        assert file["fits/6/vertices"].shape == (2, 6, 2)
+        datasets = []
+        file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "dtype") else None)
+        assert len(datasets) == 7 + 3 * 3
+        assert all("units" in item.attrs and "long_name" in item.attrs for item in datasets)
+
+
+def changed(path, change):
+    """The library with its HDF5 content changed and sealed anew."""
+    import io
+
+    content = io.BytesIO(read_sealed(path))
+    with h5py.File(content, "r+") as file:
+        change(file)
+    path.write_bytes(seal(content.getvalue()))
+
+
+def cut_vertices(file):
+    values = file["fits/6/vertices"][()]
+    del file["fits/6/vertices"]
+    file["fits/6/vertices"] = values[:, :5]
+
+
+def put_nan(file):
+    file["fits/6/vertices"][0, 0, 0] = np.nan
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda file: file.attrs.__setitem__("schema_version", 2),
+        lambda file: file.attrs.__setitem__("kind", "results"),
+        lambda file: file.attrs.__delitem__("kind"),
+        lambda file: file.__delitem__("flocs/centroid"),
+        lambda file: file.__delitem__("fits"),
+        lambda file: file.create_group("fits/many"),
+        cut_vertices,
+        put_nan,
+    ],
+)
+def test_unknown_content_is_refused(tmp_path, entries, change):
+    path = tmp_path / "s.h5"
+    write_library(path, entries)
+    changed(path, change)
+    with pytest.raises(FileError, match=r"s\.h5") as caught:
+        read_library(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_damage_and_absence_are_told(tmp_path, entries):
+    path = tmp_path / "s.h5"
+    write_library(path, entries)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(FileError, match="damaged"):
+        read_library(path)
+    path.write_text("no HDF5")
+    with pytest.raises(FileError, match="not an HDF5 file"):
+        read_library(path)
+    with pytest.raises(FileError, match="absent"):
+        read_library(tmp_path / "absent.h5")
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, entries):
+    with pytest.raises(FileError):
+        write_library(tmp_path / "no folder" / "s.h5", entries)
+    with pytest.raises(UsageError, match="at least one floc"):
+        write_library(tmp_path / "s.h5", [])
+    with pytest.raises(UsageError, match="twice"):
+        write_library(tmp_path / "s.h5", [entries[0], entries[0]])
+    assert not list(tmp_path.iterdir())
