@@ -11,6 +11,10 @@ from flocsim.errors import UsageError
 from flocsim.fields import flag, is_number, quantity
 from flocsim.geometry.contact.circle_tree import outlines_of
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.laws import LAWS
+
+NO_LAWS = (None,) * len(LAWS)
+"""``Scene.laws`` of a scene without forces, uncompiled."""
 
 
 def read_vector(name, length, unit):
@@ -138,8 +142,9 @@ class Body:
         return self.mass * (1.0 - fluid.density / self.density)
 
 
-def scene_of(bodies, fluid, parameters):
-    """The bodies as one Scene of fresh arrays; ``parameters`` are the forces' numbers."""
+def scene_of(bodies, fluid, parameters=(), laws=NO_LAWS, surface_reach=-1.0, events=0):
+    """The bodies as one Scene of fresh arrays, with what their forces make of it
+    (flocsim.forces.codegen.Pieces); without, a scene that has no laws."""
     shapes = [body.shape for body in bodies]
     columns = (
         [body.mass for body in bodies],
@@ -154,4 +159,7 @@ def scene_of(bodies, fluid, parameters):
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
         **outlines_of(shapes)._asdict(),
         parameters=np.array(parameters, dtype=float),
+        laws=laws,
+        surface_reach=float(surface_reach),
+        events=int(events),
     )

@@ -1,16 +1,22 @@
-"""One compiled function per scene, warm from disk in a new process and never stale.
+"""Compiled functions that are warm from disk in a new process and never stale.
 
-``compose`` takes a driver written in plain Python and the functions that fill its slots
-(flocsim.hooks), clones every function that the driver reaches with those slots replaced, and
-compiles the whole as one. What goes to disk is named by a hash of all that was reached: bytecode,
-constants, Python, numba and numpy versions. An edited kernel therefore has another name; new
-parameter values, which are arguments, do not.
+``compose`` takes a driver written in plain Python and the functions that stand in for its hooks
+(flocsim.hooks), clones every function that the driver reaches with those replaced, and compiles the
+whole as one: an engine, the same for all scenes of a family (method, spheres or polygons, observer).
+``compile_law`` does the same for what a scene's forces add up to (flocsim.laws), and gives the address
+at which the engine calls it, so that other forces never compile an engine.
+
+What goes to disk is named by a hash of all that was reached: bytecode, constants, Python, numba and
+numpy versions. An edited kernel therefore has another name; new parameter values, which are
+arguments, do not.
 
 Kernels must be plain functions that capture nothing: a closure's variables are invisible to
 numba's symbol table, where two of them can collide and silently return each other's answers.
 """
 
 import builtins
+import functools
+import hashlib
 import os
 import re
 import sys
@@ -20,7 +26,6 @@ from pathlib import Path
 
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint, reached, refuse_closure
-from flocsim.numba_internals import pipeline, quick_typing
 
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
@@ -30,10 +35,10 @@ _warned = []
 
 
 class Linker:
-    """Clones functions for one scene, with slots replaced, and hashes what it clones."""
+    """Clones functions, with others in the place of hooks."""
 
     def __init__(self, fillings, transform):
-        """``fillings`` {slot function: scene's function}; ``transform(clone)`` compiles or not."""
+        """``fillings`` {hook: function}; ``transform(clone)`` compiles or not."""
         self.fillings = fillings
         self.transform = transform
         self.clones = {}
@@ -109,21 +114,19 @@ def write_once(path, text):
         os.replace(temporary, path)
 
 
-def compiled(entry, fillings, name, allocates):
-    """The entry compiled as module ``name``, from the disk where that is possible."""
+def linked_module(entry, fillings, name, options):
+    """(module ``name`` whose function ``run`` calls the entry linked, whether the disk keeps it)."""
     import numba
 
-    # Kernels that allocate nothing need no counting of references, which costs more than most work.
-    options = {"nogil": True, "error_model": "numpy", "_nrt": allocates}
+    from flocsim.numba_internals import inner_compiler, typed_once
+
+    inner = {**options, **UNWRAPPED, **inner_compiler()}
 
     def transform(clone):
         clone.__module__ = name
         # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
         small = len(clone.__code__.co_code) < INLINED_SIZE
-        inner = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": small}
-        if pipeline() is not None:
-            inner["pipeline_class"] = pipeline()
-        return compiled_once(numba.njit(clone, **options, **inner))
+        return typed_once(numba.njit(clone, **inner, forceinline=small))
 
     folder = cache_folder()
     text = entry_source(entry)
@@ -135,34 +138,37 @@ def compiled(entry, fillings, name, allocates):
     sys.modules[name] = module
     module.driver = Linker(fillings, transform).link(entry)
     exec(compile(text, str(path), "exec"), module.__dict__)
-    dispatcher = numba.njit(module.run, cache=folder is not None, **options)
-    return guarded(dispatcher, numba.core.errors.NumbaError)
+    return module, folder is not None
 
 
-def compiled_once(dispatcher):
-    """The function, not compiled anew for every constant that it is called with."""
-    from numba import types
-
-    template = dispatcher.get_call_template
-
-    def without_literals(arguments, keywords):
-        plain = tuple(types.unliteral(each) for each in arguments)
-        return template(plain, {name: types.unliteral(v) for name, v in keywords.items()})
-
-    dispatcher.get_call_template = without_literals
-    return dispatcher
+UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of functions that only compiled code calls."""
 
 
-def guarded(dispatcher, compiler_error):
-    """The compiled function; code that cannot be compiled gives a KernelError, one line."""
+def options_of(allocates):
+    """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
+    from flocsim.numba_internals import NO_COUNTING
+
+    return {"nogil": True, "error_model": "numpy", **({} if allocates else NO_COUNTING)}
+
+
+def compiled(entry, fillings, name, allocates):
+    """The entry compiled as module ``name`` at its first call, from the disk where it is there."""
+    import numba
+
+    from flocsim.numba_internals import quick_typing
+
+    options = options_of(allocates)
+    module, kept = linked_module(entry, fillings, name, options)
+    dispatcher = numba.njit(module.run, cache=kept, **options)
 
     def call(*arguments):
         try:
             if not dispatcher.signatures:
                 with quick_typing():
-                    dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments)))
+                    dispatcher.compile(tuple(map(numba.typeof, arguments)))
             return dispatcher(*arguments)
-        except compiler_error as error:
+        except numba.core.errors.NumbaError as error:
             raise KernelError(compiler_complaint(str(error))) from None
         except OSError as error:
             # Compiled, but the disk took no copy: go on with what is in memory.
@@ -186,14 +192,14 @@ def compiler_complaint(text):
 
 
 def compose(entry, fillings, *, jit=True, allocates=False):
-    """The driver ``entry`` with its slots filled, as one function.
+    """The driver ``entry`` with its hooks filled, as one function.
 
-    Parameters: ``entry``, a plain function; ``fillings``, {slot function of flocsim.hooks: plain
+    Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
     ``allocates``, whether any of the functions makes an array.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
-    key = (fingerprint(entry, fillings, f"{INLINED_SIZE} {allocates}"), jit)
+    key = (fingerprint(entry, fillings, options_text(allocates)), jit)
     if key not in _composed:
         name = f"flocsim_scene_{key[0]}"
         if jit:
@@ -201,3 +207,40 @@ def compose(entry, fillings, *, jit=True, allocates=False):
         else:
             _composed[key] = Linker(fillings, lambda clone: clone).link(entry)
     return _composed[key]
+
+
+def compile_law(law, signature):
+    """The address [int] at which an engine calls a plain function, compiled for a numba signature.
+
+    Raises KernelError for what captures variables, reads globals that may change, or cannot be
+    compiled. The compiled function lives as long as the process.
+    """
+    import numba
+
+    from flocsim.numba_internals import address_of, quick_typing
+
+    key = (fingerprint(law, {}, options_text(False)), str(signature))
+    if key not in _composed:
+        module, kept = linked_module(law, {}, f"flocsim_law_{key[0]}", options_of(False))
+        options = {**options_of(False), **UNWRAPPED}
+        try:
+            with quick_typing():
+                try:
+                    dispatcher = numba.njit(signature, cache=kept, **options)(module.run)
+                except OSError as error:
+                    warn_uncached(error)
+                    dispatcher = numba.njit(signature, **options)(module.run)
+        except numba.core.errors.NumbaError as error:
+            raise KernelError(compiler_complaint(str(error))) from None
+        _composed[key] = dispatcher, address_of(dispatcher, signature)
+    return _composed[key][1]
+
+
+@functools.cache
+def options_text(allocates):
+    """How functions are compiled, for the hash: options, and the code that calls laws."""
+    from flocsim import numba_internals
+
+    source = Path(numba_internals.__file__).read_bytes()
+    digest = hashlib.blake2b(source, digest_size=8).hexdigest()
+    return f"{INLINED_SIZE} {allocates} {digest}"

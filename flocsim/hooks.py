@@ -1,118 +1,49 @@
-"""The empty scene: physics that a driver calls by name and the composer replaces.
+"""Every function that a method, a family of shapes or an observer may replace.
 
-A driver (the assembly, an integrator, an observer) calls these functions as globals. For every
-scene the composer puts that scene's own functions in their place before it compiles; a slot that
-a scene does not fill stays as it is here: nothing, at no cost.
+``@hook`` marks such a function where it is defined, and HOOKS lists them all. A driver calls it by
+name; for a scene the composer puts the scene's own function in its place in a clone of everything
+that the driver reaches, before that is compiled. Physics is no matter of hooks: what forces a scene
+has is told and called through its laws (flocsim.laws).
 """
 
-import math
+HOOKS = {}
+"""{"module.name": function}: what may be replaced."""
 
 
-def body_force(body, parameters):
-    """(fx, fy, torque) of all body forces on one body."""
-    return 0.0, 0.0, 0.0
+def hook(function):
+    """Mark a function that a scene may replace; it stays what it is."""
+    HOOKS[f"{function.__module__}.{function.__qualname__}"] = function
+    return function
 
 
-def velocity_force(body, parameters):
-    """The part of body_force whose kernels read the body's velocity."""
-    return 0.0, 0.0, 0.0
-
-
-def position_force(body, parameters):
-    """The part of body_force whose kernels read the body's place."""
-    return 0.0, 0.0, 0.0
-
-
-def centre_force(pair, parameters):
-    """Repulsion along the line of centres, all centre forces together."""
-    return 0.0
-
-
-def centre_slope(pair, parameters):
-    """Derivative of centre_force by the gap."""
-    return 0.0
-
-
-def centre_damping(pair, parameters):
-    """Minus the derivative of centre_force by the gap's rate."""
-    return 0.0
-
-
-def surface_force(pair, parameters):
-    """Repulsion at the closest points, all surface forces together."""
-    return 0.0
-
-
-def surface_slope(pair, parameters):
-    """Derivative of surface_force by the gap."""
-    return 0.0
-
-
-def surface_damping(pair, parameters):
-    """Minus the derivative of surface_force by the gap's rate."""
-    return 0.0
-
-
-def surface_reach(parameters):
-    """The gap beyond which no surface force acts: −1 where there are none."""
-    return -1.0
-
-
-def has_contact():
-    """Whether the scene has a contact force at all."""
-    return False
-
-
-def contact_force(contact, parameters):
-    """(normal, tangential) of all contact forces at one contact point."""
-    return 0.0, 0.0
-
-
-def slip_limit(contact, parameters):
-    """The largest elastic tangential displacement that the contact holds."""
-    return math.inf
-
-
-def kink(contact, parameters):
-    """A number that changes its sign where the contact forces have a kink."""
-    return 1.0
-
-
-def has_centre_force():
-    """Whether the scene has a centre force at all."""
-    return False
-
-
-def reads_velocity():
-    """Whether any body force depends on the velocity."""
-    return False
-
-
-def reads_position():
-    """Whether any body force depends on the position."""
-    return False
-
-
-def skin_factor():
-    """How far candidates are listed, in multiples of what suits many short steps."""
-    return 1.0
-
-
+@hook
 def attempt(scene, work, clock, step):
-    """One step of the integrator: the local error over the tolerance, or −1 where it failed."""
+    """One step of the integrator: the local error over the tolerance, or −1 where it failed.
+
+    What it is given and what it has to fill: flocsim.integrators.base.Integrator.
+    """
     return 0.0
 
 
+@hook
 def next_step(clock, step, ratio):
     """The size of the next step after one whose error was ``ratio`` times the tolerance."""
     return step
 
 
+@hook
+def skin_factor():
+    """How far candidates are listed, in multiples of what suits many short steps."""
+    return 1.0
+
+
+@hook
 def awaits_touch(memo):
     """Whether a method of fixed steps, too, is to end a step where the first pair touches."""
     return False
 
 
+@hook
 def observe(scene, work, memo, time):
     """Watches every accepted step; a code other than 0 stops the run."""
     return 0

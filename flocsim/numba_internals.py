@@ -1,41 +1,88 @@
-"""How numba compiles the inner functions of a scene: to be linked into the outermost, no further.
+"""All that flocsim knows of numba's private parts; tests/test_numba_internals.py fails if it errs.
 
-numba optimises every function and makes machine code of it, at once, as if Python were to call it.
-Of a scene's two hundred functions Python calls one. The others are kept as they are lowered, and
-optimised once, where they end up: that halves the time that a scene takes to compile.
+1. ``NO_COUNTING``: kernels that allocate nothing need no counting of references, which costs more
+   than most of their work.
+2. ``call_by_address``: one compiled function calls another by its address, as numba's own code
+   does. numba's first-class functions do the same, but every one that is handed to a compiled
+   function costs 70 µs there; a run would be handed ten, and a replicate takes 2 ms.
+3. ``inner_compiler``: of an engine's two hundred functions Python calls one. The others are kept as
+   they are lowered, to be optimised once, where they end up, instead of each by itself as if Python
+   were to call it: that halves the time of compiling.
+4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
+5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits.
 
-This leans on numba's insides; where they are not what they were, ``pipeline`` is None and scenes
-compile the usual way.
-
-While numba compiles a scene, it remembers what it inferred, and Python's garbage waits.
-
-numba asks anew for the type of every ``+`` and ``sqrt``, trying dozens of templates each time,
-though a scene of two hundred functions has some hundred different cases. And it makes millions of
-objects that live until it is done, which the garbage collector walks through again and again.
-Together they are a fifth of the time that a scene takes to compile.
-
-The memory ends with the compilation: it can't outlive the options that it was made under. Where
-numba's insides are not what they were, nothing is remembered.
+Measured: benchmarks/speed/compile_times.py --without NAME leaves one of 3 to 5 out.
 """
 
 import contextlib
 import functools
 import gc
+import os
 import threading
-import weakref
 
-NEEDED = (
-    "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals",
-    "get_pointer_to_function",
-)  # fmt: skip
-"""What numba's library of compiled code must have for us to leave it out."""
+WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
+"""Names of what to leave out, to measure what it gains."""
+
+NO_COUNTING = {"_nrt": False}
+"""Options of numba.njit for functions that allocate nothing."""
+
+_one_at_a_time = threading.RLock()
+
+
+def call_by_address(signature):
+    """A function for compiled code: ``call(address, *arguments)`` of a function of a signature.
+
+    The arguments must have just the types of the signature.
+    """
+    from numba.core import cgutils
+    from numba.core.errors import TypingError
+    from numba.extending import intrinsic
+
+    def generate(context, builder, typed, values):
+        convention = context.call_conv
+        kind = convention.get_function_type(signature.return_type, signature.args)
+        function = builder.inttoptr(values[0], kind.as_pointer())
+        status, result = convention.call_function(
+            builder, function, signature.return_type, signature.args, values[1:]
+        )
+        with cgutils.if_unlikely(builder, status.is_error):
+            convention.return_status_propagate(builder, status)
+        return result
+
+    def typed_call(address, given):
+        if tuple(given) != signature.args:
+            raise TypingError(f"a law takes {signature.args}, found {tuple(given)}")
+        return signature.return_type(address, *given), generate
+
+    # An intrinsic has as many arguments as its function: the laws have two or three.
+    if len(signature.args) == 2:
+
+        @intrinsic
+        def call(typing, address, view, parameters):
+            return typed_call(address, (view, parameters))
+
+    else:
+
+        @intrinsic
+        def call(typing, address, view, parameters, which):
+            return typed_call(address, (view, parameters, which))
+
+    return call
+
+
+def address_of(dispatcher, signature):
+    """The address of a compiled function of a signature, for ``call_by_address``.
+
+    It holds as long as the dispatcher lives.
+    """
+    compiled = dispatcher.get_compile_result(signature)
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
 class NoEnvironment:
     """A numba code generator that sets no environment of a function, for there is nowhere to."""
 
     def __init__(self, generator):
-        """Stands for ``generator`` in all else."""
         self.generator = generator
 
     def __getattr__(self, name):
@@ -53,7 +100,6 @@ def linked_library(base):
 
         @property
         def codegen(self):
-            """The code generator, without what it does for functions that Python calls."""
             return NoEnvironment(self._codegen)
 
         def _optimize_final_module(self):
@@ -62,7 +108,6 @@ def linked_library(base):
         def _finalize_final_module(self):
             """Only what linking needs."""
             self._finalize_dynamic_globals()
-            self._final_module.__library = weakref.proxy(self)
             self._finalized = True
 
         def get_pointer_to_function(self, name):
@@ -72,60 +117,64 @@ def linked_library(base):
     return LinkedLibrary
 
 
-def lowering_pass(library_class):
-    """numba's last pass, into a library of the given kind."""
+@functools.cache
+def inner_compiler():
+    """{option: value} of numba.njit for functions that are only linked into others."""
+    if "inner_compiler" in WITHOUT:
+        return {}
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
     from numba.core.typed_passes import NativeLowering
 
+    library_class = linked_library(JITCodeLibrary)
+
     @register_pass(mutates_CFG=True, analysis_only=False)
     class LinkedLowering(NativeLowering):
-        """Lowers a function into a library that is linked only."""
+        """numba's last pass, into a library that is linked only."""
 
         _name = "flocsim_linked_lowering"
 
         def run_pass(self, state):
-            """Prepare the library, then lower as usual."""
             name = state.func_id.func_qualname
             state.library = library_class(state.targetctx.codegen(), name)
             return super().run_pass(state)
-
-    return LinkedLowering
-
-
-@functools.cache
-def pipeline():
-    """The compiler class for inner functions, to hand to numba.njit; None where it cannot be."""
-    try:
-        from numba.core.codegen import JITCodeLibrary
-        from numba.core.compiler import CompilerBase, DefaultPassBuilder
-        from numba.core.typed_passes import NativeLowering
-    except ImportError:
-        return None
-    if not all(hasattr(JITCodeLibrary, name) for name in NEEDED):
-        return None
-    lowering = lowering_pass(linked_library(JITCodeLibrary))
 
     class InnerCompiler(CompilerBase):
         """numba's usual passes with another last one."""
 
         def define_pipelines(self):
-            """The one pipeline of compiled code."""
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
             passes.passes = [
-                (lowering if each is NativeLowering else each, what) for each, what in passes.passes
+                (LinkedLowering if each is NativeLowering else each, what)
+                for each, what in passes.passes
             ]
             passes.finalize()
             return [passes]
 
-    return InnerCompiler
+    return {"pipeline_class": InnerCompiler}
 
 
-_one_at_a_time = threading.RLock()
+def typed_once(dispatcher):
+    """The function, not compiled anew for every constant that it is called with."""
+    from numba import types
+
+    if "typed_once" in WITHOUT:
+        return dispatcher
+    template = dispatcher.get_call_template
+
+    def without_literals(arguments, keywords):
+        plain = tuple(types.unliteral(each) for each in arguments)
+        return template(plain, {name: types.unliteral(v) for name, v in keywords.items()})
+
+    dispatcher.get_call_template = without_literals
+    return dispatcher
 
 
 @contextlib.contextmanager
 def garbage_waits():
-    """No garbage collection inside, unless it was off before."""
+    """No garbage collection inside, unless it was off before: numba makes millions of objects that
+    live until it is done, through which the collector walks again and again."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -151,23 +200,27 @@ def remembering(real):
 
 @contextlib.contextmanager
 def types_remembered():
-    """numba's built-in functions remember their types inside."""
-    from numba.core import types
+    """numba's built-in functions remember their types inside: it asks anew for the type of every
+    ``+`` and ``sqrt``, though an engine of two hundred functions has some hundred different cases.
+    The memory ends with the compilation: it can't outlive the options that it was made under."""
+    from numba.core.types import Function
 
-    kind, name = types.Function, "get_call_type"
-    own, real = vars(kind).get(name), getattr(kind, name, None)
-    if real is None:
-        yield
-        return
-    setattr(kind, name, remembering(real))
+    own, real = vars(Function).get("get_call_type"), Function.get_call_type
+    Function.get_call_type = remembering(real)
     try:
         yield
     finally:
-        delattr(kind, name) if own is None else setattr(kind, name, own)
+        if own is None:
+            del Function.get_call_type
+        else:
+            Function.get_call_type = own
 
 
 @contextlib.contextmanager
 def quick_typing():
-    """Compile in here: see the module's text. One thread at a time, as numba compiles."""
+    """Compile in here, one thread at a time, as numba does."""
+    if "quick_typing" in WITHOUT:
+        yield
+        return
     with _one_at_a_time, garbage_waits(), types_remembered():
         yield

@@ -6,36 +6,21 @@ from itertools import combinations
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    ERROR,
-    EVALUATIONS,
-    NOW,
-    PAUSE_AT,
-    RECORDED,
-    REJECTED,
-    STEPS,
-    TIME,
-    TOLERANCE,
-    UNTIL,
-    with_capacity,
-    work_of,
-)
+from flocsim.arrays import TOLERANCE, work_of
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.composer import compose
 from flocsim.errors import UsageError
 from flocsim.explain import explain
 from flocsim.fields import is_number, is_whole
 from flocsim.forces.base import Force
-from flocsim.forces.codegen import scene_functions
+from flocsim.forces.codegen import laws_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
-from flocsim.integrators.absent import replacements
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
-
-RECORD_ROWS = 4096
-"""Rows of the record between two copies; also the steps between two looks at Ctrl-C."""
+from flocsim.laws import compiled_calls, law_table
+from flocsim.run import Run
 
 
 @attrs.frozen(eq=False)
@@ -58,6 +43,16 @@ class Trajectory:
     evaluations: int
     error: float
     wall_time: float
+
+    @classmethod
+    def of(cls, run, status, wall_time):
+        """What a Run has come to."""
+        times, position, velocity = run.motion()
+        adaptive = np.isfinite(run.clock[TOLERANCE])
+        return cls(
+            times, position, velocity, status, run.steps, run.rejected, run.evaluations,
+            run.error if adaptive else float("nan"), wall_time,
+        )  # fmt: skip
 
 
 def as_tuple(values, what):
@@ -130,16 +125,24 @@ class System:
     pieces: object = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self):
-        object.__setattr__(self, "pieces", scene_functions(self.forces, self.fluid))
+        object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
 
     @property
     def spheres_only(self):
         """Whether no body has an edge."""
         return all(len(body.shape.vertices) == 1 for body in self.bodies)
 
-    def scene(self):
-        """The bodies as arrays for the drivers."""
-        return scene_of(self.bodies, self.fluid, self.pieces.parameters)
+    def scene(self, *, jit=True):
+        """The bodies as arrays for the drivers, with the laws that their forces add up to.
+
+        KernelError for a law that cannot be compiled.
+        """
+        pieces = self.pieces
+        return scene_of(
+            self.bodies, self.fluid, pieces.parameters,
+            laws=law_table(pieces.laws, jit=jit),
+            surface_reach=pieces.surface_reach, events=pieces.events,
+        )  # fmt: skip
 
     def motion(self):
         """Position and velocity (n, 3) at the start."""
@@ -148,15 +151,14 @@ class System:
         return np.array(position, dtype=float), np.array(velocity, dtype=float)
 
     def fillings(self, observer=None):
-        """{slot: function} of forces, integrator, shapes and an observer."""
-        physics = self.pieces.fillings
+        """{hook: function} of integrator, shapes and an observer."""
         shapes = spheres_only.FILLINGS if self.spheres_only else {}
-        known = {**physics, **self.integrator.fillings, **shapes, **(observer or {})}
-        return {**replacements(physics), **known}
+        return {**self.integrator.fillings, **shapes, **(observer or {})}
 
     def compose(self, entry=advance, observer=None, *, jit=True):
-        """The driver of this scene as one function, compiled unless ``jit=False``."""
-        return compose(entry, self.fillings(observer), jit=jit)
+        """The driver of this family of scenes as one function, compiled unless ``jit=False``."""
+        calls = compiled_calls() if jit else {}
+        return compose(entry, {**calls, **self.fillings(observer)}, jit=jit)
 
     def check_overlaps(self):
         """UsageError where two bodies start with crossing cores or too deep an overlap."""
@@ -176,9 +178,13 @@ class System:
         check_limits(until, max_steps)
         self.check_overlaps()
         began = time.perf_counter()
-        run = Run(self, until, max_steps, record, jit)
+        scene = self.scene(jit=jit)
+        run = Run(
+            self.compose(jit=jit), scene, work_of(scene, *self.motion()), self.integrator, until,
+            max_steps=max_steps, record=record,
+        )  # fmt: skip
         status = run.to_end()
-        return run.trajectory(status, time.perf_counter() - began)
+        return Trajectory.of(run, status, time.perf_counter() - began)
 
     def explain(self):
         """What is compiled into this scene and what is left out, each with its reason, as text.
@@ -186,56 +192,3 @@ class System:
         Ends with the scene's time scales and the step that an explicit method would need.
         """
         return explain(self)
-
-
-class Run:
-    """One run in progress: the arrays, and what was recorded so far."""
-
-    def __init__(self, system, until, max_steps, record, jit):
-        """Arrays for a run of the system from its start."""
-        self.driver = system.compose(jit=jit)
-        self.scene = system.scene()
-        self.work = work_of(self.scene, *system.motion())
-        self.clock = system.integrator.fresh_clock()
-        self.clock[UNTIL] = until
-        self.counts = system.integrator.fresh_counts(max_steps)
-        self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * len(system.bodies)))
-        self.saved = [self.current_row()]
-
-    def current_row(self):
-        """Time and state now, as one row of a record."""
-        return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
-
-    def to_end(self):
-        """Advance until the run has ended for good."""
-        memo = np.zeros(1)
-        while True:
-            self.counts[PAUSE_AT] = self.counts[STEPS] + RECORD_ROWS
-            code = self.driver(self.scene, self.work, memo, self.clock, self.counts, self.record)
-            self.save()
-            if code == Status.NO_ROOM:
-                self.work = with_capacity(self.work, 2 * len(self.work.candidates))
-            elif code not in (Status.RECORD_FULL, Status.PAUSED):
-                return Status(code)
-
-    def save(self):
-        """Copy the record and start it anew."""
-        self.saved.append(self.record[: self.counts[RECORDED]].copy())
-        self.counts[RECORDED] = 0
-
-    def trajectory(self, status, wall_time):
-        """The Trajectory of what was recorded; start and end alone where nothing was."""
-        rows = np.concatenate([*self.saved, *([] if len(self.record) else [self.current_row()])])
-        motion = rows[:, 1:].reshape(len(rows), -1, 6)
-        adaptive = np.isfinite(self.clock[TOLERANCE])
-        return Trajectory(
-            t=rows[:, 0],
-            position=motion[:, :, :3],
-            velocity=motion[:, :, 3:],
-            status=status,
-            steps=int(self.counts[STEPS]),
-            rejected=int(self.counts[REJECTED]),
-            evaluations=int(self.work.tally[EVALUATIONS]),
-            error=float(self.clock[ERROR]) if adaptive else float("nan"),
-            wall_time=wall_time,
-        )

@@ -83,14 +83,14 @@ class ContactForce(Force):
     The normal force is positive in repulsion; the tangential force acts along the direction in
     which ``slip`` grows, so that a spring returns −k·slip. A class may supply
     ``slip_limit(contact, …)`` [m]: the largest elastic displacement that the contact can hold; and
-    ``kink(contact, …)``: a number of any unit that changes its sign where the law has a kink (a
-    clip, a threshold), so that steps of controlled error end there.
+    ``events(contact, …) → (number, …)``, of any unit: each changes its sign at a kink of the law
+    (a clip, a threshold), and steps of controlled error end there.
     """
 
     slip_limit = None
-    kink = None
+    events = None
 
     @property
-    def has_kink(self):
-        """Whether the law has a kink with these parameters."""
-        return self.kink is not None
+    def has_events(self):
+        """Whether the law has kinks with these parameters."""
+        return self.events is not None

@@ -210,12 +210,36 @@ def check_pair_force(force, fluid):
 
 
 def check_contact_force(force, fluid):
-    """KernelError for a contact force whose kernel or slip limit is wrong."""
+    """KernelError for a contact force whose kernel, slip limit or events are wrong."""
     check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
     if force.slip_limit is not None:
         check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
-    if force.has_kink:
-        check_results(force, fluid, force.kink, SAMPLE_CONTACTS, "kink")
+    if inspect.isfunction(getattr(force, "kink", None)):
+        raise refusal(
+            force, force.kink, "is called kink: name it events and return a tuple, one a kink"
+        )
+    if force.has_events:
+        check_events(force, fluid)
+
+
+def check_events(force, fluid):
+    """KernelError unless the events of a contact force are a tuple of always as many numbers."""
+    require_plain(force, force.events)
+    arguments = kernel_arguments(force, fluid, force.events)
+    found = list(results(force, force.events, SAMPLE_CONTACTS, arguments))
+    for result in found:
+        numbers = isinstance(result, tuple) and all(isinstance(each, Real) for each in result)
+        if not numbers or len(result) != len(found[0]) or not result:
+            raise refusal(
+                force, force.events,
+                f"returns {result!r}; it must return a tuple of numbers, always as many",
+            )  # fmt: skip
+
+
+def event_count(force, fluid):
+    """How many events a contact force has."""
+    arguments = kernel_arguments(force, fluid, force.events)
+    return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
 
 
 def check_kernel(force, fluid):

@@ -1,26 +1,28 @@
-"""From force objects to the scene's own functions: generated source that calls their kernels.
+"""From force objects to the scene's laws: generated source that adds up their kernels.
 
 The text is short and has no numbers in it: a force's values travel in one flat array, so that new
 values never recompile. What a scene does not need (absent forces, forces out of reach,
-derivatives of what no kernel reads) is not written.
+derivatives of what no kernel reads) is not written, and is no law of the scene.
 """
 
+import functools
 import math
 
 import attrs
 
-from flocsim import hooks as slots
 from flocsim.arrays import PairView
 from flocsim.errors import UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     check_kernel,
+    event_count,
     fields_read,
     kernel_arguments,
     reach_of,
     sample_pairs,
 )
+from flocsim.laws import LAWS
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
@@ -28,10 +30,14 @@ PLACES = {"x", "y", "angle", "time"}
 
 @attrs.define
 class Pieces:
-    """What the scene is made of: functions for the slots, the numbers, and what was left out."""
+    """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
+    numbers, the gap up to which surface forces reach (−1: there are none), how many events its
+    contact forces have, and which forces are used and left out."""
 
-    fillings: dict = attrs.Factory(dict)
+    laws: dict = attrs.Factory(dict)
     parameters: list = attrs.Factory(list)
+    surface_reach: float = -1.0
+    events: int = 0
     used: dict = attrs.Factory(dict)
     left_out: dict = attrs.Factory(dict)
 
@@ -70,11 +76,6 @@ def sum_function(name, view, terms, zeros):
     return "\n".join(lines) + "\n"
 
 
-def constant_function(name, arguments, value):
-    """Source of a function that returns a literal."""
-    return f"def {name}({arguments}):\n    return {value}\n"
-
-
 def difference_text(call, name, field, size):
     """Source of a central difference of a pair kernel by one field of its view."""
     index = PairView._fields.index(field)
@@ -98,19 +99,14 @@ def body_text(pieces, namespace, forces, fluid):
             terms["velocity_force"].append(("", call))
         if reads & PLACES:
             terms["position_force"].append(("", call))
-    text = [sum_function(name, "body", some, 3) for name, some in terms.items() if some]
-    for name in ("velocity", "position"):
-        text.append(constant_function(f"reads_{name}", "", bool(terms[f"{name}_force"])))
-    return text
+    return [sum_function(name, "body", some, 3) for name, some in terms.items() if some]
 
 
 def pair_text(pieces, namespace, forces, fluid, kind):
-    """Source of the centre forces or of the surface forces, with slope and damping."""
+    """Source of the centre forces or of the surface forces, and of their derivatives."""
     force_terms, slope_terms, damping_terms = [], [], []
-    reaches = []
     for force in forces:
         reach = append_value(pieces.parameters, reach_of(force))
-        reaches.append(reach)
         condition = f"pair.gap < {reach}"
         name, call = call_text(pieces, namespace, force, fluid, force.kernel, "pair")
         force_terms.append((condition, call))
@@ -125,38 +121,45 @@ def pair_text(pieces, namespace, forces, fluid, kind):
             size = "(1e-3 * abs(pair.gap_rate) + 1e-9)"
             change = difference_text(call, name, "gap_rate", size)
             damping_terms.append((condition, f"-({change})"))
-    text = [sum_function(f"{kind}_force", "pair", force_terms, 1)]
-    text.append(sum_function(f"{kind}_slope", "pair", slope_terms, 1))
-    if damping_terms:
-        text.append(sum_function(f"{kind}_damping", "pair", damping_terms, 1))
-    if kind == "surface":
-        largest = f"max({', '.join(reaches)})" if len(reaches) > 1 else reaches[0]
-        text.append(constant_function("surface_reach", "parameters", largest))
-    else:
-        text.append(constant_function("has_centre_force", "", True))
-    return text
+    return [
+        sum_function(f"{kind}_force", "pair", force_terms, 1),
+        sum_function(f"{kind}_slope", "pair", slope_terms, 1),
+        sum_function(f"{kind}_damping", "pair", damping_terms, 1),
+        f"def {kind}_derivatives(pair, parameters):\n"
+        f"    return {kind}_slope(pair, parameters), {kind}_damping(pair, parameters)\n",
+    ]
 
 
 def contact_text(pieces, namespace, forces, fluid):
-    """Source of the contact forces, the limit of their tangential displacement, and their kinks."""
-    terms, limits, kinks = [], [], []
+    """Source of the contact forces, the limit of their tangential displacement, their events."""
+    terms, limits, events = [], [], []
     for force in forces:
         _, call = call_text(pieces, namespace, force, fluid, force.kernel, "contact")
         terms.append(("", call))
         if force.slip_limit is not None:
             _, limit = call_text(pieces, namespace, force, fluid, force.slip_limit, "contact")
             limits.append(limit)
-        if force.has_kink:
-            _, kink = call_text(pieces, namespace, force, fluid, force.kink, "contact")
-            kinks.append(kink)
+        if force.has_events:
+            _, call = call_text(pieces, namespace, force, fluid, force.events, "contact")
+            events.append((event_count(force, fluid), call))
     text = [sum_function("contact_force", "contact", terms, 2)]
     if limits:
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
-        text.append(constant_function("slip_limit", "contact, parameters", least))
-    if kinks:
-        text.append(constant_function("kink", "contact, parameters", " * ".join(kinks)))
-    text.append(constant_function("has_contact", "", True))
+        text.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
+    if events:
+        text.append(event_text(events))
+    pieces.events = sum(count for count, _ in events)
     return text
+
+
+def event_text(events):
+    """Source of the function that gives the event of a number, those of all forces in a row."""
+    lines, first = ["def contact_event(contact, parameters, which):"], 0
+    for count, call in events:
+        for each in range(count):
+            lines += [f"    if which == {first + each}:", f"        return {call}[{each}]"]
+        first += count
+    return "\n".join([*lines, "    return 1.0"]) + "\n"
 
 
 def sort_forces(pieces, forces, fluid):
@@ -187,19 +190,27 @@ def sort_forces(pieces, forces, fluid):
     return kinds
 
 
-def scene_functions(forces, fluid):
-    """Pieces of the scene with these forces in this fluid."""
+def laws_of(forces, fluid):
+    """The Pieces of a scene with these forces in this fluid."""
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
-    namespace = {"PairView": PairView, "max": max, "min": min, "abs": abs, "math": math}
+    namespace = {}
     text = body_text(pieces, namespace, kinds["body"], fluid)
     for kind in ("centre", "surface"):
         if kinds[kind]:
             text += pair_text(pieces, namespace, kinds[kind], fluid, kind)
     if kinds["contact"]:
         text += contact_text(pieces, namespace, kinds["contact"], fluid)
-    before = set(namespace)
-    exec(compile("\n\n".join(text), "<scene>", "exec"), namespace)
-    made = set(namespace) - before - {"__builtins__"}
-    pieces.fillings = {getattr(slots, name): namespace[name] for name in made}
+    if kinds["surface"]:
+        pieces.surface_reach = max(map(reach_of, kinds["surface"]))
+    pieces.laws = made_laws("\n\n".join(text), tuple(namespace.items()))
     return pieces
+
+
+@functools.lru_cache(maxsize=256)
+def made_laws(text, kernels):
+    """{law: function} of a source text; the same functions for the same text and kernels."""
+    namespace = {"PairView": PairView, "max": max, "min": min, "abs": abs, "math": math}
+    namespace |= dict(kernels)
+    exec(compile(text, "<scene>", "exec"), namespace)
+    return {name: namespace[name] for name in LAWS if name in namespace}

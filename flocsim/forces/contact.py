@@ -66,7 +66,7 @@ class Contact(ContactForce):
         return math.inf if self.friction == "none" else float(self.friction)
 
     @property
-    def has_kink(self):
+    def has_events(self):
         """Whether anything is clipped."""
         return not self.tension or self.friction_limit < math.inf
 
@@ -86,14 +86,15 @@ class Contact(ContactForce):
         return normal, tangential
 
     @staticmethod
-    def kink(contact, k_n, k_t, critical, lambda_n, proportional, lambda_t, friction_limit):
-        """Changes its sign where the normal force begins to pull, and where sliding begins."""
+    def events(contact, k_n, k_t, critical, lambda_n, proportional, lambda_t, friction_limit):
+        """(the normal force, which begins to pull where it is 0; how much more friction could hold,
+        which begins to slide) [N]."""
         normal, tangential = unclipped(
             contact, k_n, k_t, critical, lambda_n, proportional, lambda_t
         )
         if friction_limit == math.inf:
-            return normal
-        return normal * (friction_limit * max(normal, 0.0) - abs(tangential))
+            return normal, 1.0
+        return normal, friction_limit * max(normal, 0.0) - abs(tangential)
 
     @staticmethod
     def slip_limit(contact, k_n, k_t, friction_limit):

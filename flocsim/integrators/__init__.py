@@ -1,13 +1,20 @@
-"""Integrators: each gives its step; loop, error control, events and recording exist once."""
+"""Integrators: each gives its step; loop, error control, events and recording exist once.
+
+``base``: the contract.  ``parts``: the pieces that a method of one's own may call.  ``rhs``, ``events``,
+``loop``, ``radau``: forces and derivatives, what ends a step early, the driver, the implicit stages.
+May import geometry, body and what is below.
+"""
 
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.dormand_prince import DormandPrince54
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.parts import FixedStep
 from flocsim.integrators.velocity_verlet import VelocityVerlet
 
 __all__ = [
     "DormandPrince54",
+    "FixedStep",
     "Implicit",
     "Integrator",
     "Overdamped",

@@ -1,7 +1,4 @@
-"""Integrator: what all integrators share, and the driver's inputs made from it.
-
-How a run can end.
-"""
+"""The contract of an integrator, and how a run can end."""
 
 import math
 from abc import ABC, abstractmethod
@@ -10,6 +7,7 @@ from enum import IntEnum
 import attrs
 import numpy as np
 
+from flocsim import hooks
 from flocsim.arrays import (
     BEARABLE_STEP,
     CLOCK_SIZE,
@@ -58,34 +56,54 @@ REASONS = {
 }
 
 
-__all__ = ["Integrator", "Status", "all_finite"]
-
-
-def all_finite(work, state):
-    """Whether every place and velocity of a state is finite."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            if not math.isfinite(work.motion[state, body, axis]):
-                return False
-    return True
-
-
 @attrs.frozen
 class Integrator(ABC):
-    """A way to take one step. A subclass names the plain functions that do it.
+    """A way to take one step; loop, lists, error control, events and recording exist once, around it.
 
-    ``fillings`` maps ``slots.attempt`` and ``slots.next_step`` to them. ``tolerance`` [m] and
-    ``first_step`` [s] are read by the driver; a fixed-step method has an infinite tolerance.
+    A subclass gives ``attempt``, a plain function on arrays that numba can compile:
+
+    ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.motion[NOW]``
+    (n, 6: x, y, angle, vx, vy, spin), the time ``clock[TIME]`` and the step [s] to be tried. It must
+    write the motion a step later to ``work.motion[NEW]``, and the tangential displacements there to
+    ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns the step's error over
+    what is allowed: above 1 the step is tried again, shorter; below 0 it has failed and is tried
+    again much shorter. A method of controlled error writes that error to ``clock[STEP_ERROR]`` [m]
+    and, for each body, how long a velocity is remembered to ``work.bodies[:, MEMORY]`` [s], which
+    says how finely switches must be located: ``parts.error_ratio`` and ``parts.weigh_velocities``
+    do both. A method of fixed steps returns 0 or, where the motion is no longer finite, −1, and
+    subclasses ``parts.FixedStep``.
+
+    ``next_step(clock, step, ratio)`` is the size of the step after one with that ratio.
+    ``replaces`` {hook: function} are other functions of the engine that it stands in for.
+    ``tolerance`` [m] and ``first_step`` [s] are read by the driver; a fixed-step method has an
+    infinite tolerance.
     """
 
     tolerance = math.inf
     first_step = 1e-6
     largest_step = math.inf
 
-    @property
+    @staticmethod
     @abstractmethod
+    def attempt(scene, work, clock, step):
+        """Try one step; see the class."""
+
+    @staticmethod
+    @abstractmethod
+    def next_step(clock, step, ratio):
+        """The size of the step after one of that size [s]."""
+
+    @property
+    def replaces(self):
+        """{hook of flocsim.hooks.HOOKS: function} besides."""
+        return {}
+
+    @property
     def fillings(self):
-        """{slot: function} of this integrator."""
+        """{hook: function} of this integrator."""
+        return {
+            hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
+        }  # fmt: skip
 
     def fresh_clock(self):
         """The float state of a run that starts at time zero."""

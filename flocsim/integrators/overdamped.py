@@ -21,6 +21,6 @@ class Overdamped(Implicit):
     """
 
     @property
-    def fillings(self):
-        """The slots that this integrator fills."""
-        return {**super().fillings, inertia: massless}
+    def replaces(self):
+        """No inertia besides what Implicit replaces."""
+        return {**super().replaces, inertia: massless}

@@ -1,24 +1,13 @@
 """The binary collision scene: one replicate from its random numbers to its outcome."""
 
+import functools
 import math
 
 import attrs
 import numpy as np
 
-from flocsim import hooks as slots
-from flocsim.arrays import (
-    CODE,
-    ERROR,
-    NOW,
-    PAUSE_AT,
-    RECORDED,
-    REJECTED,
-    STEPS,
-    TIME,
-    UNTIL,
-    with_capacity,
-    work_of,
-)
+from flocsim import hooks
+from flocsim.arrays import work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import memo as memo_at
 from flocsim.ensembles.collision import outcomes
@@ -29,22 +18,20 @@ from flocsim.ensembles.config.methods import make_integrator
 from flocsim.errors import UsageError
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE
+from flocsim.run import Run
 from flocsim.system import System
 
-OBSERVER = {slots.awaits_touch: outcomes.has_not_touched, slots.observe: outcomes.watch_pair}
-"""What a binary collision puts into the driver's slots."""
+OBSERVER = {hooks.awaits_touch: outcomes.has_not_touched, hooks.observe: outcomes.watch_pair}
+"""What a binary collision puts into the driver."""
 
 REST_TURNS = 3.0
 """Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
-
-STEPS_AT_A_TIME = 5_000
-"""Steps between two looks at whether to stop: some 50 ms."""
 
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, slots=False)
 class Encounter:
     """Two shapes that meet: everything about them but orientation and displacement.
 
@@ -54,11 +41,9 @@ class Encounter:
     system: System
     options: object
     zone_distance: float
-    scene: object = attrs.field(init=False)
     settling: tuple = attrs.field(init=False)
 
     def __attrs_post_init__(self):
-        object.__setattr__(self, "scene", self.system.scene())
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
         if not math.hypot(*self.drift) > 0.0:
@@ -66,6 +51,11 @@ class Encounter:
                 "the two bodies settle at the same speed and never meet: give scene.pairs two "
                 "different radii, set scene.receiver = 'fixed', or add a missing [forces.gravity]"
             )
+
+    @functools.cached_property
+    def scene(self):
+        """The two bodies as arrays for the driver, their laws compiled."""
+        return self.system.scene()
 
     @property
     def shapes(self):
@@ -129,34 +119,27 @@ def make_encounter(config, shapes, zone):
 def run_encounter(encounter, driver, angles, share, max_steps, record=None, halted=None):
     """Run one replicate; the row of the table of replicates as a dict.
 
-    ``driver`` is the compiled driver of the encounter's scene; ``record`` (k, 13), optional,
-    receives the motion; where it is full, recording ends. ``halted()``, optional, is asked every
-    some thousand steps whether to give up; the row is None then.
+    ``driver`` is the compiled driver of the encounter's scene; ``record``, optional, is a Record to
+    receive the motion. ``halted()``, optional, is asked every some thousand steps whether to give
+    up; the row is None then.
     """
-    work = encounter.start(angles, share)
-    memo = encounter.memo()
-    integrator = encounter.system.integrator
-    clock, counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
-    clock[UNTIL] = encounter.time_limit()
-    rows = np.zeros((0, 13)) if record is None else record.begin(work)
-    while True:
-        # A pause comes between two steps, so that it changes nothing.
-        counts[PAUSE_AT] = counts[STEPS] + STEPS_AT_A_TIME
-        status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
-        if record is not None:
-            record.take(counts)
-        if status == Status.NO_ROOM:
-            work = with_capacity(work, 2 * len(work.candidates))
-        elif status == Status.PAUSED:
-            if halted is not None and halted():
-                return None
-        elif status != Status.RECORD_FULL:
-            return replicate_row(status, angles, memo, clock, counts)
+    run = Run(
+        driver, encounter.scene, encounter.start(angles, share), encounter.system.integrator,
+        encounter.time_limit(), max_steps=max_steps, memo=encounter.memo(),
+        record=record is not None,
+    )  # fmt: skip
+    status = run.to_end(halted)
+    if status == Status.PAUSED:
+        return None
+    if record is not None:
+        record.run = run
+    return replicate_row(status, angles, run)
 
 
-def replicate_row(status, angles, memo, clock, counts):
-    """What the table of replicates holds of a run that has ended."""
-    outcome, failure = outcome_of(status, counts[CODE], memo)
+def replicate_row(status, angles, run):
+    """What the table of replicates holds of a Run that has ended."""
+    memo = run.memo
+    outcome, failure = outcome_of(status, run.code, memo)
     touched = collided(memo)
     return {
         "angle_i": angles[0],
@@ -168,34 +151,19 @@ def replicate_row(status, angles, memo, clock, counts):
         "d_c_max": memo[memo_at.D_MAX] if touched else np.nan,
         "d_c_last": memo[memo_at.D_LAST],
         "t_collision": memo[memo_at.T_COLLISION] if touched else np.nan,
-        "t_end": clock[TIME],
-        "steps": counts[STEPS],
-        "rejected": counts[REJECTED],
-        "error": clock[ERROR],
+        "t_end": run.time,
+        "steps": run.steps,
+        "rejected": run.rejected,
+        "error": run.error,
         "failure": failure,
     }
 
 
 class Record:
-    """The recorded motion of one replicate, of any length."""
+    """Asks run_encounter to keep every step of a replicate."""
 
-    def __init__(self, rows=4096):
-        """Room for ``rows`` rows between two copies."""
-        self.buffer = np.zeros((rows, 13))
-        self.saved = []
-
-    def begin(self, work):
-        """Record the state at the start; the array that the driver is to fill."""
-        self.saved = [np.concatenate([[0.0], work.motion[NOW].ravel()])[None]]
-        return self.buffer
-
-    def take(self, counts):
-        """Copy what the driver has recorded, and let it start anew."""
-        self.saved.append(self.buffer[: counts[RECORDED]].copy())
-        counts[RECORDED] = 0
+    run = None
 
     def arrays(self):
         """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
-        rows = np.concatenate(self.saved)
-        motion = rows[:, 1:].reshape(-1, 2, 6)
-        return rows[:, 0], motion[:, :, :3], motion[:, :, 3:]
+        return self.run.motion()

@@ -2,12 +2,12 @@
 
 import math
 
-from flocsim.arrays import CANDIDATES, NEW, NOW, TOLERANCE
+from flocsim.arrays import CANDIDATES, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import first_switch
-from flocsim.integrators.events.law_events import kink_share
+from flocsim.integrators.events.law_events import law_event_share
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
 
@@ -25,7 +25,7 @@ def deepest_overlap(work):
     """The largest overlap of a listed pair now [m], at least 0."""
     deepest = 0.0
     for row in range(work.tally[CANDIDATES]):
-        deepest = max(deepest, -work.geometry[NOW, row, 2])
+        deepest = max(deepest, -work.geometry[NOW, row, GAP])
     return deepest
 
 
@@ -46,5 +46,5 @@ def switch_share(scene, work, memo, clock, step):
         shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
         depth = grain if deepest_overlap(work) > 0.0 else max(grain, shallowest)
         share = first_switch(scene, work, step, grain, depth)
-        return kink_share(scene, work, share) if share > 1.0 else share
+        return law_event_share(scene, work, share) if share > 1.0 else share
     return math.inf

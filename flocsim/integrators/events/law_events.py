@@ -1,12 +1,13 @@
-"""Where inside a step a contact force passes a kink of its law: a clip, a threshold.
+"""Where inside a step a contact force has an event: a kink of its law, as a clip or a threshold.
 
-The force is continuous there, so that a step that ends a little behind the kink errs by the square
-of that little alone.
+A force may have several, and each is watched by itself: two that change their signs in one step
+would hide each other in a product. The force is continuous there, so that a step that ends a little
+behind the kink errs by the square of that little alone.
 """
 
 from flocsim.arrays import CANDIDATES, CLOSED, NEW, NOW
-from flocsim.hooks import kink
 from flocsim.integrators.rhs.views import contact_view, pressed_view
+from flocsim.laws import contact_event
 
 FINENESS = 1e-4
 """A kink is located to this share of how far the step began from it, …"""
@@ -16,28 +17,24 @@ ROUNDING = 1e-6
 its sign may be rounding, and steps would end there for ever, and no time would go by."""
 
 
-def rounding(view, parameters):
-    """The value of a kink that cannot be told from none."""
-    return ROUNDING * abs(kink(pressed_view(view, view.overlap, 0.0), parameters))
-
-
-def row_share(scene, work, row):
-    """The share of the step at which one contact passes its kink, by linear interpolation; 2.0
-    where it does not, or is as good as there at either end."""
+def event_share(scene, work, row, which):
+    """The share of the step at which one contact passes one of its kinks, by linear interpolation;
+    2.0 where it does not, or is as good as there at either end."""
     view = contact_view(scene, work, NOW, row)
-    before = kink(view, scene.parameters)
-    after = kink(contact_view(scene, work, NEW, row), scene.parameters)
+    before = contact_event(scene, view, which)
+    after = contact_event(scene, contact_view(scene, work, NEW, row), which)
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
-    least = max(FINENESS * further, rounding(view, scene.parameters))
-    if before * after >= 0.0 or nearer <= least:
+    at_rest = contact_event(scene, pressed_view(view, view.overlap, 0.0), which)
+    if before * after >= 0.0 or nearer <= max(FINENESS * further, ROUNDING * abs(at_rest)):
         return 2.0
     # A little further than the kink, so that the next step begins behind it.
     return (1.0 + 0.5 * FINENESS) * before / (before - after)
 
 
-def kink_share(scene, work, share):
+def law_event_share(scene, work, share):
     """The share of the step at which the first contact passes a kink, or the given one before."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
-            share = min(share, row_share(scene, work, row))
+            for which in range(scene.events):
+                share = min(share, event_share(scene, work, row, which))
     return share

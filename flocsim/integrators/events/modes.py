@@ -5,8 +5,7 @@ step the flags stay as they are, so that the forces are smooth functions of the 
 ends the step where a flag would change (see switches.py).
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, NOW
-from flocsim.hooks import surface_reach
+from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, GAP, NOW
 from flocsim.integrators.rhs.views import closest_rows
 
 SAME, OTHER_CLOSEST, OTHER_CONTACTS = range(3)
@@ -16,7 +15,7 @@ by rounding, where two share a corner; which pairs touch."""
 
 def set_modes(scene, work, state=NOW):
     """Flag every listed pair by its geometry in a state; what changed (see SAME)."""
-    wanted = 1 if surface_reach(scene.parameters) > 0.0 else 0
+    wanted = 1 if scene.surface_reach > 0.0 else 0
     changed = SAME
     row = 0
     while row < work.tally[CANDIDATES]:
@@ -24,7 +23,7 @@ def set_modes(scene, work, state=NOW):
         if work.candidates[closest, CLOSEST] != wanted:
             changed = max(changed, OTHER_CLOSEST)
         for each in range(row, end):
-            closed = 1 if work.geometry[state, each, 2] < 0.0 else 0
+            closed = 1 if work.geometry[state, each, GAP] < 0.0 else 0
             if work.candidates[each, CLOSED] != closed:
                 changed = OTHER_CONTACTS
             work.candidates[each, CLOSED] = closed

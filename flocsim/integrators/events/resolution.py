@@ -6,9 +6,9 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 
 import math
 
-from flocsim.arrays import MEMORY
-from flocsim.hooks import contact_force
+from flocsim.arrays import EDGE_BODY, MEMORY, VERTEX_BODY
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
+from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 SHARE_OF_DEPTH = 0.02
 """Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
@@ -29,23 +29,23 @@ TINY = 1e-300
 """Keeps a quotient finite."""
 
 
-def pressed(view, overlap, overlap_rate, parameters):
+def pressed(scene, view, overlap, overlap_rate):
     """The normal force of a contact with such an overlap [N]."""
-    force, _ = contact_force(pressed_view(view, overlap, overlap_rate), parameters)
+    if not has(scene, CONTACT_FORCE):
+        return 0.0
+    force, _ = contact_force(scene, pressed_view(view, overlap, overlap_rate))
     return force
 
 
-def bounces(view, speed, frequency, parameters):
+def bounces(scene, view, speed, frequency):
     """Whether bodies fly apart again: damping below critical, or none that pulls."""
     drag = 2.0 * NEARLY * frequency * speed * view.effective_mass
-    return pressed(view, 0.0, speed, parameters) < drag or (
-        pressed(view, 0.0, -speed, parameters) >= 0.0
-    )
+    return pressed(scene, view, 0.0, speed) < drag or (pressed(scene, view, 0.0, -speed) >= 0.0)
 
 
 def memory_of(work, row):
     """How long a velocity of either body of a pair is remembered [s]."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
 
 
@@ -67,11 +67,11 @@ def touch_grain(scene, work, state, row, grain):
     """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
     speed = -normal_rate(work, state, row)
     view = contact_view(scene, work, state, row)
-    stiffness = pressed(view, grain, 0.0, scene.parameters) / grain
+    stiffness = pressed(scene, view, grain, 0.0) / grain
     if not (stiffness > 0.0 and speed > 0.0):
         return grain
     frequency = math.sqrt(stiffness / view.effective_mass)
-    if not bounces(view, speed, frequency, scene.parameters):
+    if not bounces(scene, view, speed, frequency):
         return grain
     later = GRAINS_LATER * grain / max(frequency * memory_of(work, row), TINY)
     return above_rounding(work, state, min(grain, SHARE_OF_DEPTH * speed / frequency, later))
@@ -83,6 +83,6 @@ def release_grain(scene, work, state, row, grain):
     if not speed > 0.0:
         return grain
     view = contact_view(scene, work, state, row)
-    pull = abs(pressed(view, 0.0, -speed, scene.parameters)) / view.effective_mass
+    pull = abs(pressed(scene, view, 0.0, -speed)) / view.effective_mass
     later = GRAINS_AFTER_RELEASE * grain * speed / max(pull * memory_of(work, row), TINY)
     return above_rounding(work, state, min(grain, later))

@@ -17,31 +17,26 @@ Derivatives of the contact forces, taken from the kernels by differences.
 """
 
 from flocsim.arrays import (
+    ANGLE,
     CANDIDATES,
     CLOSED,
     CLOSEST,
     DAMPING,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
+    GAP,
+    NORMAL_X,
+    NORMAL_Y,
     NOW,
     RADIUS,
     STIFFNESS,
+    TURNING,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
     BodyView,
     ContactView,
-)
-from flocsim.hooks import (
-    centre_damping,
-    centre_force,
-    centre_slope,
-    contact_force,
-    has_centre_force,
-    has_contact,
-    position_force,
-    reads_position,
-    reads_velocity,
-    surface_damping,
-    surface_force,
-    surface_reach,
-    surface_slope,
-    velocity_force,
 )
 from flocsim.integrators.rhs.velocity_memory import remember_velocities
 from flocsim.integrators.rhs.views import (
@@ -51,20 +46,34 @@ from flocsim.integrators.rhs.views import (
     contact_view,
     surface_view,
 )
+from flocsim.laws import (
+    CENTRE_FORCE,
+    CONTACT_FORCE,
+    POSITION_FORCE,
+    VELOCITY_FORCE,
+    centre_derivatives,
+    centre_force,
+    contact_force,
+    has,
+    position_force,
+    surface_derivatives,
+    surface_force,
+    velocity_force,
+)
 
 
 def normal_rows(work, row):
     """Entries of a pair's normal direction on its two bodies, now."""
     g = work.geometry
-    nx, ny = g[NOW, row, 0], g[NOW, row, 1]
-    return (nx, ny, g[NOW, row, 3]), (-nx, -ny, -g[NOW, row, 5])
+    nx, ny = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    return (nx, ny, g[NOW, row, VERTEX_ARM_N]), (-nx, -ny, -g[NOW, row, EDGE_ARM_N])
 
 
 def tangent_rows(work, row):
     """Entries of a pair's tangential direction on its two bodies, now."""
     g = work.geometry
-    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
-    return (tx, ty, g[NOW, row, 4]), (-tx, -ty, -g[NOW, row, 6])
+    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
+    return (tx, ty, g[NOW, row, VERTEX_ARM_T]), (-tx, -ty, -g[NOW, row, EDGE_ARM_T])
 
 
 def add_product(work, which, a, b, out, by, weight):
@@ -72,12 +81,13 @@ def add_product(work, which, a, b, out, by, weight):
     if weight == 0.0:
         return
     matrix = work.jacobian
+    (out_a, out_b), (by_a, by_b) = out, by
     for i in range(3):
         for j in range(3):
-            matrix[which, 3 * a + i, 3 * a + j] += weight * out[0][i] * by[0][j]
-            matrix[which, 3 * a + i, 3 * b + j] += weight * out[0][i] * by[1][j]
-            matrix[which, 3 * b + i, 3 * a + j] += weight * out[1][i] * by[0][j]
-            matrix[which, 3 * b + i, 3 * b + j] += weight * out[1][i] * by[1][j]
+            matrix[which, 3 * a + i, 3 * a + j] += weight * out_a[i] * by_a[j]
+            matrix[which, 3 * a + i, 3 * b + j] += weight * out_a[i] * by_b[j]
+            matrix[which, 3 * b + i, 3 * a + j] += weight * out_b[i] * by_a[j]
+            matrix[which, 3 * b + i, 3 * b + j] += weight * out_b[i] * by_b[j]
 
 
 NOTHING = (0.0, 0.0, 0.0)
@@ -89,33 +99,34 @@ def sliding_row(scene, work, row):
 
     The arms are p·n and the same for the foot.
     """
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g = work.geometry
-    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
+    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
     difference = scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
-    distance = g[NOW, row, 2] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    arm_a = g[NOW, row, 4] + 0.5 * (distance + difference)
-    arm_b = g[NOW, row, 6] - 0.5 * (distance - difference)
+    distance = g[NOW, row, GAP] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    arm_a = g[NOW, row, VERTEX_ARM_T] + 0.5 * (distance + difference)
+    arm_b = g[NOW, row, EDGE_ARM_T] - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
-    beside = distance if g[NOW, row, 7] == 0.0 else 0.0
+    beside = distance if g[NOW, row, TURNING] == 0.0 else 0.0
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
 def scaled(row, share):
     """A direction's entries on one body, times a number."""
-    return row[0] * share, row[1] * share, row[2] * share
+    x, y, angle = row
+    return x * share, y * share, angle * share
 
 
 def add_turning(scene, work, row, normal, tangential):
     """Derivative by the places of a pair's force whose size stays the same."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g, stiffness = work.geometry, work.jacobian
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
-    nx, ny, turning = g[NOW, row, 0], g[NOW, row, 1], g[NOW, row, 7]
+    nx, ny, turning = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y], g[NOW, row, TURNING]
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
-    torque_a = normal * arm_a - tangential * g[NOW, row, 3]
-    torque_b = normal * arm_b - tangential * g[NOW, row, 5]
-    stiffness[STIFFNESS, 3 * a + 2, 3 * a + 2] += torque_a
+    torque_a = normal * arm_a - tangential * g[NOW, row, VERTEX_ARM_N]
+    torque_b = normal * arm_b - tangential * g[NOW, row, EDGE_ARM_N]
+    stiffness[STIFFNESS, 3 * a + ANGLE, 3 * a + ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
         add_product(work, STIFFNESS, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
@@ -125,7 +136,7 @@ def add_turning(scene, work, row, normal, tangential):
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
         by = scaled(slide_a, turning), scaled(slide_b, turning)
         add_product(work, STIFFNESS, a, b, out, by, -1.0)
-        stiffness[STIFFNESS, 3 * b + 2, 3 * b + 2] -= torque_b
+        stiffness[STIFFNESS, 3 * b + ANGLE, 3 * b + ANGLE] -= torque_b
 
 
 def changed_view(view, axis, by):
@@ -146,13 +157,13 @@ def change_of(view, axis):
 
 def add_contact(scene, work, row):
     """The derivatives of one contact's forces."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     view = contact_view(scene, work, NOW, row)
-    normal, tangential = contact_force(view, scene.parameters)
+    normal, tangential = contact_force(scene, view)
     along, across = normal_rows(work, row), tangent_rows(work, row)
     for axis in range(4):
         size = change_of(view, axis)
-        more, further = contact_force(changed_view(view, axis, size), scene.parameters)
+        more, further = contact_force(scene, changed_view(view, axis, size))
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
         which = STIFFNESS if axis % 2 == 0 else DAMPING
@@ -181,11 +192,11 @@ def shifted(view, axis, by):
 def add_velocity_derivative(scene, work, view, body):
     """One body's forces by its velocity, by differences of the kernels."""
     speeds = (view.vx, view.vy, view.spin)
-    before = velocity_force(view, scene.parameters)
+    before = velocity_force(scene, view)
     for axis in range(3):
         floor = 1e-9 / view.radius if axis == 2 else 1e-9
         size = 1e-3 * abs(speeds[axis]) + floor
-        after = velocity_force(shifted(view, 3 + axis, size), scene.parameters)
+        after = velocity_force(scene, shifted(view, 3 + axis, size))
         for part in range(3):
             damping = -(after[part] - before[part]) / size
             work.jacobian[DAMPING, 3 * body + part, 3 * body + axis] += damping
@@ -193,10 +204,10 @@ def add_velocity_derivative(scene, work, view, body):
 
 def add_position_derivative(scene, work, view, body):
     """One body's forces by its place, by differences of the kernels."""
-    before = position_force(view, scene.parameters)
+    before = position_force(scene, view)
     for axis in range(3):
         size = 1e-6 if axis == 2 else 1e-6 * view.radius
-        after = position_force(shifted(view, axis, size), scene.parameters)
+        after = position_force(scene, shifted(view, axis, size))
         for part in range(3):
             stiffness = -(after[part] - before[part]) / size
             work.jacobian[STIFFNESS, 3 * body + part, 3 * body + axis] += stiffness
@@ -214,9 +225,9 @@ def add_bodies(scene, work, time):
     """Derivatives of the body forces."""
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, NOW, body)
-        if reads_velocity():
+        if has(scene, VELOCITY_FORCE):
             add_velocity_derivative(scene, work, view, body)
-        if reads_position():
+        if has(scene, POSITION_FORCE):
             add_position_derivative(scene, work, view, body)
 
 
@@ -228,12 +239,11 @@ def add_centres(scene, work, time):
             nx, ny, distance = centre_line(work, NOW, a, b)
             along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
             across = ((-ny, nx, 0.0), (ny, -nx, 0.0))
-            slope = centre_slope(view, scene.parameters)
-            damping = centre_damping(view, scene.parameters)
+            slope, damping = centre_derivatives(scene, view)
             add_product(work, STIFFNESS, a, b, along, along, -slope)
             add_product(work, DAMPING, a, b, along, along, damping)
             if distance > 0.0:
-                turning = -centre_force(view, scene.parameters) / distance
+                turning = -centre_force(scene, view) / distance
                 add_product(work, STIFFNESS, a, b, across, across, turning)
 
 
@@ -243,12 +253,11 @@ def add_surfaces(scene, work, time):
         if work.candidates[row, CLOSEST] == 1:
             view = surface_view(scene, work, time, NOW, row)
             along = normal_rows(work, row)
-            a, b = work.candidates[row, 0], work.candidates[row, 2]
-            slope = surface_slope(view, scene.parameters)
-            damping = surface_damping(view, scene.parameters)
+            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+            slope, damping = surface_derivatives(scene, view)
             add_product(work, STIFFNESS, a, b, along, along, -slope)
             add_product(work, DAMPING, a, b, along, along, damping)
-            add_turning(scene, work, row, surface_force(view, scene.parameters), 0.0)
+            add_turning(scene, work, row, surface_force(scene, view), 0.0)
 
 
 def weigh_velocities(scene, work, time, remaining):
@@ -261,9 +270,9 @@ def weigh_velocities(scene, work, time, remaining):
 def assemble_jacobian(scene, work, time, remaining):
     """DAMPING and STIFFNESS of the current state, whose contact geometry is located."""
     weigh_velocities(scene, work, time, remaining)
-    if has_centre_force():
+    if has(scene, CENTRE_FORCE):
         add_centres(scene, work, time)
-    if surface_reach(scene.parameters) > 0.0:
+    if scene.surface_reach > 0.0:
         add_surfaces(scene, work, time)
-    if has_contact():
+    if has(scene, CONTACT_FORCE):
         add_contacts(scene, work)

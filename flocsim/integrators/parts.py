@@ -1,0 +1,118 @@
+"""What methods are made of, one's own included: the pieces that ``attempt`` may call.
+
+examples/own_integrator.py is a whole method in a few lines; flocsim.integrators.base.Integrator says
+what ``attempt`` is given and has to fill.
+"""
+
+import math
+
+import attrs
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FORCE,
+    FREE,
+    GAP,
+    LARGEST_STEP,
+    MOTION_COLUMNS,
+    NEW,
+    NOW,
+    TIME,
+    UNTIL,
+    VELOCITY,
+)
+from flocsim.fields import quantity
+from flocsim.geometry.contact.points import locate_acting, locate_contacts
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.loop.step_size import adaptive_factor
+from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.jacobian import weigh_velocities
+from flocsim.integrators.rhs.views import inertia, tangential_rate
+
+__all__ = [
+    "NEW",
+    "NOW",
+    "TIME",
+    "UNTIL",
+    "VELOCITY",
+    "FixedStep",
+    "acceleration",
+    "adaptive_factor",
+    "all_finite",
+    "error_ratio",
+    "evaluate",
+    "limit_slips",
+    "move_slips",
+    "weigh_velocities",
+]
+
+
+def evaluate(scene, work, time, state):
+    """Forces and torques in a state, from its motion and its tangential displacements."""
+    locate_and_rate(scene, work, state)
+    sum_forces(scene, work, time, state)
+
+
+def acceleration(scene, work, state, body, axis):
+    """Rate of change of a body's velocity (axis 0, 1) or spin (2) in an evaluated state; 0 where
+    the body is fixed."""
+    force = work.rates[state, body, FORCE + axis]
+    return scene.bodies[body, FREE] * force / inertia(scene, body, axis)
+
+
+def move_slips(work, step):
+    """Tangential displacements of NEW from the mean of their rates at both ends of a fixed step;
+    the contact geometry of both is located."""
+    slip = work.slip
+    for row in range(work.tally[CANDIDATES]):
+        slip[NEW, row] = 0.0
+        if work.candidates[row, CLOSED] == 1:
+            rate = tangential_rate(work, NEW, row)
+            if work.geometry[NOW, row, GAP] < 0.0:
+                rate = 0.5 * (rate + tangential_rate(work, NOW, row))
+            slip[NEW, row] = slip[NOW, row] + step * rate
+
+
+def all_finite(work, state):
+    """Whether every place and velocity of a state is finite."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            if not math.isfinite(work.motion[state, body, axis]):
+                return False
+    return True
+
+
+def locate_and_flag(scene, work, state):
+    """Fixed steps do not end at switches: every evaluation flags the pairs as they are."""
+    locate_contacts(scene, work, state)
+    set_modes(scene, work, state)
+
+
+@attrs.frozen
+class FixedStep(Integrator):
+    """A method whose steps all have the size ``step`` [s]."""
+
+    step: float = quantity("s", above=0.0, default=1e-8)
+
+    @staticmethod
+    def next_step(clock, step, ratio):
+        """All steps are equal."""
+        return clock[LARGEST_STEP]
+
+    @property
+    def first_step(self):
+        """All steps are equal."""
+        return self.step
+
+    @property
+    def largest_step(self):
+        """All steps are equal."""
+        return self.step
+
+    @property
+    def replaces(self):
+        """Pairs are located and flagged at every evaluation."""
+        return {locate_acting: locate_and_flag}

@@ -1,0 +1,159 @@
+"""The laws of a scene: the few functions that its forces add up to, called through pointers.
+
+A scene has at most one law of each kind, the sum of all its forces of that kind (codegen.py). The
+engine around them is compiled once for all scenes; a law is compiled by itself, in a tenth of a
+second, and the engine calls it by its address. What a scene has no forces for it has no law for,
+and ``has`` tells: that is the one way in which physics is left out.
+
+``scene.laws`` is an array of addresses (0: none) where the engine is compiled, and a tuple of plain
+functions (None: none) where it runs uncompiled, for debugging and as a reference.
+"""
+
+import functools
+
+import numpy as np
+
+from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.composer import compile_law
+from flocsim.hooks import hook
+
+LAWS = (
+    "body_force", "velocity_force", "position_force", "centre_force", "centre_derivatives",
+    "surface_force", "surface_derivatives", "contact_force", "slip_limit", "contact_event",
+)  # fmt: skip
+"""Names of the laws, in the order of ``scene.laws``."""
+
+(
+    BODY_FORCE, VELOCITY_FORCE, POSITION_FORCE, CENTRE_FORCE, CENTRE_DERIVATIVES,
+    SURFACE_FORCE, SURFACE_DERIVATIVES, CONTACT_FORCE, SLIP_LIMIT, CONTACT_EVENT,
+) = range(len(LAWS))  # fmt: skip
+
+
+@hook
+def has(scene, law):
+    """Whether a scene has a law."""
+    return scene.laws[law] is not None
+
+
+@hook
+def body_force(scene, view):
+    """(fx, fy, torque) of all body forces on the body of a BodyView [N, N, N m]."""
+    return scene.laws[BODY_FORCE](view, scene.parameters)
+
+
+@hook
+def velocity_force(scene, view):
+    """The part of body_force whose kernels read the body's velocity."""
+    return scene.laws[VELOCITY_FORCE](view, scene.parameters)
+
+
+@hook
+def position_force(scene, view):
+    """The part of body_force whose kernels read the body's place or the time."""
+    return scene.laws[POSITION_FORCE](view, scene.parameters)
+
+
+@hook
+def centre_force(scene, view):
+    """Repulsion along the line of centres of a PairView [N], all centre forces together."""
+    return scene.laws[CENTRE_FORCE](view, scene.parameters)
+
+
+@hook
+def centre_derivatives(scene, view):
+    """(derivative of centre_force by the gap, minus that by the gap's rate) [N/m, N s/m]."""
+    return scene.laws[CENTRE_DERIVATIVES](view, scene.parameters)
+
+
+@hook
+def surface_force(scene, view):
+    """Repulsion at the closest points of a PairView [N], all surface forces together."""
+    return scene.laws[SURFACE_FORCE](view, scene.parameters)
+
+
+@hook
+def surface_derivatives(scene, view):
+    """(derivative of surface_force by the gap, minus that by the gap's rate) [N/m, N s/m]."""
+    return scene.laws[SURFACE_DERIVATIVES](view, scene.parameters)
+
+
+@hook
+def contact_force(scene, view):
+    """(normal, tangential) of all contact forces at the contact point of a ContactView [N]."""
+    return scene.laws[CONTACT_FORCE](view, scene.parameters)
+
+
+@hook
+def slip_limit(scene, view):
+    """The largest elastic tangential displacement that a contact holds [m]."""
+    return scene.laws[SLIP_LIMIT](view, scene.parameters)
+
+
+@hook
+def contact_event(scene, view, which):
+    """Event ``which`` of the contact forces: it changes its sign where a force has a kink."""
+    return scene.laws[CONTACT_EVENT](view, scene.parameters, which)
+
+
+@functools.cache
+def signatures():
+    """{law: its numba signature}."""
+    from numba import types
+
+    number, parameters = types.float64, types.Array(types.float64, 1, "C")
+
+    def view_type(view):
+        return types.NamedUniTuple(number, len(view._fields), view)
+
+    body, pair, contact = map(view_type, (BodyView, PairView, ContactView))
+    two, three = types.UniTuple(number, 2), types.UniTuple(number, 3)
+    of_body, of_pair = three(body, parameters), number(pair, parameters)
+    derivatives = two(pair, parameters)
+    return dict(
+        zip(
+            LAWS,
+            (
+                of_body, of_body, of_body, of_pair, derivatives, of_pair, derivatives,
+                two(contact, parameters), number(contact, parameters),
+                number(contact, parameters, types.int64),
+            ),
+            strict=True,
+        )
+    )  # fmt: skip
+
+
+def has_address(scene, law):
+    """``has`` in the compiled engine."""
+    return scene.laws[law] != 0
+
+
+@functools.cache
+def compiled_calls():
+    """{hook: function} that let the compiled engine call laws by their addresses."""
+    from flocsim.numba_internals import call_by_address
+
+    calls = {has: has_address}
+    for index, (law, signature) in enumerate(signatures().items()):
+        more = ", which" if law == "contact_event" else ""
+        names = {"call": call_by_address(signature), "__name__": __name__}
+        exec(
+            f"def {law}(scene, view{more}):\n"
+            f"    return call(scene.laws[{index}], view, scene.parameters{more})\n",
+            names,
+        )
+        calls[globals()[law]] = names[law]
+    return calls
+
+
+def law_table(functions, *, jit):
+    """The laws {name: plain function} as ``scene.laws``: addresses, or the functions themselves.
+
+    KernelError for a law that cannot be compiled.
+    """
+    if not jit:
+        return tuple(functions.get(name) for name in LAWS)
+    addresses = [
+        compile_law(functions[name], signatures()[name]) if name in functions else 0
+        for name in LAWS
+    ]
+    return np.array(addresses, dtype=np.int64)

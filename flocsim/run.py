@@ -1,0 +1,115 @@
+"""Run: one run of a scene in progress, and the only caller of a driver."""
+
+import numpy as np
+
+from flocsim.arrays import (
+    CODE,
+    ERROR,
+    EVALUATIONS,
+    NOW,
+    PAUSE_AT,
+    RECORDED,
+    REJECTED,
+    STEPS,
+    TIME,
+    UNTIL,
+    with_capacity,
+)
+from flocsim.integrators.base import Status
+
+STEPS_AT_A_TIME = 5_000
+"""Steps between two looks at whether to go on: some 50 ms."""
+
+RECORD_ROWS = 4096
+"""Rows of the record between two copies."""
+
+
+class Run:
+    """The arrays of a run, what was recorded of it, and how it goes on.
+
+    Parameters: ``driver``, of System.compose; ``scene`` and ``work``, its arrays (System.scene,
+    arrays.work_of); ``integrator``; ``until`` [s]; ``max_steps``, steps taken, rejected and located;
+    ``memo``, the observer's array; ``record``, whether to keep every accepted step.
+    """
+
+    def __init__(
+        self, driver, scene, work, integrator, until, *, max_steps, memo=None, record=False
+    ):
+        self.driver, self.scene, self.work = driver, scene, work
+        self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
+        self.clock[UNTIL] = until
+        self.memo = np.zeros(1) if memo is None else memo
+        n = len(scene.bodies)
+        self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
+        self.saved = [self.row_now()]
+
+    def row_now(self):
+        """Time and state now, as one row of a record."""
+        return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
+
+    def advance(self, steps=STEPS_AT_A_TIME):
+        """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
+
+        A pause comes between two steps, so that it changes nothing.
+        """
+        self.counts[PAUSE_AT] = self.counts[STEPS] + steps
+        while True:
+            code = self.driver(
+                self.scene, self.work, self.memo, self.clock, self.counts, self.record
+            )
+            if self.counts[RECORDED] > 0:
+                self.saved.append(self.record[: self.counts[RECORDED]].copy())
+                self.counts[RECORDED] = 0
+            if code == Status.NO_ROOM:
+                self.work = with_capacity(self.work, 2 * len(self.work.candidates))
+            elif code != Status.RECORD_FULL:
+                return Status(code)
+
+    def to_end(self, halted=None):
+        """Go on until the run has ended: its Status; PAUSED where ``halted()`` said to give up."""
+        while (status := self.advance()) == Status.PAUSED:
+            if halted is not None and halted():
+                break
+        return status
+
+    def rows(self):
+        """The record (k, 1 + 6 n): time, then x, y, angle, vx, vy, spin of every body; start and
+        end alone where steps are not kept."""
+        end = [] if len(self.record) else [self.row_now()]
+        return np.concatenate([*self.saved, *end])
+
+    def motion(self):
+        """Times (k,) [s], places (k, n, 3) [m, m, rad] and velocities (k, n, 3) of the record."""
+        rows = self.rows()
+        states = rows[:, 1:].reshape(len(rows), -1, 6)
+        return rows[:, 0], states[:, :, :3], states[:, :, 3:]
+
+    @property
+    def time(self):
+        """How far it has come [s]."""
+        return float(self.clock[TIME])
+
+    @property
+    def steps(self):
+        """Steps taken."""
+        return int(self.counts[STEPS])
+
+    @property
+    def rejected(self):
+        """Steps tried in vain."""
+        return int(self.counts[REJECTED])
+
+    @property
+    def evaluations(self):
+        """How often the forces were summed."""
+        return int(self.work.tally[EVALUATIONS])
+
+    @property
+    def error(self):
+        """The sum of the steps' estimated errors [m]."""
+        return float(self.clock[ERROR])
+
+    @property
+    def code(self):
+        """The observer's last code."""
+        return int(self.counts[CODE])
