@@ -60,7 +60,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal"],
-        ["files", "provenance", "confidence"],
+        ["files", "provenance", "confidence", "markdown"],
     ],
 }
 
