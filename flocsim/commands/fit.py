@@ -5,7 +5,9 @@ from pathlib import Path
 
 from flocsim.commands import fit_work
 from flocsim.commands.fit_options import add_options, add_output, add_segmentation, read_options
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import FlocsimError
+from flocsim.io.files import check_writable
+from flocsim.io.plots.style import checked_format, save
 
 DESCRIPTION = """\
 Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
@@ -38,8 +40,9 @@ def run(args):
     options = read_options(args)
     summary = args.summary or Path(args.output).with_suffix(".csv")
     for output in (args.output, summary):
-        check_output(output)
-    check_overlay(args.overlay)
+        check_writable(output)
+    if args.overlay is not None:
+        checked_format(args.overlay, "--overlay ")
     try:
         pictures, fits = work(args.images, options)
     except KeyboardInterrupt:
@@ -52,25 +55,6 @@ def run(args):
         return 2
     write(args, summary, pictures, fits, entries, options)
     return 0
-
-
-def check_output(path):
-    """Raise FileError before the long work if a file could not be written at its end."""
-    import os
-
-    from flocsim.io.files import ordinary_target
-
-    folder = ordinary_target(path).parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise FileError(f"{path} cannot be written: {folder} is no folder that can be written to")
-
-
-def check_overlay(path):
-    """Raise UsageError before the long work if the overlay's name has no known ending."""
-    from flocsim.io.plots.figures import FORMATS
-
-    if path is not None and Path(path).suffix.lower().removeprefix(".") not in FORMATS:
-        raise UsageError(f"--overlay {path} must end in .{', .'.join(FORMATS)}")
 
 
 def report(error):
@@ -151,8 +135,7 @@ def write_summary(path, pictures, fits, options):
 def draw(overlay, pictures, fits, options):
     """Write each picture with the outlines at the largest N and the smallest spheroradius."""
     from flocsim.io.images.pictures import read_grey
-    from flocsim.io.plots.figures import save
-    from flocsim.io.plots.fit import draw_overlay
+    from flocsim.io.plots.shapes import draw_overlay
     from flocsim.io.shapes.fit_report import plural
 
     most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
