@@ -62,7 +62,8 @@ def bin_edges(sizes):
 def figure_3(entries):
     """Relative error of the fits against N by size class, for every spheroradius.
 
-    Mean and standard deviation of RE [%], a panel for each r. Dashed: the equivalent spheres (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
+    Mean and standard deviation of RE [%], a panel for each r. Dashed: the equivalent spheres
+    (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
     """
     radii = sorted({entry.spheroradius for entry in entries})
     with house_style():
