@@ -125,7 +125,7 @@ class Totals:
 
 
 def replicate_totals(path):
-    """The Totals of a results file, which may be larger than the memory; FileError as `read_results`."""
+    """The Totals of a file, which may be larger than the memory; FileError as `read_results`."""
     with opened(path) as file:
         rows = file["replicates"]
         reasons = len(rows["failure"].attrs["flag_meanings"].split())
