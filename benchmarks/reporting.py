@@ -11,6 +11,9 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.io.markdown import markdown_table
+from flocsim.io.provenance import processor
+
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
 
@@ -18,16 +21,6 @@ def commit():
     """The commit that is measured, "-dirty" where files differ from it."""
     command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
     return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
-
-
-def processor():
-    """The processor's name, as the system gives it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.processor() or "unknown")
 
 
 def installed(packages):
@@ -77,19 +70,15 @@ class Table:
         self.rows.append([text_of(cell) for cell in cells])
         print("  ".join(self.rows[-1]), file=sys.stderr, flush=True)
 
-    def lines(self, markdown):
-        """The table as lines of text."""
+    def aligned(self):
+        """The table as text in columns of equal width."""
         rows = [list(self.columns), *self.rows]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        if markdown:
-            rows.insert(1, ["-" * width for width in widths])
-        edge = "|" if markdown else ""
-        between = " | " if markdown else "  "
-        for row in rows:
-            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-            yield f"{edge} {between.join(cells)} {edge}".strip()
+        lines = (zip(row, widths, strict=True) for row in rows)
+        return "\n".join("  ".join(c.ljust(width) for c, width in line).strip() for line in lines)
 
     def print(self, markdown=False):
         """Print title and table."""
         print(f"**{self.title}**\n" if markdown else self.title)
-        print("\n".join(self.lines(markdown)), end="\n\n", flush=True)
+        text = markdown_table(self.columns, self.rows) if markdown else self.aligned()
+        print(text, end="\n\n", flush=True)

@@ -8,8 +8,7 @@ import pytest
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim import hooks as slots
-from flocsim.explain import explain
-from flocsim.explain.time_scales import all_scales
+from flocsim.explain import all_scales, explain
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Overdamped, VelocityVerlet
 from tests.helpers.trial_scenes import Lubrication, Spring, Trap, head_on, hook

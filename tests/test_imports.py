@@ -60,7 +60,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal"],
-        ["files", "provenance", "confidence"],
+        ["files", "provenance", "confidence", "markdown"],
     ],
 }
 
@@ -242,7 +242,7 @@ def test_version_is_one():
         ("fields.py", "from flocsim.errors import RangeError", 0),
         ("io/provenance.py", "from flocsim import __version__", 0),
         (
-            "io/plots/figures.py",
+            "io/plots/results.py",
             "import importlib\nimportlib.import_module('flocsim.ensembles.cli')",
             1,
         ),
@@ -257,9 +257,9 @@ def test_wrong_doors_are_seen(path, source, count):
 @pytest.mark.parametrize(
     ("path", "source", "count"),
     [
-        ("io/plots/figures.py", "def draw():\n    from matplotlib.figure import Figure", 0),
-        ("io/plots/fit.py", "def draw():\n    import matplotlib", 0),
-        ("io/plots/figures.py", "import matplotlib", 1),
+        ("io/plots/results.py", "def draw():\n    from matplotlib.figure import Figure", 0),
+        ("io/plots/shapes.py", "def draw():\n    import matplotlib", 0),
+        ("io/plots/results.py", "import matplotlib", 1),
         ("io/results/file.py", "def draw():\n    import matplotlib.pyplot", 1),
         ("system.py", "import h5py", 2),
         ("system.py", "def f():\n    return __import__('h5py')", 1),

@@ -11,12 +11,6 @@ from benchmarks.stability.verdict import KINDS
 BAD = ("wrong", "not finite", "crash", "hang")
 
 
-def table(heads, rows):
-    """A Markdown table."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
-
-
 def counts(found):
     """How many verdicts of each kind, zeros blank."""
     counted = Counter(verdict.kind for verdict in found)

@@ -24,9 +24,10 @@ import attrs  # noqa: E402
 
 from benchmarks.reporting import commit  # noqa: E402
 from benchmarks.stability.cases import FAMILIES, case_of, family_of  # noqa: E402
-from benchmarks.stability.report import BAD, decile_rows, family_rows, offenders, table  # noqa: E402
+from benchmarks.stability.report import BAD, decile_rows, family_rows, offenders  # noqa: E402
 from benchmarks.stability.verdict import judge  # noqa: E402
 from benchmarks.stability.workers import judge_all  # noqa: E402
+from flocsim.io.markdown import markdown_table  # noqa: E402
 
 
 def arguments():
@@ -100,8 +101,8 @@ def main():
         [
             f"commit {commit()}: {' '.join(['python', *sys.argv])}: {len(found)} cases in "
             f"{time.monotonic() - began:.0f} s",
-            table(*family_rows(found)),
-            table(*decile_rows(found)),
+            markdown_table(*family_rows(found)),
+            markdown_table(*decile_rows(found)),
             offenders(found),
         ]
     )

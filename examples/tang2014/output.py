@@ -12,7 +12,7 @@ def paths_of(stem):
 
 def save_all(figure, stem):
     """Save a figure in every format; the paths."""
-    from flocsim.io.plots.figures import save
+    from flocsim.io.plots.style import save
 
     paths = paths_of(stem)
     for path in paths:

@@ -10,7 +10,8 @@ from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.estimates.flips import flips_between
-from flocsim.io.plots.figures import FIGURES, POPULATION_FIGURES
+from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import CLASSES, read_results
 from flocsim.io.shapes.library import read_library
 

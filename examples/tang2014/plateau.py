@@ -16,7 +16,6 @@ Writes plateau.png, .pdf and plateau.md.
 """
 
 import numpy as np
-from claims.table import markdown
 from output import marked, save_all
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
@@ -26,6 +25,7 @@ from flocsim.ensembles.collision.zone import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
 from flocsim.io.confidence import proportion
+from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
@@ -89,7 +89,9 @@ def spheres_table(make, pairs):
             low, high = sphere_transition(make, kind, critical, cut_off)
             rows.append((f"{1e9 * cut_off:g}", TYPES[kind], f"{critical:.3g}",
                          f"{low:.3f} to {high:.3f}"))  # fmt: skip
-    return markdown(("d_min [nm]", "type", "H* [J]", "never below, always above H_A/H*"), rows)
+    return markdown_table(
+        ("d_min [nm]", "type", "H* [J]", "never below, always above H_A/H*"), rows
+    )
 
 
 def sweeps_table(found):
@@ -99,7 +101,7 @@ def sweeps_table(found):
         value, low, high = transition(one, 0, 0.5)
         rows.append((f"{1e9 * cut_off:g}", TYPES[kind], f"{critical:.2e}", f"{value:.2f}",
                      f"[{low:.2f}, {high:.2f}]"))  # fmt: skip
-    return markdown(("d_min [nm]", "type", "H* [J]", "half of Pr[A] at H_A/H*", "95 %"), rows)
+    return markdown_table(("d_min [nm]", "type", "H* [J]", "half of Pr[A] at H_A/H*", "95 %"), rows)
 
 
 def nearest_approach(study, kind, replicate):
@@ -137,7 +139,7 @@ def approach_table(study, pairs, found):
         reaches.append(reach)
     heads = ("type", "d* [nm]", "near, bound", "near, departed", "far, bound", "far, departed",
              "agree [%]", "95 %")  # fmt: skip
-    return markdown(heads, rows), reaches
+    return markdown_table(heads, rows), reaches
 
 
 def figure(found, approach, reach):

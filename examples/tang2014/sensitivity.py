@@ -11,11 +11,12 @@ import csv
 import time
 
 import numpy as np
-from claims.table import markdown, number_text
+from claims.table import number_text
 from output import marked, save_all
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.config.settings import nested
+from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
 
 COLOURS, MARKERS = ("#0072B2", "#D55E00", "#009E73"), "osD"
@@ -139,7 +140,7 @@ def transitions(sweeps):
         "Pr[A] from → to",
         *(f"{100 * level:g} % of the way" for level in LEVELS),
     )
-    return markdown(heads, rows)
+    return markdown_table(heads, rows)
 
 
 def solid(found):

@@ -1,13 +1,17 @@
 """summary.md: all the numbers of a finished study that docs/reproduction.md shows."""
 
+import attrs
 import numpy as np
 import steps
-from beside import beside_table
+from claims.resampling import counts_of
 from claims.robust import ALWAYS, contradicting
-from claims.table import claims_table, markdown, verdicts_table
+from claims.table import claims_table, verdicts_table
+from claims.trends import mean_of, with_delta
+from claims.verdicts import interval_of
 from output import marked
 
 from flocsim.io.confidence import proportion
+from flocsim.io.markdown import markdown_table
 from flocsim.io.results.file import CLASSES
 
 FLIP_KINDS = ("outcome", "aggregation", "zone")
@@ -15,6 +19,8 @@ MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1
 """Goals [%]: outcome flips among the replicates run again, undecided among all."""
 MOST_OPEN = 1.0
 """Share [%] of a reading's collisions without an outcome that needs a word of caution."""
+BESIDE = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
+         "pr_a_outside": "Pr[A|outside]"}  # fmt: skip
 
 
 def write_summary(folder, study, flips, findings, readings, zones):
@@ -53,7 +59,7 @@ def times(folder, study):
         f"replicates in {run['wall_time']:.0f} s, "
         f"{run['computed'] / max(run['wall_time'], 1e-9):.0f} a second."
     )
-    return f"{where}\n\n{markdown(('step', 'wall time [s]', 'goes'), rows)}"
+    return f"{where}\n\n{markdown_table(('step', 'wall time [s]', 'goes'), rows)}"
 
 
 def totals(study):
@@ -63,7 +69,7 @@ def totals(study):
     counts = [table[f"n_{name}"].sum(axis=(1, 2)) for name in names]
     rows = np.column_stack([*counts, table["n_class"].sum(axis=(1, 2))])
     lines = [(name, *row) for name, row in zip(study.types, rows, strict=True)]
-    all_of_them = markdown(("type", *names, *CLASSES), [*lines, ("all", *rows.sum(axis=0))])
+    all_of_them = markdown_table(("type", *names, *CLASSES), [*lines, ("all", *rows.sum(axis=0))])
     total, _, undecided, failed = rows.sum(axis=0)[:4]
     share = 100.0 * undecided / total
     return (
@@ -87,7 +93,7 @@ def flips_table(flips):
         rows.append((kind, changed, count, f"{value:.2f}", f"[{low:.2f}, {high:.2f}]"))
     heads = ("flips of", "replicates", "among", "share [%]", "95 %")
     flag = reached(float(rows[0][3]) <= MOST_FLIPS)
-    return f"{markdown(heads, rows)}\n\nOutcome flips (goal: at most {MOST_FLIPS} %): {flag}."
+    return f"{markdown_table(heads, rows)}\n\nOutcome flips (goal: at most {MOST_FLIPS} %): {flag}."
 
 
 def against(study, zones):
@@ -98,7 +104,9 @@ def against(study, zones):
         for row in rows_against(study, zones, number):
             numbers.setdefault(row, []).append(str(number))
     rows = [(", ".join(each), *row) for row, each in numbers.items()]
-    return markdown(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
+    return (
+        markdown_table(heads, rows) if rows else "No replicate contradicts (6), (7), (9) or (10)."
+    )
 
 
 def rows_against(study, zones, number):
@@ -127,6 +135,42 @@ def listed(values):
     return ", ".join(shown) if len(shown) <= 5 else f"{shown[0]} … {shown[-1]}"
 
 
+def below_largest(counts):
+    """The Counts without δ = δ_max, where few collide."""
+    kept = counts.delta < 1.0
+    arrays = {
+        name: getattr(counts, name)[..., kept, :] for name in ("collided", "inside", "classes")
+    }
+    return attrs.evolve(counts, delta=counts.delta[kept], **arrays)
+
+
+def change_with_vertices(counts, values):
+    """Values (vertices, delta, sample) at the largest N less those at the smallest N > 1."""
+    first, last = counts.polygons[0], counts.polygons[-1]
+    return mean_of(values[last] - values[first], axis=0)
+
+
+def beside_table(study):
+    """Statistics beside the claims, chosen after the results were seen: where trends end."""
+    whole = counts_of(study)
+    part = below_largest(whole)
+    low, high = (whole.vertices[whole.polygons[place]] for place in (0, -1))
+    rows = []
+    for name, shown in BESIDE.items():
+        cells = [cell(with_delta(part, getattr(part, name)[k])) for k in range(len(part.types))]
+        rows.append((f"τ({shown}, δ) below δ_max", *cells))
+        cells = [cell(change_with_vertices(whole, getattr(whole, name)[k]))
+                 for k in range(len(whole.types))]  # fmt: skip
+        rows.append((f"{shown} at N = {high} less N = {low}, mean over δ", *cells))
+    return markdown_table(("statistic", *(f"Type {name}" for name in whole.types)), rows)
+
+
+def cell(samples):
+    """ "-0.69 [-1.00, -0.21]"; "-" for what is not there."""
+    value, low, high = interval_of(samples)
+    return "-" if not np.isfinite(low) else f"{value:.3f} [{low:.3f}, {high:.3f}]"
+
+
 def readings_totals(readings):
     """What became of the replicates under every reading."""
     names = ("total", "missed", "undecided", "failed")
@@ -136,7 +180,7 @@ def readings_totals(readings):
         counts = [table[f"n_{each}"].sum() for each in names]
         seconds = results.run["wall_time"]
         rows.append((name, *counts, *table["n_class"].sum(axis=(0, 1, 2)), f"{seconds:.0f}"))
-    table = markdown(("reading", *names, *CLASSES, "wall time [s]"), rows)
+    table = markdown_table(("reading", *names, *CLASSES, "wall time [s]"), rows)
     return "\n\n".join([table, *(text for row in rows if (text := caution(row)))])
 
 

@@ -1,1 +1,5 @@
-"""The subcommands of ``flocsim``, one file each."""
+"""The subcommands of ``flocsim``, one file each; ``fit_pictures`` is the work behind ``fit``.
+
+A subcommand is a file with ``add_parser(subparsers)`` and ``run(arguments)``, the exit code, listed
+in `flocsim.__main__`.
+"""

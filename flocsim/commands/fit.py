@@ -1,11 +1,16 @@
 """`flocsim fit`: pictures of flocs → a library of fitted shapes."""
 
+import argparse
 import sys
 from pathlib import Path
 
-from flocsim.commands import fit_work
-from flocsim.commands.fit_options import add_options, add_output, add_segmentation, read_options
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.commands.fit_pictures import Options, fit_pictures
+from flocsim.errors import UsageError
+from flocsim.io.files import check_writable, replace_file
+from flocsim.io.plots.shapes import draw_overlay
+from flocsim.io.plots.style import checked_format, save
+from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
+from flocsim.io.shapes.library import make_entry, write_library
 
 DESCRIPTION = """\
 Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
@@ -18,8 +23,6 @@ region, also those left out and why, goes to a table beside the library.
 
 def add_parser(subparsers):
     """Add the subcommand to argparse's ``subparsers``."""
-    import argparse
-
     parser = subparsers.add_parser(
         "fit",
         help="fit spheropolygons to the flocs of pictures",
@@ -38,10 +41,11 @@ def run(args):
     options = read_options(args)
     summary = args.summary or Path(args.output).with_suffix(".csv")
     for output in (args.output, summary):
-        check_output(output)
-    check_overlay(args.overlay)
+        check_writable(output)
+    if args.overlay is not None:
+        checked_format(args.overlay, "--overlay ")
     try:
-        pictures, fits = work(args.images, options)
+        pictures, fits = fit_pictures(args.images, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
@@ -54,67 +58,127 @@ def run(args):
     return 0
 
 
-def check_output(path):
-    """Raise FileError before the long work if a file could not be written at its end."""
-    import os
-
-    from flocsim.io.files import ordinary_target
-
-    folder = ordinary_target(path).parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise FileError(f"{path} cannot be written: {folder} is no folder that can be written to")
-
-
-def check_overlay(path):
-    """Raise UsageError before the long work if the overlay's name has no known ending."""
-    from flocsim.io.plots.figures import FORMATS
-
-    if path is not None and Path(path).suffix.lower().removeprefix(".") not in FORMATS:
-        raise UsageError(f"--overlay {path} must end in .{', .'.join(FORMATS)}")
-
-
-def report(error):
-    """One line on stderr, for a picture that is skipped."""
-    print(f"flocsim: {error}", file=sys.stderr, flush=True)
+def add_options(add):
+    """Declare the options by ``add``, argparse's add_argument."""
+    add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
+    add("--pixel-size", metavar="METRES", help="length of a pixel's side in metres, e.g. 0.95e-6")
+    add("--vertices", default="4,8,16,64", metavar="LIST",
+        help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
+    add("--radius", default="1", metavar="LIST",
+        help="spheroradius in pixels, or several with commas (default: %(default)s)")  # fmt: skip
+    add("--method", default="pattern", choices=("pattern", "paper", "even"),
+        help="pattern: the least error; paper: the paper's damped dynamics; even: points evenly on "
+        "the outline, the plain baseline (default: %(default)s)")  # fmt: skip
+    add("--preserve-area", action="store_true", help="give every shape exactly its floc's area")
+    add("--inscribed", action="store_true", help="keep every shape inside its floc")
+    add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
+    add("--masks", action="store_true",
+        help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
 
 
-def work(names, options):
-    """Pictures, and for each of their regions {radius: {N: Fit}}."""
-    from flocsim.io.shapes.fit_report import Bar
+def add_segmentation(add):
+    """Declare the options of the segmentation by ``add``, argparse's add_argument."""
+    add("--flocs", default="auto", choices=("auto", "bright", "dark"),
+        help="how flocs stand out from the background (default: %(default)s)")  # fmt: skip
+    add("--background", default="surface", choices=("surface", "median"),
+        help="surface: fitted to each picture; median: of all pictures, of one fixed camera "
+        "(default: %(default)s)")  # fmt: skip
+    add("--noise-scale", default="1", metavar="PX",
+        help="detail finer than this is noise (default: %(default)s)")  # fmt: skip
+    add("--saturated", default="0.001", metavar="SHARE",
+        help="share of pixels above the upper threshold of the contrast stretch "
+        "(default: %(default)s)")  # fmt: skip
+    add("--min-radius", default="4", metavar="PX",
+        help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
+    add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
+    add("--max-blur", default="0.4", metavar="SHARE",
+        help="softness of the edge, as a share of r_eq, from which a region is out of focus; "
+        "inf: keep all (default: %(default)s)")  # fmt: skip
+    add("--neck", default="0.5", metavar="SHARE",
+        help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
+        "never (default: %(default)s)")  # fmt: skip
+    add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
 
-    paths = fit_work.list_pictures(names, options.masks, report)
-    background = fit_work.find_background(paths, options)
-    repeated = [path.name for path in paths]
-    # Pictures of one name in several folders are told apart by their paths.
-    titles = [p.name if repeated.count(p.name) == 1 else p.as_posix() for p in paths]
-    tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
-    with fit_work.workers(options.jobs) as mapped:
-        pictures = list(found_pictures(mapped(fit_work.find_flocs, tasks), options))
-        regions = [(each.name, region) for each in pictures for region in each.regions]
-        masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
-        bar = Bar(len(masks))
-        fits = [bar.count(fit) for fit in mapped(fit_work.fit_region, masks)]
-    return pictures, fits
+
+def add_output(add):
+    """Declare where results go by ``add``, argparse's add_argument."""
+    add("-o", "--output", default="shapes.h5", metavar="FILE",
+        help="shape library to write (default: %(default)s)")  # fmt: skip
+    add("--summary", metavar="FILE",
+        help="table of all regions, rejected ones with the reason (default: beside the library, "
+        "ending .csv)")  # fmt: skip
+    add("--overlay", metavar="FILE",
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
+        "pictures, one file each: FILE-picture.png")  # fmt: skip
 
 
-def found_pictures(results, options):
-    """The pictures among the results, each with its line printed; errors are reported."""
-    from flocsim.io.shapes.fit_report import describe, warn_of_coarse
+def read_options(args):
+    """Options from argparse's; UsageError for a number that does not make sense."""
+    if args.pixel_size is None:
+        raise UsageError(
+            "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
+            "of its side in metres, for example --pixel-size 0.95e-6"
+        )
+    if args.inscribed and (args.preserve_area or args.method != "pattern"):
+        raise UsageError(
+            "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
+            "its floc has less than its area"
+        )
+    return Options(
+        pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
+        vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
+        radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
+        method=args.method,
+        preserve_area=args.preserve_area,
+        inscribed=args.inscribed,
+        max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
+        masks=args.masks,
+        background=args.background,
+        jobs=whole("--jobs", args.jobs),
+        segmentation=read_segmentation(args),
+    )
 
-    for result in results:
-        if isinstance(result, FlocsimError):
-            report(result)
-            continue
-        for picture in result:
-            print(describe(picture.name, picture.found, len(picture.regions)), flush=True)
-            warn_of_coarse(picture.name, picture.regions, options.radii)
-            yield picture
+
+def read_segmentation(args):
+    """The keywords of flocsim.io.images.pictures.segment."""
+    limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
+    endless = args.max_blur.strip() == "inf"
+    return {
+        "flocs": args.flocs,
+        "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
+        "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
+        "min_radius": positive("--min-radius", args.min_radius),
+        "max_radius": limit,
+        "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
+        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+    }
+
+
+def number(option, text, meaning, least, most):
+    """A number from `least` to `most`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not least <= value <= most:
+        raise UsageError(f"{option} takes {meaning}, found {text!r}")
+    return value
+
+
+def positive(option, text, meaning="pixels"):
+    """A finite number above 0."""
+    return number(option, text, f"{meaning}, a number above 0", 5e-324, 1.7e308)
+
+
+def whole(option, text):
+    """A whole number from 1."""
+    if not text.strip().isdecimal() or int(text) < 1:
+        raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
+    return int(text)
 
 
 def make_entries(pictures, fits, options):
     """ShapeEntries of all flocs, for every spheroradius."""
-    from flocsim.io.shapes.library import make_entry
-
     flocs = [(picture, region) for picture in pictures for region in picture.regions]
     several = len(options.radii) > 1
     return [
@@ -126,9 +190,6 @@ def make_entries(pictures, fits, options):
 
 def write(args, summary, pictures, fits, entries, options):
     """Write library, table and overlays; print the table of errors."""
-    from flocsim.io.shapes.fit_report import format_errors, plural
-    from flocsim.io.shapes.library import write_library
-
     settings = {"method": options.method, "preserve_area": options.preserve_area,
                 "inscribed": options.inscribed}  # fmt: skip
     write_library(args.output, entries, settings)
@@ -142,18 +203,12 @@ def write(args, summary, pictures, fits, entries, options):
 
 def write_summary(path, pictures, fits, options):
     """Write the table of all regions."""
-    from flocsim.io.files import replace_file
-    from flocsim.io.shapes.fit_summary import summary_text
-
     replace_file(path, summary_text(pictures, fits, options.pixel_size).encode())
 
 
 def draw(overlay, pictures, fits, options):
     """Write each picture with the outlines at the largest N and the smallest spheroradius."""
     from flocsim.io.images.pictures import read_grey
-    from flocsim.io.plots.figures import save
-    from flocsim.io.plots.fit import draw_overlay
-    from flocsim.io.shapes.fit_report import plural
 
     most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
     for picture in pictures:

@@ -31,22 +31,21 @@ def add_parser(subparsers):
 
 def run(args):
     """Print the description, or the config; returns the exit code."""
-    from flocsim.io.results.file import read_results
-    from flocsim.io.results.totals import replicate_totals
+    from flocsim.io.results.file import read_results, replicate_totals
     from flocsim.io.shapes.library import is_library
 
     if not args.config and is_library(args.results):
-        print(describe_library(args.results))
+        print(library_text(args.results))
         return 0
     results = read_results(args.results, replicates=False)
     if args.config:
         sys.stdout.write(config_text(args.results, results))
     else:
-        print(describe(args.results, results, replicate_totals(args.results)))
+        print(results_text(args.results, results, replicate_totals(args.results)))
     return 0
 
 
-def describe_library(path):
+def library_text(path):
     """A shape library as text: its flocs, how they were fitted, their errors."""
     from flocsim.io.shapes.fit_report import format_errors
     from flocsim.io.shapes.library import read_library, read_settings
@@ -70,7 +69,7 @@ def config_text(path, results):
     return results.run["config"]
 
 
-def describe(path, results, totals):
+def results_text(path, results, totals):
     """The whole description as text."""
     from flocsim.ensembles.report import format_table
 

@@ -3,21 +3,23 @@
 from pathlib import Path
 
 from flocsim.errors import FileError, UsageError
+from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.shapes import POPULATION_FIGURES
+from flocsim.io.plots.style import FORMATS, save
 
-FIGURE_NAMES = ("4", "5", "6", "8", "overview")
-POPULATION_NAMES = ("2", "3")
 DESCRIPTION = """\
 Draw the figures of a results file, each into a file of its own:
-  4         Pr[C inside]: probability that a collision happens inside the attraction zone
-  5         Pr[A | inside]: probability of aggregation after a collision inside the zone
-  6         Pr[A | outside]: probability of aggregation after a collision outside the zone
-  8         probability of the classes A, B, C, D, all displacements pooled
-  overview  Pr[C inside], Pr[A] and the classes in one picture
+{results}
 Bars are Wilson 95 % intervals.
 Of a shape library that flocsim fit wrote:
-  2         histogram of the equivalent radii
-  3         relative error of the fits against N by size class, for every spheroradius
+{shapes}
 Figures are numbered as in Tang et al. (2014)."""
+
+
+def listed(figures):
+    """A line for every figure: its name and the first line of its docstring."""
+    told = {name: (draw.__doc__ or "").partition("\n")[0] for name, draw in figures.items()}
+    return "\n".join(f"  {name:<8}  {text.removesuffix('.')}" for name, text in told.items())
 
 
 def add_parser(subparsers):
@@ -27,7 +29,7 @@ def add_parser(subparsers):
     parser = subparsers.add_parser(
         "plot",
         help="draw the figures of a results file or a shape library",
-        description=DESCRIPTION,
+        description=DESCRIPTION.format(results=listed(FIGURES), shapes=listed(POPULATION_FIGURES)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
@@ -37,9 +39,7 @@ def add_parser(subparsers):
         metavar="DIR",
         help="folder for the figures, made if it is missing (default: the current one)",
     )
-    parser.add_argument(
-        "--format", default="png", choices=("png", "pdf", "svg"), help="default: %(default)s"
-    )
+    parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
     parser.add_argument(
         "--figures",
         metavar="LIST",
@@ -52,9 +52,6 @@ def add_parser(subparsers):
 def run(args):
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
-
-    from flocsim.io.plots.figures import save
-
     content, figures = read_content(args.results)
     foreign = [name for name in names or () if name not in figures]
     if foreign:
@@ -70,7 +67,6 @@ def run(args):
 
 def read_content(path):
     """What a file holds, Results or ShapeEntries, and {name: function} of its figures."""
-    from flocsim.io.plots.figures import FIGURES, POPULATION_FIGURES
     from flocsim.io.results.file import read_results
     from flocsim.io.shapes.library import is_library, read_library
 
@@ -82,7 +78,7 @@ def read_content(path):
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (*POPULATION_NAMES, *FIGURE_NAMES)
+    known = (*POPULATION_FIGURES, *FIGURES)
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

@@ -96,12 +96,10 @@ def with_one_count(config, vertex_count):
 def check_outputs(config_path, figures, others):
     """FlocsimError now, rather than after the run, for files that could not be written."""
     from flocsim.ensembles.preflight import check_output
-    from flocsim.io.plots.figures import FORMATS
+    from flocsim.io.plots.style import checked_format
 
     for path in figures:
-        if Path(path).suffix.lower().removeprefix(".") not in FORMATS:
-            known = ", ".join(f".{name}" for name in FORMATS)
-            raise UsageError(f"{path}: a figure's name must end in one of {known}")
+        checked_format(path)
     for path in [*figures, *others]:
         check_output(path, config_path)
 
@@ -148,7 +146,7 @@ def draw_more(args, encounter, arrays, row, title):
     """Draw the forces and the animation where asked for; the paths written."""
     from flocsim.ensembles.collision.forces_between import loads_of
     from flocsim.ensembles.collision.snapshots import frames_of
-    from flocsim.io.plots.figures import draw_forces, write_animation
+    from flocsim.io.plots.collision import draw_forces, write_animation
 
     times, position, _ = arrays
     written = []
@@ -165,7 +163,7 @@ def draw_more(args, encounter, arrays, row, title):
 
 def save_all(figure, names):
     """Save a figure under every name; the paths."""
-    from flocsim.io.plots.figures import save
+    from flocsim.io.plots.style import save
 
     paths = [Path(name) for name in names]
     for path in paths:
@@ -182,7 +180,7 @@ def centre_distance(position):
 
 def draw(args, frames, motion, zone, title):
     """Draw and save what was asked for; the paths written."""
-    from flocsim.io.plots.figures import draw_distance, draw_strip
+    from flocsim.io.plots.collision import draw_distance, draw_strip
 
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import fit, info, plot
+from flocsim.commands import fit, fit_pictures, info, plot
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shapes.library import read_library
 from tests.helpers.real_images import real_image
@@ -260,7 +260,7 @@ def test_an_interrupt_leaves_no_file(tmp_path, frame, capsys, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(fit.fit_work, "fit_region", interrupt)
+    monkeypatch.setattr(fit_pictures, "fit_region", interrupt)
     assert run(frame, "--pixel-size", "1e-6", "-o", tmp_path / "s.h5") == 130
     assert "interrupted" in capsys.readouterr().err
     assert not (tmp_path / "s.h5").exists()

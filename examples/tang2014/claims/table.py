@@ -1,5 +1,7 @@
 """The claims as a table in Markdown: every part with its value, interval and verdict."""
 
+from flocsim.io.markdown import markdown_table
+
 
 def number_text(value):
     """Three digits; "-" for what is not there."""
@@ -33,7 +35,7 @@ def rows_of(finding):
 def claims_table(findings):
     """A table with a row for every part of every Finding."""
     heads = ("claim", "statistic", "value", "95 %", "verdict")
-    return markdown(heads, [row for finding in findings for row in rows_of(finding)])
+    return markdown_table(heads, [row for finding in findings for row in rows_of(finding)])
 
 
 def verdicts_table(readings):
@@ -45,11 +47,4 @@ def verdicts_table(readings):
             found[place].verdict if found[place].parts else "-" for found in readings.values()
         ]
         rows.append((f"{finding.number} {finding.claim}", *verdicts))
-    return markdown(("claim", *readings), rows)
-
-
-def markdown(heads, rows):
-    """A table; bars in cells do not end them."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    cells = [[str(cell).replace("|", "\\|") for cell in line] for line in lines]
-    return "\n".join("| " + " | ".join(line) + " |" for line in cells)
+    return markdown_table(("claim", *readings), rows)

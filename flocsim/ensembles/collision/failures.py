@@ -3,9 +3,7 @@
 from flocsim.ensembles.collision.memo import COLLIDED, INSIDE
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, MISSED
 from flocsim.integrators.base import Status
-from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
-
-NAN = float("nan")
+from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
 
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""
@@ -41,20 +39,9 @@ NOT_FINITE = FAILURES.index("not finite")
 
 def failed_row(failure, angles=(float("nan"), float("nan"))):
     """The row of a replicate that ended without a result, as a dict."""
-    nothing = dict.fromkeys(("d_c_collision", "d_c_max", "d_c_last", "t_collision", "t_end"), NAN)
-    return nothing | {
-        "angle_i": angles[0],
-        "angle_j": angles[1],
-        "outcome": OUTCOMES.index("failed"),
-        "inside": NOT_APPLICABLE,
-        "crossed_zone": NOT_APPLICABLE,
-        "steps": 0,
-        "rejected": 0,
-        "error": NAN,
-        "failure": failure,
-        "floc_i": -1,
-        "floc_j": -1,
-    }
+    blank = {name: BLANKS[kind] for name, (kind, _, _) in REPLICATES.items()}
+    told = {"outcome": OUTCOMES.index("failed"), "failure": failure}
+    return blank | {"angle_i": angles[0], "angle_j": angles[1]} | told
 
 
 def collided(memo):

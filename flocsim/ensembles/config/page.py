@@ -14,6 +14,7 @@ from flocsim.ensembles.config.loader import STUDY_KEYS, TABLES
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.values import list_words
+from flocsim.io.markdown import markdown_table
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
@@ -84,13 +85,7 @@ def key_table(keys):
         [f"`{key}`", takes(field), default_of(field), field.metadata.get("help", "")]
         for key, field in keys.items()
     ]
-    return markdown_table(["key", "takes", "default", "meaning"], rows)
-
-
-def markdown_table(heading, rows):
-    """Rows of cells as Markdown text."""
-    lines = [heading, ["---"] * len(heading), *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n"
+    return markdown_table(["key", "takes", "default", "meaning"], rows) + "\n"
 
 
 def takes(field):
@@ -130,7 +125,7 @@ def preset_table():
     columns = [dict(flat(preset)) for preset in PRESETS.values()]
     keys = list(dict.fromkeys(key for column in columns for key in column))
     rows = [[f"`{key}`", *(as_cell(column.get(key)) for column in columns)] for key in keys]
-    return markdown_table(["key", *(f"`{name}`" for name in PRESETS)], rows)
+    return markdown_table(["key", *(f"`{name}`" for name in PRESETS)], rows) + "\n"
 
 
 def as_cell(value):

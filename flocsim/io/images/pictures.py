@@ -5,6 +5,7 @@ import numpy as np
 
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.background import (
+    find_threshold,
     light_surface,
     low_pass,
     noise_deviation,
@@ -12,7 +13,6 @@ from flocsim.io.images.background import (
 )
 from flocsim.io.images.reading import read_grey
 from flocsim.io.images.regions import Filters, Region, Rejection, filled, find_regions
-from flocsim.io.images.threshold import find_threshold
 
 __all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
 
@@ -67,7 +67,7 @@ def segment(
     In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
     space, and of the background; contrast stretch between two thresholds, the median and the top
     `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
-    (image_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
+    (find_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
     bright flocs: contrast = grey − background.
 
     Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of

@@ -1,9 +1,14 @@
-"""The look that all figures share: type sizes, colours, and the axis of vertex counts."""
+"""The look that all figures share, the axes that several have, and how a figure is saved."""
 
 import contextlib
+import io
 import re
+from pathlib import Path
 
 import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.files import replace_file
 
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -38,6 +43,14 @@ MOST_LABELS = 8
 """More labels of vertex counts than this would run into each other."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
+
+# A date or a version would make equal figures differ in bytes.
+METADATA = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Creator": "flocsim", "Producer": None},
+    "svg": {"Date": None, "Creator": "flocsim"},
+}
+FORMATS = tuple(METADATA)
 
 
 @contextlib.contextmanager
@@ -112,3 +125,25 @@ def dodge(number, count):
     """Sideways shift, as a share of a slot, that keeps the bars of ``count`` lines apart."""
     step = min(0.1, 0.6 / max(count - 1, 1))
     return (number - 0.5 * (count - 1)) * step
+
+
+def checked_format(path, option=""):
+    """The format that a figure's name asks for; UsageError, which names the option, for another."""
+    suffix = Path(path).suffix.lower().removeprefix(".")
+    if suffix not in FORMATS:
+        known = ", ".join(f".{name}" for name in FORMATS)
+        raise UsageError(f"{option}{path}: a figure's name must end in one of {known}")
+    return suffix
+
+
+def save(figure, path):
+    """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
+
+    The same figure gives the same bytes. Raises UsageError for another suffix, FileError if the
+    file cannot be written.
+    """
+    suffix = checked_format(path)
+    picture = io.BytesIO()
+    with house_style():
+        figure.savefig(picture, format=suffix, metadata=METADATA[suffix])
+    replace_file(path, picture.getvalue())

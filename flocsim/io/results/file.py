@@ -17,6 +17,7 @@ checked before HDF5 parses it, and is written a block at a time (see `flocsim.io
 
 import contextlib
 
+import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
@@ -41,9 +42,13 @@ __all__ = [
     "TABLE",
     "Results",
     "read_results",
+    "replicate_totals",
     "same_data",
     "write_results",
 ]
+
+BLOCK = 262_144
+"""Replicates of a condition that are read together."""
 
 
 def write_results(path, results, columns=None):
@@ -96,8 +101,42 @@ def read_group(file, name, schema):
 
 
 def read_scalar(dataset):
-    """A number or a text."""
     return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
+
+
+@attrs.define
+class Totals:
+    """How many replicates had each outcome and each reason, and what steps they took."""
+
+    outcomes: np.ndarray
+    failures: np.ndarray
+    count: int = 0
+    steps: int = 0
+    most_steps: int = 0
+    rejected: int = 0
+
+    def add(self, outcome, failure, steps, rejected):
+        self.outcomes += np.bincount(outcome, minlength=len(self.outcomes))
+        self.failures += np.bincount(failure, minlength=len(self.failures))
+        self.count += outcome.size
+        self.steps += int(steps.sum())
+        self.most_steps = max(self.most_steps, int(steps.max(initial=0)))
+        self.rejected += int(rejected.sum())
+
+
+def replicate_totals(path):
+    """The Totals of a file, which may be larger than the memory; FileError as `read_results`."""
+    with opened(path) as file:
+        rows = file["replicates"]
+        reasons = len(rows["failure"].attrs["flag_meanings"].split())
+        totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
+        *shape, count = rows["outcome"].shape
+        for place in np.ndindex(*shape):
+            for first in range(0, count, BLOCK):
+                part = (*place, slice(first, first + BLOCK))
+                columns = (rows[name][part] for name in ("outcome", "failure", "steps", "rejected"))
+                totals.add(*columns)
+        return totals
 
 
 @contextlib.contextmanager

@@ -1,4 +1,11 @@
-"""How a results file is laid out: its groups, their coordinates, and where large values go."""
+"""How a results file is laid out: its groups, their coordinates, and where large values go.
+
+HDF5 lays out the large datasets and writes all that describes them, into a SparseImage; their
+values go to the disk without it, a block at a time. So memory stays flat, and a full disk is never
+met inside HDF5, where it can end the process.
+"""
+
+import io
 
 import attrs
 import numpy as np
@@ -15,11 +22,72 @@ from flocsim.io.results.schema import (
     REPLICATES,
     TABLE,
 )
-from flocsim.io.results.sparse_image import SparseImage
 
 FORMAT = "flocsim results"
 SCHEMA_VERSION = 2
 BLOCK_ROWS = 65_536
+
+
+class SparseImage(io.RawIOBase):
+    """A file in memory of which only what is written takes space; h5py takes it for a file."""
+
+    def __init__(self):
+        self.writes = []
+        self.length = 0
+        self.place = 0
+
+    def readable(self):
+        return True
+
+    def writable(self):
+        return True
+
+    def seekable(self):
+        return True
+
+    def seek(self, offset, whence=io.SEEK_SET):
+        self.place = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self.place}.get(whence, self.length)
+        return self.place
+
+    def tell(self):
+        return self.place
+
+    def write(self, data):
+        data = bytes(data)
+        self.writes.append((self.place, data))
+        self.place += len(data)
+        self.length = max(self.length, self.place)
+        return len(data)
+
+    def readinto(self, buffer):
+        """Bytes at the place, zero where nothing was written."""
+        stop = min(self.place + len(buffer), self.length)
+        data = self.content(self.place, stop)
+        buffer[: len(data)] = data
+        self.place += len(data)
+        return len(data)
+
+    def truncate(self, size=None):
+        self.length = self.place if size is None else size
+        return self.length
+
+    def content(self, start, stop):
+        """The bytes [start, stop), as a later write has left them."""
+        found = bytearray(max(stop - start, 0))
+        for place, data in self.writes:
+            low, high = max(place, start), min(place + len(data), stop)
+            if low < high:
+                found[low - start : high - start] = data[low - place : high - place]
+        return bytes(found)
+
+    def blocks(self, streams):
+        """All bytes in order; ``streams`` are (offset, length, iterator of bytes) of the values."""
+        place = 0
+        for offset, length, values in sorted(streams, key=lambda stream: stream[0]):
+            yield self.content(place, offset)
+            yield from values
+            place = offset + length
+        yield self.content(place, self.length)
 
 
 @attrs.define
@@ -64,10 +132,10 @@ def write_group(file, name, arrays, schema, axes, coordinates):
     for axis in axes:
         write_coordinate(group, axis, coordinates[axis])
     for variable, about in schema.items():
-        describe(group.create_dataset(variable, data=arrays[variable]), about, group, axes)
+        annotate(group.create_dataset(variable, data=arrays[variable]), about, group, axes)
 
 
-def describe(dataset, about, group, axes):
+def annotate(dataset, about, group, axes):
     """Unit, meaning and coordinates of a dataset."""
     _, unit, text = about
     dataset.attrs.update({"units": unit, "long_name": text})
@@ -84,18 +152,22 @@ def reserve_replicates(file, study, results):
     shape = (*results.shape, results.count)
     scale = empty_dataset(group, "replicate", (results.count,), "i8")
     scale.make_scale("replicate")
-    describe_scale(scale, "replicate")
+    annotate_scale(scale, "replicate")
     datasets = [scale]
     for name, about in REPLICATES.items():
         dataset = empty_dataset(group, name, shape, about[0])
-        describe(dataset, about, group, (*AXES, "replicate"))
+        annotate(dataset, about, group, (*AXES, "replicate"))
         if name in flags:
             values, meanings = flags[name]
             dataset.attrs["flag_values"] = np.array(values, "u1")
             dataset.attrs["flag_meanings"] = " ".join(meanings)
         datasets.append(dataset)
     file.flush()
-    return [place_of(dataset) for dataset in datasets if dataset.nbytes]
+    return [
+        (dataset.id.get_offset(), dataset.nbytes, dataset.name.rsplit("/", 1)[1])
+        for dataset in datasets
+        if dataset.nbytes
+    ]
 
 
 def empty_dataset(group, name, shape, kind):
@@ -109,11 +181,6 @@ def empty_dataset(group, name, shape, kind):
     return group.create_dataset(name, shape, little, dcpl=plan)
 
 
-def place_of(dataset):
-    """(offset, length, name) of a dataset's values."""
-    return dataset.id.get_offset(), dataset.nbytes, dataset.name.rsplit("/", 1)[1]
-
-
 def write_coordinate(group, axis, values):
     """A dimension scale; words are stored as variable-length UTF-8."""
     import h5py
@@ -121,10 +188,10 @@ def write_coordinate(group, axis, values):
     words = isinstance(values, list)
     scale = group.create_dataset(axis, data=values, dtype=h5py.string_dtype() if words else None)
     scale.make_scale(axis)
-    describe_scale(scale, axis)
+    annotate_scale(scale, axis)
 
 
-def describe_scale(scale, axis):
+def annotate_scale(scale, axis):
     """Unit and meaning of a coordinate."""
     unit, text = COORDINATES[axis]
     scale.attrs.update({"units": unit, "long_name": text})

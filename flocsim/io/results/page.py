@@ -3,6 +3,7 @@
 Write it anew with `python -m flocsim.io.results.page > docs/results.md`.
 """
 
+from flocsim.io.markdown import markdown_table
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import (
     COORDINATES,
@@ -70,13 +71,6 @@ def results_page():
     return "\n".join([*parts, RUN, "## Coordinates\n", coordinates()])
 
 
-def rows_of(heading, rows):
-    """Rows of cells as a Markdown table."""
-    shown = [[cell.replace("|", "\\|") for cell in cells] for cells in rows]
-    lines = [heading, ["---"] * len(heading), *shown]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines) + "\n"
-
-
 def table(schema):
     """A Markdown table of one group; bounds go with what they bound."""
     rows = []
@@ -85,7 +79,7 @@ def table(schema):
             bounded = f"{name}_low" in schema
             shown = f"`{name}`" + (", `_low`, `_high`" if bounded else "")
             rows.append([shown, kind, unit, text + codes(name)])
-    return rows_of(["dataset", "type", "unit", "meaning"], rows)
+    return markdown_table(["dataset", "type", "unit", "meaning"], rows) + "\n"
 
 
 def codes(name):
@@ -97,7 +91,8 @@ def codes(name):
 
 def coordinates():
     """A Markdown table of the coordinates."""
-    return rows_of(["axis", "meaning"], [[f"`{k}`", text] for k, (_, text) in COORDINATES.items()])
+    rows = [[f"`{name}`", text] for name, (_, text) in COORDINATES.items()]
+    return markdown_table(["axis", "meaning"], rows) + "\n"
 
 
 if __name__ == "__main__":

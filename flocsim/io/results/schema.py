@@ -34,6 +34,8 @@ REPLICATES = {  # name: (dtype, units, long name)
     "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
     "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
 }
+BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
+"""By its type, what a column of `REPLICATES` holds where there is nothing to say."""
 ROW_SIZE = sum(np.dtype(kind).itemsize for kind, _, _ in REPLICATES.values())
 """Bytes of one replicate."""
 

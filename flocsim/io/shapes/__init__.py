@@ -1,1 +1,1 @@
-"""Shape libraries, and what a fit tells its user."""
+"""Shape libraries (``library``), and what a fit tells its user (``fit_report``)."""

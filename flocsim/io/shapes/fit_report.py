@@ -1,5 +1,7 @@
-"""What `flocsim fit` tells a person: progress, a line on every picture, a table."""
+"""What `flocsim fit` tells a person: progress, a line on every picture, tables."""
 
+import csv
+import io
 import sys
 import time
 
@@ -44,7 +46,7 @@ class Bar:
         return f"[{full:<{BAR_WIDTH}}] floc {self.done} of {self.total}, {left:.0f} s left"
 
 
-def describe(name, found, fitted):
+def picture_line(name, found, fitted):
     """One line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
     if fitted < len(found.regions):
@@ -98,3 +100,41 @@ def mean_error(entries, count):
     """The mean relative error at N = `count`, "-" without flocs."""
     errors = [entry.fits[count].relative_error for entry in entries]
     return f"{sum(errors) / len(errors):.2f}" if errors else "-"
+
+
+COLUMNS = (
+    "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m", "blur_px"
+)  # fmt: skip
+
+
+def summary_text(pictures, fits, pixel_size):
+    """The table of all regions as CSV: flocs with RE [%] for every r [px] and N, others with why.
+
+    pictures: with name, found (Segmentation) and regions, the fitted ones of found.regions;
+    fits: {r: {N: Fit}} of these regions in their order; pixel_size [m].
+    """
+    radii = list(fits[0]) if fits else []
+    pairs = [(radius, count) for radius in radii for count in fits[0][radius]]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow([*COLUMNS, *(f"re_percent_r{r:g}_N{n}" for r, n in pairs)])
+    results = iter(fits)
+    for picture in pictures:
+        fitted = {region.label: next(results) for region in picture.regions}
+        for region in picture.found.regions:
+            why = "" if region.label in fitted else "not among the largest"
+            row = [picture.name, region.label, why, *_facts(region, pixel_size)]
+            errors = [f"{fitted[region.label][r][n].relative_error:.4f}" for r, n in pairs
+                      if region.label in fitted]  # fmt: skip
+            table.writerow([*row, *(errors or [""] * len(pairs))])
+        for region in picture.found.rejected:
+            row = [picture.name, "", region.reason, *_facts(region, pixel_size)]
+            table.writerow([*row, *[""] * len(pairs)])
+    return text.getvalue()
+
+
+def _facts(region, pixel_size):
+    x, y = region.centroid
+    radius = region.equivalent_radius
+    blur = "" if region.blur != region.blur else f"{region.blur:.2f}"
+    return f"{x:.2f}", f"{y:.2f}", region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}", blur

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from flocsim.errors import UsageError
-from flocsim.io.plots.figures import write_animation
+from flocsim.io.plots.collision import write_animation
 
 SQUARE = 1e-6 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

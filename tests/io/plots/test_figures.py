@@ -12,19 +12,10 @@ import pytest
 
 from flocsim.ensembles.estimates.statistics import tabulate, wilson
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots.figures import (
-    FIGURES,
-    POPULATION_FIGURES,
-    draw_distance,
-    draw_strip,
-    figure_2,
-    figure_3,
-    figure_4,
-    figure_6,
-    figure_8,
-    save,
-)
-from flocsim.io.plots.trajectory import rounded_length, time_unit
+from flocsim.io.plots.collision import draw_distance, draw_strip, rounded_length, time_unit
+from flocsim.io.plots.results import FIGURES, figure_4, figure_6, figure_8
+from flocsim.io.plots.shapes import POPULATION_FIGURES, figure_2, figure_3
+from flocsim.io.plots.style import save
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
 from tests.helpers.synthetic_results import make_results
 
@@ -259,7 +250,7 @@ def test_time_unit_fits_the_longest_time(times, unit):
 
 
 def test_plotting_loads_no_window_system():
-    code = "import flocsim.io.plots.figures as p, sys; print('matplotlib' in sys.modules); "
+    code = "import flocsim.io.plots.collision as p, sys; print('matplotlib' in sys.modules); "
     code += "p.draw_distance([0, 1], [1e-5, 1e-5]); print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]

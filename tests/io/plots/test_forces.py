@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from flocsim.errors import UsageError
-from flocsim.io.plots.figures import draw_forces, save
+from flocsim.io.plots.collision import draw_forces
+from flocsim.io.plots.style import save
 
 
 def test_what_pushes_is_solid_and_what_pulls_is_dashed():

@@ -1,16 +1,27 @@
-"""Figures of one collision: a strip of frames (the paper's Fig. 7) and the centre distance."""
+"""One collision: a strip of frames (the paper's Fig. 7), distance, forces, and an animation."""
 
+import io
 import math
 
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.io.files import replace_file
 from flocsim.io.plots.style import BODY_COLOURS, CONTACT_COLOUR, house_style, new_figure
 
 MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
 PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 """Behind text that lines may cross."""
+
+NANO = 1e9
+DECADES = 8
+"""Decades below the largest force that are shown."""
+FORCE_COLOURS = (*BODY_COLOURS, "0.5", CONTACT_COLOUR)
+
+MILLISECONDS = 80
+"""Of every frame of an animation; the last stays for LAST."""
+LAST = 1500
 
 
 def draw_strip(
@@ -70,6 +81,96 @@ def draw_distance(times, centre_distance, zone_distance=None, title=""):
         axes.margins(x=0.02, y=0.12)
         draw_zone(axes, zone_distance)
         return figure
+
+
+def draw_forces(times, forces, collision=None, title=""):
+    """Magnitudes of forces [N] against time [s], solid where they push apart; returns the Figure.
+
+    ``forces``: {name: (k,)}, above 0 where a force pushes the bodies apart; ``collision``: the
+    time of the first touch. Raises UsageError if the lengths disagree.
+    """
+    if any(len(force) != len(times) for force in forces.values()):
+        raise UsageError("a figure of forces needs one force per time")
+    unit, factor = time_unit(times)
+    with house_style():
+        figure = new_figure(5.4, 2.6)
+        axes = figure.subplots()
+        for colour, (name, force) in zip(FORCE_COLOURS, forces.items(), strict=False):
+            draw_signed(axes, np.asarray(times) * factor, np.asarray(force) * NANO, colour, name)
+        if collision is not None and np.isfinite(collision):
+            axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":")
+        set_force_axis(axes, forces)
+        axes.set_xlabel(f"time [{unit}]")
+        axes.set_title(title)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
+                    alignment="left")  # fmt: skip
+        return figure
+
+
+def draw_signed(axes, times, force, colour, name):
+    """One force: solid where it pushes apart, dashed where it pulls together."""
+    push, pull = np.where(force > 0.0, force, np.nan), np.where(force < 0.0, -force, np.nan)
+    axes.plot(times, push, color=colour, linewidth=1.1, label=name)
+    axes.plot(times, pull, color=colour, linewidth=1.1, linestyle=(0, (3, 1.5)))
+
+
+def set_force_axis(axes, forces):
+    """Powers of ten down to what can still matter."""
+    sizes = np.abs(np.concatenate([np.asarray(force) for force in forces.values()])) * NANO
+    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
+    if largest > 0.0:
+        axes.set_yscale("log")
+        axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
+    axes.set_ylabel("force on the line of centres [nN]")
+
+
+def write_animation(path, frames, motion, zone_distance=None, title=""):
+    """Write Frames (times, outlines, paths, contacts, centre_distance) as a GIF that loops.
+
+    ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
+    D_0 [m]. FileError if it cannot be written.
+    """
+    check_lengths(len(frames.times), frames.outlines, frames.contacts, frames.centre_distance)
+    pictures = [picture_of(frames, place, motion, zone_distance, title)
+                for place in range(len(frames.times))]  # fmt: skip
+    lasting = [MILLISECONDS] * (len(pictures) - 1) + [LAST]
+    buffer = io.BytesIO()
+    pictures[0].save(buffer, "GIF", save_all=True, append_images=pictures[1:], duration=lasting,
+                     loop=0, optimize=False)  # fmt: skip
+    replace_file(path, buffer.getvalue())
+
+
+def picture_of(frames, place, motion, zone_distance, title):
+    """One frame as a Pillow image of 64 colours."""
+    from PIL import Image
+
+    with house_style():
+        figure = draw_frame(frames, place, motion, zone_distance, title)
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
+    return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
+
+
+def draw_frame(frames, place, motion, zone_distance, title):
+    """The Figure of one frame."""
+    unit, factor = time_unit(motion[0])
+    figure = new_figure(6.4, 3.0)
+    bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
+    centres, half = windows(frames.outlines)
+    draw_paths(bodies, frames.paths)
+    draw_bodies(bodies, frames.outlines[place])
+    draw_contacts(bodies, frames.contacts[place])
+    frame_axes(bodies, centres[place], half)
+    draw_scale_bar(bodies, centres[place], half)
+    bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
+    graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
+    now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
+    graph.plot(*now, "o", color=BODY_COLOURS[0])
+    graph.set_xlabel(f"time [{unit}]")
+    graph.set_ylabel("centre distance $d_c$ [µm]")
+    draw_zone(graph, zone_distance)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+    return figure
 
 
 def draw_zone(axes, zone_distance):

@@ -1,12 +1,38 @@
-"""The work of `flocsim fit`, in one process or several: pictures → regions → fits."""
+"""The work of `flocsim fit`, in one process or several: pictures → flocs → fits."""
 
 import contextlib
 import sys
 from pathlib import Path
 
 import attrs
+import numpy as np
 
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
+from flocsim.io.shapes.fit_report import Bar, picture_line, warn_of_coarse
+
+MOST_FRAMES = 25
+"""More frames than this tell hardly more about the light."""
+
+
+@attrs.frozen
+class Options:
+    """What to look for and what to fit, ready to be handed to other processes.
+
+    Radii, blur and saturation as in flocsim.io.images.pictures.segment; vertices with 1 among them;
+    radii: spheroradii [px], rising.
+    """
+
+    pixel_size: float
+    vertices: tuple
+    radii: tuple
+    method: str
+    preserve_area: bool
+    inscribed: bool
+    max_flocs: int | None
+    masks: bool
+    background: str
+    jobs: int
+    segmentation: dict
 
 
 @attrs.frozen(eq=False)
@@ -19,6 +45,40 @@ class Picture:
     regions: tuple
 
 
+def fit_pictures(names, options):
+    """Pictures, and for each of their regions {radius: {N: Fit}}."""
+    paths = list_pictures(names, options.masks)
+    background = find_background(paths, options)
+    repeated = [path.name for path in paths]
+    # Pictures of one name in several folders are told apart by their paths.
+    titles = [p.name if repeated.count(p.name) == 1 else p.as_posix() for p in paths]
+    tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
+    with workers(options.jobs) as mapped:
+        pictures = list(found_pictures(mapped(find_flocs, tasks), options))
+        regions = [(each.name, region) for each in pictures for region in each.regions]
+        masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
+        bar = Bar(len(masks))
+        fits = [bar.count(fit) for fit in mapped(fit_region, masks)]
+    return pictures, fits
+
+
+def found_pictures(results, options):
+    """The pictures among the results, each with its line printed; errors are reported."""
+    for result in results:
+        if isinstance(result, FlocsimError):
+            report(result)
+            continue
+        for picture in result:
+            print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
+            warn_of_coarse(picture.name, picture.regions, options.radii)
+            yield picture
+
+
+def report(error):
+    """One line on stderr, for a picture that is skipped."""
+    print(f"flocsim: {error}", file=sys.stderr, flush=True)
+
+
 @contextlib.contextmanager
 def workers(jobs):
     """A map over tasks, in order, as results come in; by `jobs` processes if more than one."""
@@ -27,20 +87,14 @@ def workers(jobs):
         return
     import multiprocessing
 
-    prepare()
+    from flocsim.geometry.fit.fit import fit_mask
+
+    # Compile before there are several processes that would all do it.
+    fit_mask(np.ones((9, 9), bool), vertices=5)
     # Linux processes inherit what is compiled and loaded; elsewhere forking is not safe.
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
     with context.Pool(jobs, ignore_interrupts) as pool:
         yield pool.imap
-
-
-def prepare():
-    """Compile before there are several processes that would all do it."""
-    import numpy as np
-
-    from flocsim.geometry.fit.fit import fit_mask
-
-    fit_mask(np.ones((9, 9), bool), vertices=5)
 
 
 def ignore_interrupts():
@@ -59,7 +113,7 @@ def find_flocs(task):
         from flocsim.io.images.pictures import read_grey, segment
 
         found = segment(read_grey(path), background=background, **options.segmentation)
-        return [picture(path, name, found, options)]
+        return [Picture(path, name, found, largest(found.regions, options.max_flocs))]
     except FlocsimError as error:
         return error
 
@@ -69,15 +123,12 @@ def masked(path, name, options):
     from flocsim.io.images.masks import read_masks, segment_mask
 
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
-    return [
-        picture(path, name + inner[len(path.name) :], segment_mask(mask, **limits), options)
-        for inner, mask in read_masks(path)
-    ]
-
-
-def picture(path, name, found, options):
-    """A Picture with the regions that are to be fitted."""
-    return Picture(path, name, found, largest(found.regions, options.max_flocs))
+    pictures = []
+    for inner, mask in read_masks(path):
+        found = segment_mask(mask, **limits)
+        regions = largest(found.regions, options.max_flocs)
+        pictures.append(Picture(path, name + inner[len(path.name) :], found, regions))
+    return pictures
 
 
 def largest(regions, count):
@@ -107,18 +158,15 @@ def fit_one(mask, count, radius, options):
     """The Fit of a mask by the Options."""
     from flocsim.geometry.fit.fit import fit_mask
 
+    # A circle of a spheroradius above r_eq is larger than the floc already.
+    is_fine = np.pi * radius**2 < mask.sum()
     return fit_mask(
         mask, vertices=count, radius=radius, method=options.method, inscribed=options.inscribed,
-        preserve_area=options.preserve_area and is_fine(mask, radius),
+        preserve_area=options.preserve_area and is_fine,
     )  # fmt: skip
 
 
-def is_fine(mask, radius):
-    """Whether the spheroradius is below the floc's equivalent radius."""
-    return 3.141592653589793 * radius**2 < mask.sum()
-
-
-def list_pictures(names, masks, report):
+def list_pictures(names, masks):
     """The files' paths, folders replaced by the pictures in them; each path once."""
     from flocsim.io.images.masks import MASK_SUFFIXES
     from flocsim.io.images.reading import SUFFIXES
@@ -132,10 +180,6 @@ def list_pictures(names, masks, report):
             report(ImageError(f"{path}: the folder holds no pictures ({', '.join(suffixes)})"))
         paths += found
     return list(dict.fromkeys(paths))
-
-
-MOST_FRAMES = 25
-"""More frames than this tell hardly more about the light."""
 
 
 def find_background(paths, options):

@@ -1,7 +1,12 @@
-"""The paper's figures of a population of flocs: sizes (Fig. 2), errors against N and r (Fig. 3)."""
+"""Figures of fitted flocs: sizes (Fig. 2) and errors (Fig. 3) of a library, outlines on pictures.
+
+A figure of a shape library is a function of its entries that stands in POPULATION_FIGURES, under
+the name that `flocsim plot` gives it; the first line of its docstring is the command's help.
+"""
 
 import numpy as np
 
+from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.plots.style import house_style, new_figure, set_vertex_axis, vertex_positions
 from flocsim.io.shapes.fit_report import CLASS_LIMIT
 
@@ -13,6 +18,14 @@ DODGE = 0.06
 PANEL_SIZE = (2.6, 2.3)
 MARGIN = 0.75
 
+OUTLINE_COLOUR = "#d55e00"
+REJECTED_COLOUR = "#56b4e9"
+REASONS = {"too small": "·"}
+"""Shorter words: the small are many."""
+
+LONGEST_SIDE = 12.0
+"""Longer side of the drawing [inch]."""
+
 
 def distinct_flocs(entries):
     """One entry per floc, where a library holds several spheroradii of each."""
@@ -21,7 +34,7 @@ def distinct_flocs(entries):
 
 
 def figure_2(entries):
-    """Fig. 2: histogram of the equivalent radii [µm] of ShapeEntries, median and mean marked."""
+    """Histogram of the equivalent radii of ShapeEntries [µm], median and mean marked."""
     sizes = np.array([1e6 * e.equivalent_radius * e.pixel_size for e in distinct_flocs(entries)])
     with house_style():
         figure = new_figure(4.2, 2.8)
@@ -47,9 +60,10 @@ def bin_edges(sizes):
 
 
 def figure_3(entries):
-    """Fig. 3: mean and standard deviation of RE [%] against N by size class, a panel for each r.
+    """Relative error of the fits against N by size class, for every spheroradius.
 
-    Dashed: the equivalent spheres (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
+    Mean and standard deviation of RE [%], a panel for each r. Dashed: the equivalent spheres
+    (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
     """
     radii = sorted({entry.spheroradius for entry in entries})
     with house_style():
@@ -87,3 +101,48 @@ def draw_errors(axes, entries):
 
 
 POPULATION_FIGURES = {"2": figure_2, "3": figure_3}
+
+
+def picture_rings(region, fit):
+    """Closed rings [(k, 2), …] of a region's Fit, in picture pixels, x right and y down."""
+    top, left = region.bbox[:2]
+    # The mask has a margin of one pixel, and the fit's y counts upwards.
+    rings = swept_rings(fit.vertices, fit.radius)
+    return [ring * (1.0, -1.0) + (left - 1, top - 1) for ring in rings]
+
+
+def draw_overlay(grey, flocs, title, rejected=()):
+    """A figure of the picture with the outline of every floc, and why others are left out.
+
+    grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line; rejected: Rejections.
+    Returns the figure, for flocsim.io.plots.style.save.
+    """
+    with house_style():
+        axes = _picture_axes(grey.shape)
+        axes.imshow(grey, cmap="gray", interpolation="nearest")
+        axes.set_axis_off()
+        axes.set_title(title)
+        for region, fit in flocs:
+            _draw_floc(axes, region, fit)
+        for region in rejected:
+            axes.annotate(REASONS.get(region.reason, region.reason), region.centroid,
+                          color=REJECTED_COLOUR, fontsize=6, ha="center", va="center")  # fmt: skip
+    return axes.figure
+
+
+def _picture_axes(shape):
+    """Axes that a picture of this shape fills, with a strip for the title."""
+    from matplotlib.figure import Figure
+
+    height, width = (size * LONGEST_SIDE / max(shape) for size in shape)
+    strip = 0.3
+    figure = Figure(figsize=(max(width, 4.0), max(height, 2.0) + strip))
+    return figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
+
+
+def _draw_floc(axes, region, fit):
+    rings = picture_rings(region, fit)
+    for ring in rings:
+        axes.plot(*ring.T, color=OUTLINE_COLOUR, linewidth=0.8)
+    right, top = np.max(rings[0][:, 0]), np.min(rings[0][:, 1])
+    axes.annotate(str(region.label), (right, top), color=OUTLINE_COLOUR, fontsize=7)

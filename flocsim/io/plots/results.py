@@ -1,4 +1,9 @@
-"""The paper's figures of probabilities against the number of vertices, from a `Results`."""
+"""Figures of a results file: the paper's Figs 4, 5, 6 and 8, and an overview.
+
+A figure is a function of a `Results`, which may come without its table of replicates, and stands in
+FIGURES at the end, under the name that `flocsim plot` gives it; the first line of its docstring is
+the command's help.
+"""
 
 import numpy as np
 
@@ -47,17 +52,17 @@ NO_EVENTS = {
 
 
 def figure_4(results):
-    """Fig. 4: probability that a collision happens inside the attraction zone."""
+    """Pr[C inside]: probability that a collision happens inside the attraction zone."""
     return probability_figure(results, "pr_inside")
 
 
 def figure_5(results):
-    """Fig. 5: probability of aggregation after a collision inside the zone."""
+    """Pr[A | inside]: probability of aggregation after a collision inside the zone."""
     return probability_figure(results, "pr_a_given_inside")
 
 
 def figure_6(results):
-    """Fig. 6: probability of aggregation after a collision outside the zone."""
+    """Pr[A | outside]: probability of aggregation after a collision outside the zone."""
     return probability_figure(results, "pr_a_given_outside")
 
 
@@ -74,7 +79,7 @@ def probability_figure(results, name):
 
 
 def figure_8(results):
-    """Fig. 8: probability of the classes A–D, the counts of all delta pooled, against N.
+    """Probability of the classes A, B, C, D, all displacements pooled.
 
     A replicate has the same flocs and orientations at all delta: a cluster, for the intervals.
     """
@@ -89,7 +94,7 @@ def figure_8(results):
 
 
 def overview(results):
-    """All in one: zone, aggregation and classes (rows) of every type (columns)."""
+    """Pr[C inside], Pr[A] and the classes in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", "classes")
     with house_style():
         count = len(results.types)
@@ -228,3 +233,6 @@ def place_legend(axes, handles, title):
         ncols=-(-len(handles) // LEGEND_ROWS),
         alignment="left",
     )
+
+
+FIGURES = {"4": figure_4, "5": figure_5, "6": figure_6, "8": figure_8, "overview": overview}

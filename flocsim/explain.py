@@ -1,0 +1,389 @@
+"""What a scene is made of: compiled in, left out, and why; and how stiff it is.
+
+The lines on forces and machinery are read off the force objects and off the slots that the composer
+really fills, so that they cannot disagree with what is compiled. Time scales are slopes of the
+uncompiled kernels by differences, so that a user's own force counts like the built-in ones.
+"""
+
+import math
+import types
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from flocsim import hooks as slots
+from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.fingerprint import reached
+from flocsim.forces.base import BodyForce, ContactForce, PairForce
+from flocsim.forces.check import (
+    SAMPLE_BODIES,
+    SAMPLE_CONTACTS,
+    fields_read,
+    kernel_arguments,
+    results,
+    sample_pairs,
+)
+from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+
+PLACES = {"x", "y", "angle", "time"}
+SPEEDS = {"vx", "vy", "spin"}
+
+UNFILLED = (
+    (slots.centre_force, "forces along lines of centres", "none is given"),
+    (slots.surface_force, "forces at closest points", "none is given, no closest pair is sought"),
+    (slots.slip_limit, "sliding", "no contact force limits its slip"),
+    (slots.kink, "search for kinks of the contact law", "it has none with these parameters"),
+)
+"""(slot, what is left out where a scene does not fill it, why)."""
+
+UNDERIVED = (
+    (slots.position_force, "derivative by the place", "no body force reads a place or the time"),
+    (slots.velocity_force, "derivative by the velocity", "no body force reads a velocity"),
+)
+"""The same for the derivatives that an implicit method would take."""
+
+STIFF = 100.0
+"""A scale this much shorter than the slowest one is stiff."""
+
+OVERLAP_SHARE = 1e-3
+"""Contact stiffness is taken at this share of r_i + r_j, for laws that are not linear."""
+
+GAPS = 10.0 ** np.linspace(-10.0, -5.0, 101)
+"""Gaps [m] searched for the steepest pair force."""
+
+STABLE = 2.0
+"""Velocity Verlet is stable below 2/ω of a vibration, an explicit step below 2 τ of a decay."""
+
+
+def explain(system):
+    """The report of System.explain() as text: forces, machinery, time scales."""
+    return "\n".join(
+        [
+            heading(system),
+            *force_lines(system),
+            *machinery_lines(system),
+            "in:  recording: every accepted step; run(record=False) keeps start and end only",
+            "out: events and observer: a plain run awaits none; an ensemble puts its own",
+            *scale_lines(system),
+        ]
+    )
+
+
+def heading(system):
+    """One line on bodies, core points and method."""
+    bodies = system.bodies
+    sizes = sorted({len(body.shape.vertices) for body in bodies})
+    kind = "spheres only" if system.spheres_only else "polygons"
+    noun = "body" if len(bodies) == 1 else "bodies"
+    points = " to ".join(map(str, sizes[:: max(len(sizes) - 1, 1)]))
+    fixed = sum(body.fixed for body in bodies)
+    held = f", {fixed} of them fixed" if fixed else ""
+    count = f"{len(bodies)} {noun}, {kind} (core points: {points}){held}"
+    return f"{count}; method {system.integrator}"
+
+
+def force_lines(system):
+    """ "in: …" or "out: …" for every force object, two of one class each by itself."""
+    implicit = differentiates(system)
+    lines = [
+        f"in:  {force}: {'; '.join(about(system, force, implicit))}"
+        for force in system.forces
+        if not force.absent
+    ]
+    lines += [
+        f"out: {type(force).__name__}: {force.absent}" for force in system.forces if force.absent
+    ]
+    return lines or ["out: forces: none is given, bodies fly free"]
+
+
+def about(system, force, implicit):
+    """Where a force acts and, for an implicit method, whence its derivatives come."""
+    if isinstance(force, BodyForce):
+        parts, derivative = ["on every body"], body_derivative(system, force)
+    elif len(system.bodies) == 1:
+        return ["never called, a single body has no partner"]
+    elif isinstance(force, ContactForce):
+        parts = ["at every overlapping pair", sliding(system, force)]
+        derivative = "derivatives from differences of its kernel"
+    else:
+        centres = force.acts_on == "centres"
+        place = "along the line of centres" if centres else "at the closest points"
+        parts = [f"{place}, {reach_words(system, force)}"]
+        derivative = pair_derivative(system, force)
+    return [*parts, derivative] if implicit else parts
+
+
+def body_derivative(system, force):
+    """By what a body force has to be differentiated."""
+    reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
+    by = [name for name, fields in (("velocity", SPEEDS), ("place", PLACES)) if reads & fields]
+    if not by:
+        return "constant, nothing to differentiate"
+    return f"derivative by {' and '.join(by)} from differences of its kernel"
+
+
+def pair_derivative(system, force):
+    """Whence the derivatives of a pair force come."""
+    samples = sample_pairs(force.reach)
+    damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
+    slope = "from differences of its kernel" if force.slope is None else "analytic"
+    rate = ", by the gap's rate from differences" if damped else ""
+    return f"derivative by the gap {slope}{rate}"
+
+
+def reach_words(system, force):
+    """How far a pair force reaches, and whether it does so at the start."""
+    if not force.reach < math.inf:
+        return "at every gap"
+    words = f"not called at gaps from {force.reach:.3g} m on"
+    nearest = least_gap(system.bodies, force)
+    if nearest >= force.reach:
+        words += f" (out of range at the start, where gaps are at least {nearest:.3g} m)"
+    return words
+
+
+def least_gap(bodies, force):
+    """The least gap [m] at the start: of equivalent spheres, or of bounding circles."""
+    size = "equivalent_radius" if force.acts_on == "centres" else "bounding_radius"
+    return min((gap_between(a, b, size) for a, b in combinations(bodies, 2)), default=math.inf)
+
+
+def gap_between(a, b, size):
+    """Distance of two bodies' circles of the given size [m]."""
+    distance = math.dist(a.position, b.position)
+    return distance - getattr(a.shape, size) - getattr(b.shape, size)
+
+
+def sliding(system, force):
+    """Whether the tangential displacement of a contact force has a limit."""
+    if force.slip_limit is None:
+        return "no sliding"
+    limits = tried(system, force, force.slip_limit, SAMPLE_CONTACTS)
+    return "slides at its limit" if min(limits) < math.inf else "no sliding, its limit is infinite"
+
+
+def machinery_lines(system):
+    """ "in: …" or "out: …" for every piece of machinery around the forces."""
+    filled = system.fillings()
+    touching = slots.has_contact in filled or slots.surface_force in filled
+    lines = [search_line(system, touching)]
+    if system.spheres_only:
+        lines.append("out: vertex-edge pairs, rotation of vertices: no body has an edge")
+    lines += [spin_line(system), history_line(system)]
+    lines += [f"out: {what}: {why}" for slot, what, why in UNFILLED if slot not in filled]
+    if not differentiates(system):
+        lines.append("out: Jacobian of the forces: the method is explicit")
+    else:
+        lines += [f"out: {what}: {why}" for slot, what, why in UNDERIVED if slot not in filled]
+    if isinstance(system.integrator, Overdamped):
+        lines.append("out: inertia: the method balances forces and drag at every instant")
+    return lines
+
+
+def search_line(system, touching):
+    """Whether contacts are looked for, and how long they are not."""
+    if not touching:
+        return "out: contact search: no force acts at contacts or closest points"
+    far = [gap_between(a, b, "bounding_radius") for a, b in combinations(system.bodies, 2)]
+    if not far:
+        return "out: contact search: a single body has no partner"
+    words = "in:  contact search, left out for every two bodies whose bounding circles are apart"
+    return f"{words} (at the start {sum(gap > 0.0 for gap in far)} of {len(far)} pairs)"
+
+
+def spin_line(system):
+    """Whether anything can turn the bodies."""
+    turning = [type(force).__name__ for force in system.forces if exerts_torque(system, force)]
+    if turning:
+        return f"in:  rotation of bodies: torques come from {', '.join(dict.fromkeys(turning))}"
+    if system.spheres_only:
+        return "idle: rotation of spheres: no force exerts a torque, spins stay as they are"
+    return "in:  rotation of bodies: no force exerts a torque, but outlines turn with their spin"
+
+
+def history_line(system):
+    """Whether tangential displacements are carried, and matter."""
+    forces = [force for force in system.forces if isinstance(force, ContactForce)]
+    if not forces:
+        return "out: tangential history: no contact force"
+    if any(holds_slip(system, force) for force in forces):
+        return "in:  tangential history: displacements are kept while a contact lasts"
+    return "idle: tangential history: no tangential stiffness, displacements carry no force"
+
+
+def exerts_torque(system, force):
+    """Whether a force may turn a body: by its own torque, or by a lever."""
+    if force.absent:
+        return False
+    if isinstance(force, BodyForce):
+        kernel = force.kernel_in(system.fluid)
+        return any(result[2] != 0.0 for result in tried(system, force, kernel, SAMPLE_BODIES))
+    if len(system.bodies) == 1:
+        return False
+    if isinstance(force, PairForce):
+        return force.acts_on == "surfaces" and not system.spheres_only
+    sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)
+    return not system.spheres_only or any(result[1] != 0.0 for result in sideways)
+
+
+def holds_slip(system, force):
+    """Whether a contact force's tangential part depends on the tangential displacement."""
+    views = [SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
+    one, other = tried(system, force, force.kernel, views)
+    return one[1] != other[1]
+
+
+def tried(system, force, kernel, views):
+    """What a kernel, uncompiled, returns for some views."""
+    arguments = kernel_arguments(force, system.fluid, kernel)
+    return list(results(force, kernel, views, arguments))
+
+
+def differentiates(system):
+    """Whether the method needs the Jacobian of the forces: whether its driver reaches it."""
+    fillings, found, pending = system.fillings(), set(), [advance]
+    while pending:
+        function = pending.pop()
+        function = fillings.get(function, function)
+        if function not in found:
+            found.add(function)
+            values = reached(function).values()
+            pending += [value for value in values if isinstance(value, types.FunctionType)]
+    return assemble_jacobian in found
+
+
+class Scale(NamedTuple):
+    """A time scale [s] of the scene."""
+
+    name: str
+    time: float
+    limits_steps: bool
+
+
+def scale_lines(system):
+    """The lines of the report: scales, how many are stiff, what an explicit method would need."""
+    scales = [scale for scale in all_scales(system) if 0.0 < scale.time < math.inf]
+    if not scales:
+        return ["time scales: none, nothing pulls back or slows down"]
+    slowest = max(scale.time for scale in scales)
+    stiff = sum(slowest > STIFF * scale.time for scale in scales)
+    words = ", ".join(f"{scale.name} {scale.time:.2g} s" for scale in scales)
+    head = f"time scales: {words}; {stiff} of {len(scales)} stiff (over 100 x below the slowest)"
+    limits = [scale.time for scale in scales if scale.limits_steps]
+    if not limits:
+        return [head]
+    step = STABLE * min(limits)
+    return [
+        head,
+        f"an explicit method: unstable from steps of about {step:.2g} s on, "
+        f"{slowest / step:.2g} steps for the slowest scale",
+    ]
+
+
+def all_scales(system):
+    """Contact, pair forces, drag and settling, the shortest over the bodies or pairs."""
+    return [*contact_scales(system), *pair_scales(system), *body_scales(system)]
+
+
+def pairs_of(system):
+    """(bodies a, b, M of the pair) for every two bodies of which one is free."""
+    for a, b in combinations(system.bodies, 2):
+        inverse = sum(1.0 / body.mass for body in (a, b) if not body.fixed)
+        if inverse > 0.0:
+            yield a, b, 1.0 / inverse
+
+
+def slope_of(force, view, field, size, parameters, part=None):
+    """Central difference of a scene's force by one field of its view."""
+    value = getattr(view, field)
+    ends = [force(view._replace(**{field: value + by}), parameters) for by in (size, -size)]
+    if part is not None:
+        ends = [end[part] for end in ends]
+    return (ends[0] - ends[1]) / (2.0 * size)
+
+
+def contact_scales(system):
+    """1/ω0 = √(M/k) of a contact and 1/λ of its damping, the shortest over the pairs."""
+    force = system.pieces.fillings.get(slots.contact_force)
+    found = [contact_pair(force, system, *pair) for pair in pairs_of(system)] if force else []
+    if not found:
+        return []
+    vibration, decay = (min(times) for times in zip(*found, strict=True))
+    return [
+        Scale("contact 1/omega0", vibration, True),
+        Scale("contact damping 1/lambda", decay, True),
+    ]
+
+
+def contact_pair(force, system, a, b, mass):
+    """(1/ω0, 1/λ) [s] of one pair's normal contact; inf where there is none."""
+    radii = a.shape.radius, b.shape.radius
+    overlap = OVERLAP_SHARE * sum(radii)
+    view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
+    known = system.pieces.parameters
+    stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
+    damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
+    return vibration_time(mass, stiffness), decay_time(mass, damping)
+
+
+def vibration_time(mass, stiffness):
+    """√(M/|k|) [s]; inf without stiffness."""
+    return math.sqrt(mass / abs(stiffness)) if stiffness != 0.0 else math.inf
+
+
+def decay_time(mass, damping):
+    """M/c [s]; inf without damping."""
+    return mass / damping if damping > 0.0 else math.inf
+
+
+def pair_scales(system):
+    """√(M/|dF/dd|) where centre or surface forces are steepest, the shortest over the pairs."""
+    pieces = system.pieces.fillings
+    found = []
+    for name in ("centre", "surface"):
+        force = pieces.get(getattr(slots, f"{name}_force"))
+        times = [steepest(force, system, *pair) for pair in pairs_of(system)] if force else []
+        found += [Scale(f"{name} forces at their steepest", min(times), True)] if times else []
+    return found
+
+
+def steepest(force, system, a, b, mass):
+    """√(M/|dF/dd|) [s] of one pair at the gap where the force changes most."""
+    r_a, r_b = a.shape.equivalent_radius, b.shape.equivalent_radius
+    view = PairView(0.0, 0.0, 0.0, r_a + r_b, r_a, r_b, r_a * r_b / (r_a + r_b), mass)
+    known = system.pieces.parameters
+    slopes = [
+        abs(slope_of(force, view._replace(gap=gap), "gap", 1e-3 * gap, known)) for gap in GAPS
+    ]
+    return vibration_time(mass, max(slopes))
+
+
+def body_scales(system):
+    """Stokes relaxation m/(6πγ r) and the time of settling by a radius, of the free bodies."""
+    force = system.pieces.fillings.get(slots.body_force)
+    free = [body for body in system.bodies if not body.fixed]
+    if force is None or not free:
+        return []
+    times = [body_times(force, system, body) for body in free]
+    relaxation, settling = zip(*times, strict=True)
+    return [
+        Scale("Stokes relaxation", min(relaxation), True),
+        Scale("settling by a radius", max(settling), False),
+    ]
+
+
+def body_times(force, system, body):
+    """(relaxation, settling by a radius) [s] of one body that starts from rest; inf without."""
+    radius = body.shape.equivalent_radius
+    weight = body.buoyant_mass(system.fluid)
+    view = BodyView(
+        0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
+    )
+    known = system.pieces.parameters
+    resistance = -slope_of(force, view, "vy", 1e-9, known, 1)
+    load = math.hypot(*force(view, known)[:2])
+    settling = radius * resistance / load if load > 0.0 and resistance > 0.0 else math.inf
+    return decay_time(body.mass, resistance), settling
