@@ -2,9 +2,9 @@
 
 ``compose`` takes a driver written in plain Python and the functions that stand in for its hooks
 (flocsim.hooks), clones every function that the driver reaches with those replaced, and compiles the
-whole as one: an engine, the same for all scenes of a family (method, spheres or polygons, observer).
-``compile_law`` does the same for what a scene's forces add up to (flocsim.laws), and gives the address
-at which the engine calls it, so that other forces never compile an engine.
+whole as one: an engine, the same for all scenes of a family (method, spheres or polygons,
+observer). ``compile_law`` does the same for what a scene's forces add up to (flocsim.laws), and
+gives the address at which the engine calls it, so that other forces never compile an engine.
 
 What goes to disk is named by a hash of all that was reached: bytecode, constants, Python, numba and
 numpy versions. An edited kernel therefore has another name; new parameter values, which are
@@ -115,7 +115,7 @@ def write_once(path, text):
 
 
 def linked_module(entry, fillings, name, options):
-    """(module ``name`` whose function ``run`` calls the entry linked, whether the disk keeps it)."""
+    """(module ``name`` whose function ``run`` calls the linked entry, whether the disk keeps it)."""
     import numba
 
     from flocsim.numba_internals import inner_compiler, typed_once

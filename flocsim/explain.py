@@ -1,7 +1,7 @@
-"""What a scene is made of: compiled in, left out, and why; and how stiff it is.
+"""What a scene is made of: what runs, what is left out, and why; and how stiff it is.
 
-The lines on forces and machinery are read off the force objects and off the slots that the composer
-really fills, so that they cannot disagree with what is compiled. Time scales are slopes of the
+The lines on forces and machinery are read off the force objects and off the laws that the engine is
+really given, so that they cannot disagree with what runs. Time scales are slopes of the
 uncompiled kernels by differences, so that a user's own force counts like the built-in ones.
 """
 
@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim import hooks as slots
 from flocsim.arrays import BodyView, ContactView, PairView
 from flocsim.fingerprint import reached
 from flocsim.forces.base import BodyForce, ContactForce, PairForce
@@ -31,17 +30,17 @@ from flocsim.integrators.rhs.jacobian import assemble_jacobian
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}
 
-UNFILLED = (
-    (slots.centre_force, "forces along lines of centres", "none is given"),
-    (slots.surface_force, "forces at closest points", "none is given, no closest pair is sought"),
-    (slots.slip_limit, "sliding", "no contact force limits its slip"),
-    (slots.kink, "search for kinks of the contact law", "it has none with these parameters"),
+LAWLESS = (
+    ("centre_force", "forces along lines of centres", "none is given"),
+    ("surface_force", "forces at closest points", "none is given, no closest pair is sought"),
+    ("slip_limit", "sliding", "no contact force limits its slip"),
+    ("contact_event", "search for kinks of the contact law", "it has none with these parameters"),
 )
-"""(slot, what is left out where a scene does not fill it, why)."""
+"""(law, what is left out where a scene has none, why)."""
 
 UNDERIVED = (
-    (slots.position_force, "derivative by the place", "no body force reads a place or the time"),
-    (slots.velocity_force, "derivative by the velocity", "no body force reads a velocity"),
+    ("position_force", "derivative by the place", "no body force reads a place or the time"),
+    ("velocity_force", "derivative by the velocity", "no body force reads a velocity"),
 )
 """The same for the derivatives that an implicit method would take."""
 
@@ -167,17 +166,17 @@ def sliding(system, force):
 
 def machinery_lines(system):
     """ "in: …" or "out: …" for every piece of machinery around the forces."""
-    filled = system.fillings()
-    touching = slots.has_contact in filled or slots.surface_force in filled
+    laws = system.pieces.laws
+    touching = "contact_force" in laws or "surface_force" in laws
     lines = [search_line(system, touching)]
     if system.spheres_only:
         lines.append("out: vertex-edge pairs, rotation of vertices: no body has an edge")
     lines += [spin_line(system), history_line(system)]
-    lines += [f"out: {what}: {why}" for slot, what, why in UNFILLED if slot not in filled]
+    lines += [f"out: {what}: {why}" for law, what, why in LAWLESS if law not in laws]
     if not differentiates(system):
         lines.append("out: Jacobian of the forces: the method is explicit")
     else:
-        lines += [f"out: {what}: {why}" for slot, what, why in UNDERIVED if slot not in filled]
+        lines += [f"out: {what}: {why}" for law, what, why in UNDERIVED if law not in laws]
     if isinstance(system.integrator, Overdamped):
         lines.append("out: inertia: the method balances forces and drag at every instant")
     return lines
@@ -307,7 +306,7 @@ def slope_of(force, view, field, size, parameters, part=None):
 
 def contact_scales(system):
     """1/ω0 = √(M/k) of a contact and 1/λ of its damping, the shortest over the pairs."""
-    force = system.pieces.fillings.get(slots.contact_force)
+    force = system.pieces.laws.get("contact_force")
     found = [contact_pair(force, system, *pair) for pair in pairs_of(system)] if force else []
     if not found:
         return []
@@ -341,10 +340,9 @@ def decay_time(mass, damping):
 
 def pair_scales(system):
     """√(M/|dF/dd|) where centre or surface forces are steepest, the shortest over the pairs."""
-    pieces = system.pieces.fillings
     found = []
     for name in ("centre", "surface"):
-        force = pieces.get(getattr(slots, f"{name}_force"))
+        force = system.pieces.laws.get(f"{name}_force")
         times = [steepest(force, system, *pair) for pair in pairs_of(system)] if force else []
         found += [Scale(f"{name} forces at their steepest", min(times), True)] if times else []
     return found
@@ -363,7 +361,7 @@ def steepest(force, system, a, b, mass):
 
 def body_scales(system):
     """Stokes relaxation m/(6πγ r) and the time of settling by a radius, of the free bodies."""
-    force = system.pieces.fillings.get(slots.body_force)
+    force = system.pieces.laws.get("body_force")
     free = [body for body in system.bodies if not body.fixed]
     if force is None or not free:
         return []

@@ -28,8 +28,8 @@ class Run:
     """The arrays of a run, what was recorded of it, and how it goes on.
 
     Parameters: ``driver``, of System.compose; ``scene`` and ``work``, its arrays (System.scene,
-    arrays.work_of); ``integrator``; ``until`` [s]; ``max_steps``, steps taken, rejected and located;
-    ``memo``, the observer's array; ``record``, whether to keep every accepted step.
+    arrays.work_of); ``integrator``; ``until`` [s]; ``max_steps``, of all steps tried; ``memo``, the
+    observer's array; ``record``, whether to keep every accepted step.
     """
 
     def __init__(

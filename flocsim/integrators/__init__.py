@@ -1,8 +1,8 @@
 """Integrators: each gives its step; loop, error control, events and recording exist once.
 
-``base``: the contract.  ``parts``: the pieces that a method of one's own may call.  ``rhs``, ``events``,
-``loop``, ``radau``: forces and derivatives, what ends a step early, the driver, the implicit stages.
-May import geometry, body and what is below.
+``base``: the contract.  ``parts``: the pieces that a method of one's own may call.  ``rhs``: forces
+and their derivatives.  ``events``: what ends a step early.  ``loop``: the driver.  ``radau``: the
+stages of the implicit methods.  May import geometry, body and what is below.
 """
 
 from flocsim.integrators.base import Integrator, Status

@@ -58,20 +58,20 @@ REASONS = {
 
 @attrs.frozen
 class Integrator(ABC):
-    """A way to take one step; loop, lists, error control, events and recording exist once, around it.
+    """A way to take one step; lists, error control, events and recording exist once, around it.
 
     A subclass gives ``attempt``, a plain function on arrays that numba can compile:
 
     ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.motion[NOW]``
-    (n, 6: x, y, angle, vx, vy, spin), the time ``clock[TIME]`` and the step [s] to be tried. It must
-    write the motion a step later to ``work.motion[NEW]``, and the tangential displacements there to
-    ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns the step's error over
-    what is allowed: above 1 the step is tried again, shorter; below 0 it has failed and is tried
-    again much shorter. A method of controlled error writes that error to ``clock[STEP_ERROR]`` [m]
-    and, for each body, how long a velocity is remembered to ``work.bodies[:, MEMORY]`` [s], which
-    says how finely switches must be located: ``parts.error_ratio`` and ``parts.weigh_velocities``
-    do both. A method of fixed steps returns 0 or, where the motion is no longer finite, −1, and
-    subclasses ``parts.FixedStep``.
+    (n, 6: x, y, angle, vx, vy, spin), the time ``clock[TIME]`` and the step [s] to be tried. It
+    must write the motion a step later to ``work.motion[NEW]``, and the tangential displacements
+    there to ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns the step's
+    error over what is allowed: above 1 the step is tried again, shorter; below 0 it has failed and
+    is tried again much shorter. A method of controlled error writes that error to
+    ``clock[STEP_ERROR]`` [m] and, for each body, how long a velocity is remembered to
+    ``work.bodies[:, MEMORY]`` [s], which says how finely switches must be located:
+    ``parts.error_ratio`` and ``parts.weigh_velocities`` do both. A method of fixed steps returns 0
+    or, where the motion is no longer finite, −1, and subclasses ``parts.FixedStep``.
 
     ``next_step(clock, step, ratio)`` is the size of the step after one with that ratio.
     ``replaces`` {hook: function} are other functions of the engine that it stands in for.

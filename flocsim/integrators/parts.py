@@ -1,7 +1,7 @@
 """What methods are made of, one's own included: the pieces that ``attempt`` may call.
 
-examples/own_integrator.py is a whole method in a few lines; flocsim.integrators.base.Integrator says
-what ``attempt`` is given and has to fill.
+examples/own_integrator.py is a whole method in a few lines; flocsim.integrators.base.Integrator
+says what ``attempt`` is given and has to fill.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from flocsim import hooks as slots
-from flocsim.ensembles.collision.settling import lone_view
-from flocsim.forces.codegen import scene_functions
+from flocsim.ensembles.collision.settling import lone_view, no_force
+from flocsim.forces.codegen import laws_of
 from flocsim.integrators.rhs.views import pair_view
 
 OUTLINES = "contact"
@@ -30,8 +29,8 @@ def centre_forces(encounter, times, geometry):
     system, (_, distance, gap, rate) = encounter.system, geometry
     found = {}
     for force in system.forces:
-        pieces = scene_functions([force], system.fluid)
-        kernel = pieces.fillings.get(slots.centre_force)
+        pieces = laws_of([force], system.fluid)
+        kernel = pieces.laws.get("centre_force")
         if kernel is not None:
             views = (
                 pair_view(encounter.scene, *now[:1], 1, 0, *now[1:])
@@ -45,7 +44,7 @@ def centre_forces(encounter, times, geometry):
 def settling_force(encounter, velocity, direction):
     """(k,) weight and drag of body j along the line of centres [N]."""
     system = encounter.system
-    kernel = system.pieces.fillings.get(slots.body_force, slots.body_force)
+    kernel = system.pieces.laws.get("body_force", no_force)
     body, parameters = system.bodies[1], system.pieces.parameters
     forces = [
         kernel(lone_view(body, system.fluid, *now[:2]), parameters)[:2] for now in velocity[:, 1]

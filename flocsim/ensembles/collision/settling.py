@@ -4,12 +4,16 @@ import math
 
 import numpy as np
 
-from flocsim import hooks as slots
 from flocsim.arrays import BodyView
 from flocsim.errors import UsageError
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
+
+
+def no_force(view, parameters):
+    """Where a system has no body forces."""
+    return 0.0, 0.0, 0.0
 
 
 def lone_view(body, fluid, vx, vy):
@@ -45,7 +49,7 @@ def terminal_motion(system, body):
     """
     if body.fixed:
         return np.zeros(2), 0.0
-    force = system.pieces.fillings.get(slots.body_force, slots.body_force)
+    force = system.pieces.laws.get("body_force", no_force)
     known = (force, body, system.fluid, system.pieces.parameters)
     velocity = np.zeros(2)
     for _ in range(ITERATIONS):

@@ -97,7 +97,12 @@ def kernel_facts(config):
     for shapes in kinds(config, pair.shapes):
         system = placed_system(config, pair.system, shapes)
         name = "spheres" if system.spheres_only else "polygons"
-        facts[f"kernels.{name}"] = fingerprint(advance, system.fillings(OBSERVER))
+        laws = sorted(system.pieces.laws.items())
+        codes = [fingerprint(advance, system.fillings(OBSERVER))]
+        codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
+        facts[f"kernels.{name}"] = hashlib.blake2b(
+            "\n".join(codes).encode(), digest_size=12
+        ).hexdigest()
     return facts
 
 

@@ -5,7 +5,6 @@ Both trees of circles are walked against each other (see hierarchy.py), in the f
 
 import math
 
-from flocsim.hooks import hook
 from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
@@ -35,6 +34,7 @@ from flocsim.geometry.contact.circle_tree import (
     within,
 )
 from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
+from flocsim.hooks import hook
 
 
 def pose_of(work, a, b):

@@ -11,7 +11,6 @@ the vertex is shifted along t: 0 where the foot lies inside the edge, which alon
 
 import math
 
-from flocsim.hooks import hook
 from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
@@ -38,6 +37,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.geometry.contact.segments import closest_share
+from flocsim.hooks import hook
 
 TINY = 1e-300
 """Keeps the reciprocal of a distance finite."""

@@ -2,7 +2,6 @@
 
 import math
 
-from flocsim.hooks import hook
 from flocsim.arrays import (
     ANGLE,
     BOUNDING_RADIUS,
@@ -34,6 +33,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.hooks import hook
 
 
 def body_view(scene, work, time, state, body):
