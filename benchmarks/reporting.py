@@ -39,13 +39,12 @@ def installed(packages):
             yield f"{name} not installed"
 
 
-def print_heading(packages=()):
+def print_heading(packages=(), used="one used"):
     """Print commit, command, machine and versions; ``packages`` are named beside the usual."""
-    script = Path(sys.argv[0]).resolve()
-    shown = script.relative_to(Path(__file__).resolve().parents[1])
-    print(f"commit {commit()}: python {shown} {shlex.join(sys.argv[1:])}".rstrip())
+    name = sys.modules["__main__"].__spec__.name
+    print(f"commit {commit()}: python -m {name} {shlex.join(sys.argv[1:])}".rstrip())
     versions = ", ".join(installed([*PACKAGES, *packages]))
-    print(f"{processor()}, {os.cpu_count()} cores, one used; Python {platform.python_version()}")
+    print(f"{processor()}, {os.cpu_count()} cores, {used}; Python {platform.python_version()}")
     print(f"{versions}\n", flush=True)
 
 
