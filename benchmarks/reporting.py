@@ -11,12 +11,13 @@ from pathlib import Path
 
 import attrs
 
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
 
 def commit():
     """The commit that is measured, "-dirty" where files differ from it."""
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
     return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
 
 
@@ -48,11 +49,17 @@ def print_heading(packages=(), used="one used"):
     print(f"{versions}\n", flush=True)
 
 
-def parse_arguments(description, **more):
-    """Arguments of a benchmark: ``--quick``, ``--markdown`` and its own (name → add_argument)."""
+def parser_of(description):
+    """The arguments that every benchmark takes: ``--quick`` and ``--markdown``."""
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="less of it, within a minute or so")
     parser.add_argument("--markdown", action="store_true", help="print the tables for docs/")
+    return parser
+
+
+def parse_arguments(description, **more):
+    """Arguments of a benchmark: those that all take and its own (name → add_argument)."""
+    parser = parser_of(description)
     for name, options in more.items():
         parser.add_argument(f"--{name.replace('_', '-')}", **options)
     return parser.parse_args()
