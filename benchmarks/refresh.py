@@ -10,9 +10,9 @@ import re
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from benchmarks.reporting import ROOT
+
 PAGES = [ROOT / "docs" / f"{name}.md" for name in ("benchmarks", "images", "cluster")]
 BLOCK = re.compile(r"(<!-- (\w+): (python [^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 

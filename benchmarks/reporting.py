@@ -14,12 +14,13 @@ import attrs
 from flocsim.io.markdown import markdown_table
 from flocsim.io.provenance import processor
 
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")
 
 
 def commit():
     """The commit that is measured, "-dirty" where files differ from it."""
-    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    command = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
     return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
 
 
@@ -32,21 +33,26 @@ def installed(packages):
             yield f"{name} not installed"
 
 
-def print_heading(packages=()):
+def print_heading(packages=(), used="one used"):
     """Print commit, command, machine and versions; ``packages`` are named beside the usual."""
-    script = Path(sys.argv[0]).resolve()
-    shown = script.relative_to(Path(__file__).resolve().parents[1])
-    print(f"commit {commit()}: python {shown} {shlex.join(sys.argv[1:])}".rstrip())
+    name = sys.modules["__main__"].__spec__.name
+    print(f"commit {commit()}: python -m {name} {shlex.join(sys.argv[1:])}".rstrip())
     versions = ", ".join(installed([*PACKAGES, *packages]))
-    print(f"{processor()}, {os.cpu_count()} cores, one used; Python {platform.python_version()}")
+    print(f"{processor()}, {os.cpu_count()} cores, {used}; Python {platform.python_version()}")
     print(f"{versions}\n", flush=True)
 
 
-def parse_arguments(description, **more):
-    """Arguments of a benchmark: ``--quick``, ``--markdown`` and its own (name → add_argument)."""
+def parser_of(description):
+    """The arguments that every benchmark takes: ``--quick`` and ``--markdown``."""
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="less of it, within a minute or so")
     parser.add_argument("--markdown", action="store_true", help="print the tables for docs/")
+    return parser
+
+
+def parse_arguments(description, **more):
+    """Arguments of a benchmark: those that all take and its own (name → add_argument)."""
+    parser = parser_of(description)
     for name, options in more.items():
         parser.add_argument(f"--{name.replace('_', '-')}", **options)
     return parser.parse_args()

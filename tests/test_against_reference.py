@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from tests.helpers.fast_cases import FORCES, GAPS, SURFACE_DENSITY, random_case, silenced
-from tests.helpers.fast_scene import FastScene, shape_of
+from tests.helpers.fast_scene import (
+    FORCES,
+    GAPS,
+    SURFACE_DENSITY,
+    FastScene,
+    random_case,
+    shape_of,
+    silenced,
+)
 from tests.reference.contacts import contacts
 from tests.reference.forces import loads
 from tests.reference.samples import scene_of

@@ -1,6 +1,6 @@
 """How many outcomes change with the integrator's tolerance: the numerical error of a study.
 
-    python -m benchmarks.accuracy.tolerance CONFIG [--tolerances 1e-9 1e-10 1e-11] [--replicates 100]
+    python -m benchmarks.accuracy.tolerance CONFIG [--tolerances 1e-9 1e-10] [--replicates 100]
 
 runs the config's study at every tolerance, in one process, and compares each with the tightest.
 """

@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from benchmarks.faults.job import make_study, run_here
+from benchmarks.faults.job import Tally, make_study, run_here
 from flocsim.ensembles.chunks import ROW
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.storage.identity import identity_of
@@ -48,8 +48,6 @@ def a_journal(root):
 
 def damage_journal(root, reference, count, rng):
     """{kind: Tally} of faults in a journal."""
-    from benchmarks.faults.run import Tally
-
     folder, data = a_journal(root)
     (folder / "study.h5").unlink()
     study = Study(load_config(folder / "study.toml"))
@@ -122,8 +120,6 @@ def finished_wrong(folder, changed, reference):
 
 def damage_results(root, reference, count, rng):
     """{kind: Tally} of faults in a results file: each is found before HDF5 parses the file."""
-    from benchmarks.faults.run import Tally
-
     data = Path(reference).read_bytes()
     path = root / "damaged.h5"
     tallies = {"results flipped": Tally(), "results truncated": Tally()}

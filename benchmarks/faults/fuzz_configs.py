@@ -11,7 +11,6 @@ need code that would have to be compiled beyond the first few kinds.
 import re
 import sys
 import tempfile
-import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -19,21 +18,14 @@ import attrs
 from hypothesis import HealthCheck, given, seed, settings
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "ensembles")]
-
-from hypothesis import strategies as st  # noqa: E402
-from test_config_mutations import MUTATION, mutate, toml  # noqa: E402
-
-from flocsim.ensembles.config.loader import TABLES, TOP_KEYS, load_config  # noqa: E402
-from flocsim.ensembles.estimates.stop_rule import borders  # noqa: E402
-from flocsim.ensembles.parallel.worker import run_safely  # noqa: E402
-from flocsim.ensembles.preflight import check_study  # noqa: E402
-from flocsim.ensembles.storage.identity import identity_of, short  # noqa: E402
-from flocsim.ensembles.study import Study  # noqa: E402
-from flocsim.errors import FlocsimError  # noqa: E402
-from tests.helpers.config_files import VALID  # noqa: E402
+from flocsim.ensembles.config.loader import TABLES, TOP_KEYS, load_config
+from flocsim.ensembles.estimates.stop_rule import borders
+from flocsim.ensembles.parallel.worker import run_safely
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.storage.identity import identity_of, short
+from flocsim.ensembles.study import Study
+from flocsim.errors import FlocsimError
+from tests.helpers.config_mutations import GARBLED, MUTATED
 
 MOST_KINDS = 4
 """Kinds of compiled code; each takes some 20 s to compile when it is new."""
@@ -89,22 +81,6 @@ class Fuzz:
         return "run" if row["outcome"] < 6 else "run, failed with a reason"
 
 
-def texts():
-    """Fuzzed texts of config files."""
-    mutations = st.lists(MUTATION, min_size=1, max_size=4).map(mutated)
-    pieces = st.tuples(st.integers(0, len(VALID)), st.integers(0, 30), st.text(max_size=5))
-    garbled = pieces.map(lambda p: VALID[: p[0]] + p[2] + VALID[p[0] + p[1] :])
-    return mutations | garbled
-
-
-def mutated(mutations):
-    """The valid file with some mutations, as text."""
-    table = tomllib.loads(VALID)
-    for mutation in mutations:
-        mutate(table, *mutation)
-    return "\n".join(f"{toml(key)} = {toml(value)}" for key, value in table.items())
-
-
 def main():
     """Print the table; exit code 1 where a config gave a traceback or an empty message."""
     arguments = parse_arguments(__doc__)
@@ -116,7 +92,7 @@ def main():
         @seed(1)
         @settings(max_examples=count, deadline=None, database=None,
                   suppress_health_check=list(HealthCheck))  # fmt: skip
-        @given(texts())
+        @given(MUTATED | GARBLED)
         def throw(text):
             fuzz.take(text)
 

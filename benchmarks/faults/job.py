@@ -156,6 +156,27 @@ class Job:
         return None, PATIENCE
 
 
+@attrs.define
+class Tally:
+    """How faults of one kind have ended."""
+
+    faults: int = 0
+    right: int = 0
+    hangs: int = 0
+    slowest: float = 0.0
+    wrong: list = attrs.Factory(list)
+
+    def add(self, problem, seconds, hang=False):
+        """Count a fault; ``problem`` is "" where nothing was lost."""
+        self.faults += 1
+        self.right += not problem
+        self.hangs += hang
+        self.slowest = max(self.slowest, seconds)
+        if problem:
+            self.wrong.append(problem)
+            print(problem, file=sys.stderr, flush=True)
+
+
 def make_study(folder):
     """A folder with the study's config."""
     folder.mkdir(parents=True)

@@ -19,11 +19,10 @@ import tempfile
 import time
 from pathlib import Path
 
-import attrs
 import numpy as np
 
 from benchmarks.faults.damage import damage_journal, damage_results
-from benchmarks.faults.job import KINDS, Job, make_study, run_here, verdict, whole_rows
+from benchmarks.faults.job import KINDS, Job, Tally, make_study, run_here, verdict, whole_rows
 from benchmarks.reporting import Table, parse_arguments, print_heading
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
@@ -32,27 +31,6 @@ LONGEST_SIGNAL = 2.0
 
 COUNTS = {"kills": 1000, "signals": 200, "disk": 100, "flips": 10_000}
 QUICK = {"kills": 12, "signals": 6, "disk": 6, "flips": 300}
-
-
-@attrs.define
-class Tally:
-    """How faults of one kind have ended."""
-
-    faults: int = 0
-    right: int = 0
-    hangs: int = 0
-    slowest: float = 0.0
-    wrong: list = attrs.Factory(list)
-
-    def add(self, problem, seconds, hang=False):
-        """Count a fault; ``problem`` is "" where nothing was lost."""
-        self.faults += 1
-        self.right += not problem
-        self.hangs += hang
-        self.slowest = max(self.slowest, seconds)
-        if problem:
-            self.wrong.append(problem)
-            print(problem, file=sys.stderr, flush=True)
 
 
 def begin_job(folder, rng, **more):

@@ -1,6 +1,6 @@
 """CPU time of other methods over that of Implicit, at equal error of the outcomes.
 
-    python -m benchmarks.speed.speedup [--quick] [--markdown] [--presets tang2014 si] [--types I III]
+    python -m benchmarks.speed.speedup [--quick] [--markdown] [--presets si] [--types I III]
 
 The same replicates (N = 64, displacements 0 to 3/4 in turn), the same compiled forces, the same
 observer that stops them, one core. Error: the share of outcomes that differ from those of Implicit

@@ -1,6 +1,6 @@
 """Replicates per second and core, the share of outcomes that flip, and µs per force evaluation.
 
-    python -m benchmarks.speed.throughput [--quick] [--markdown] [--replicates 40] [--tolerance 1e-9]
+    python -m benchmarks.speed.throughput [--quick] [--markdown] [--replicates 40]
 
 Everything in one process on one core. Flips: replicates whose outcome (A, B, C, D, missed,
 undecided, failed) differs from that at a tolerance 100 times tighter.

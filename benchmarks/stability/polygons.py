@@ -5,12 +5,19 @@ import math
 import attrs
 import numpy as np
 
-from benchmarks.stability.case import Answer, Case
-from benchmarks.stability.explicit import explicit_answer
-from benchmarks.stability.places import interlocked_place, place_at_gap, placed
-from benchmarks.stability.plain import plain_answer
-from benchmarks.stability.ranges import FASTEST, WATER_DENSITY
-from benchmarks.stability.shapes import hook, made, random_shape, segment, sliver, star
+from benchmarks.stability.case import FASTEST, WATER_DENSITY, Answer, Case
+from benchmarks.stability.references import explicit_answer, plain_answer
+from benchmarks.stability.shapes import (
+    hook,
+    interlocked_place,
+    made,
+    place_at_gap,
+    placed,
+    random_shape,
+    segment,
+    sliver,
+    star,
+)
 from benchmarks.stability.spheres import contact_of
 from flocsim import Body, Fluid
 from flocsim.forces import DoubleLayer, Gravity, StokesDrag, VanDerWaals

@@ -3,47 +3,41 @@
     python -m benchmarks.stability.run [--quick] [--cases 2000] [--case 1234] [--markdown]
 
 draws the cases with a fixed seed, runs each in a process that is killed after --limit seconds, and
-holds it against a reference (see stability_cases.py) and against invariants. --case reruns one case
-and prints everything about it.
+holds it against a reference (see benchmarks/stability/families.py) and against invariants. --case
+reruns one case and prints everything about it.
 """
 
-import argparse
 import json
-import os
 import sys
 import time
 from collections import Counter
 from pathlib import Path
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "tests"), str(HERE.parent)]
+import attrs
+import numpy as np
 
-import attrs  # noqa: E402
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.stability.case import RANGES
+from benchmarks.stability.families import FAMILIES, case_of, family_of
+from benchmarks.stability.verdict import KINDS, judge
+from benchmarks.stability.workers import judge_all
 
-from benchmarks.reporting import commit  # noqa: E402
-from benchmarks.stability.cases import FAMILIES, case_of, family_of  # noqa: E402
-from benchmarks.stability.report import BAD, decile_rows, family_rows, offenders  # noqa: E402
-from benchmarks.stability.verdict import judge  # noqa: E402
-from benchmarks.stability.workers import judge_all  # noqa: E402
-from flocsim.io.markdown import markdown_table  # noqa: E402
+BAD = ("wrong", "not finite", "crash", "hang")
 
 
 def arguments():
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=2000)
-    parser.add_argument("--first", type=int, default=0, help="index of the first case")
-    parser.add_argument("--quick", action="store_true", help="200 cases")
-    parser.add_argument("--case", type=int, help="rerun this one and print everything")
-    parser.add_argument("--limit", type=float, default=30.0, help="seconds for a case")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--family", choices=list(FAMILIES), help="cases of this family only")
-    parser.add_argument("--markdown", action="store_true", help="the tables are so anyway")
-    parser.add_argument("--save", help="also write every verdict to this file, one JSON a line")
-    parser.add_argument("--again", help="rerun the offenders of such a file only")
-    return parser.parse_args()
+    return parse_arguments(
+        __doc__,
+        cases={"type": int, "default": 2000, "help": "with --quick: 200"},
+        first={"type": int, "default": 0, "help": "index of the first case"},
+        case={"type": int, "help": "rerun this one and print everything"},
+        limit={"type": float, "default": 30.0, "help": "seconds for a case"},
+        workers={"type": int, "default": 2},
+        family={"choices": list(FAMILIES), "help": "cases of this family only"},
+        save={"help": "also write every verdict to this file, one JSON a line"},
+        again={"help": "rerun the offenders of such a file only"},
+    )
 
 
 def show_case(index):
@@ -88,25 +82,90 @@ def indices_of(options):
     return [k for k in wanted if options.family in (None, family_of(k))]
 
 
+def counts(found):
+    """How many verdicts of each kind, zeros blank."""
+    counted = Counter(verdict.kind for verdict in found)
+    return [counted[kind] or "" for kind in KINDS]
+
+
+def typed_words(found):
+    """Which typed failures there were."""
+    counted = Counter(verdict.detail for verdict in found if verdict.kind == "typed")
+    return ", ".join(f"{name} {count}" for name, count in counted.most_common())
+
+
+def worst(found):
+    """The largest error over what was allowed, among the finished cases with a reference."""
+    ratios = [v.error / v.allowed for v in found if v.judged_by == "reference" and v.allowed > 0.0]
+    return f"{np.nanmax(ratios):.2g}" if ratios else ""
+
+
+def family_table(found):
+    """How the cases of each family came out."""
+    columns = ("family", "judged by", "cases", *KINDS, "which typed failures", "by invariants only",
+               "worst error / allowed", "median steps", "slowest [s]")  # fmt: skip
+    rows = [family_row(name, [v for v in found if v.family == name]) for name in FAMILIES]
+    return Table("By family", columns, [*filter(None, rows), family_row("all", found)])
+
+
+def family_row(name, some):
+    """One row."""
+    if not some:
+        return None
+    judge = FAMILIES[name].judge if name in FAMILIES else ""
+    alone = sum(v.kind in ("right", "wrong") and v.judged_by == "invariants" for v in some)
+    cells = [
+        name, judge, len(some), *counts(some), typed_words(some), alone or "", worst(some),
+        f"{np.median([v.steps for v in some]):.0f}", f"{max(v.wall for v in some):.2g}",
+    ]  # fmt: skip
+    return list(map(str, cells))
+
+
+def decile_table(found):
+    """How the cases came out by the ranges that their numbers were drawn from."""
+    table = Table("right/typed/bad by decile of each range", ("range", *map(str, range(1, 11))))
+    for name, (low, high) in RANGES.items():
+        within = [[] for _ in range(10)]
+        for verdict in found:
+            if name in verdict.places:
+                within[min(max(int(10 * verdict.places[name]), 0), 9)].append(verdict)
+        if any(within):
+            table.rows.append([f"{name} {low:g}…{high:g}", *map(decile_cell, within)])
+    return table
+
+
+def decile_cell(some):
+    """right/typed/bad of one cell."""
+    names = {"stated": "right", **dict.fromkeys(BAD, "bad")}
+    kinds = Counter(names.get(v.kind, v.kind) for v in some)
+    return f"{kinds['right']}/{kinds['typed']}/{kinds['bad']}" if some else ""
+
+
+def offenders(found):
+    """A line for every case that came out badly."""
+    lines = [
+        f"--case {v.index} ({v.family}): {v.kind}: {v.detail}; tolerance {v.tolerance:.2g} m, "
+        f"allowed {v.allowed:.2g} m, its own estimate {v.estimate:.2g} m, {v.steps} steps"
+        for v in found
+        if v.kind in BAD
+    ]
+    return "\n".join([f"offenders: {len(lines)}", *lines])
+
+
 def main():
     """Print the table, or one case."""
     options = arguments()
     if options.case is not None:
         show_case(options.case)
         return
+    print_heading(used=f"{options.workers} used")
     began, indices = time.monotonic(), indices_of(options)
     found = judge_all(indices, options.workers, options.limit, progress(len(indices)))
     found.sort(key=lambda verdict: verdict.index)
-    text = "\n\n".join(
-        [
-            f"commit {commit()}: {' '.join(['python', *sys.argv])}: {len(found)} cases in "
-            f"{time.monotonic() - began:.0f} s",
-            markdown_table(*family_rows(found)),
-            markdown_table(*decile_rows(found)),
-            offenders(found),
-        ]
-    )
-    print(text)
+    print(f"{len(found)} cases in {time.monotonic() - began:.0f} s.\n")
+    family_table(found).print(options.markdown)
+    decile_table(found).print(options.markdown)
+    print(offenders(found))
     if options.save:
         lines = [json.dumps(attrs.asdict(verdict), default=float) for verdict in found]
         Path(options.save).write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -4,7 +4,7 @@ import multiprocessing
 import time
 from multiprocessing.connection import wait
 
-from benchmarks.stability.cases import family_of
+from benchmarks.stability.families import family_of
 from benchmarks.stability.verdict import Verdict, judge
 
 COMPILE_TIME = 120.0

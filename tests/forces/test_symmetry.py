@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from flocsim import SpheroPolygon
-from tests.helpers.fast_cases import FORCES, random_case, silenced
-from tests.helpers.fast_scene import FastScene
+from tests.helpers.fast_scene import FORCES, FastScene, random_case, silenced
 from tests.reference.samples import SEEDS
 from tests.reference.shapes import Scene, rotation
 

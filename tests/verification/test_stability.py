@@ -1,23 +1,20 @@
 """A fixed part of the stability table: every family over its ranges, right or clearly failed.
 
-The table itself is benchmarks/stability/run.py; here some of its cases go through the same functions,
-in this process and without a limit of time.
+The table itself is benchmarks/stability/run.py; here some of its cases go through the same
+functions, in this process and without a limit of time.
 """
 
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-
-from benchmarks.stability.cases import FAMILIES, case_of, family_of
-from benchmarks.stability.closed import bounce, resting_overlap, settle
-from benchmarks.stability.ranges import RANGES
+from benchmarks.stability.case import RANGES
+from benchmarks.stability.families import FAMILIES, case_of, family_of
+from benchmarks.stability.spheres import bounce, resting_overlap, settle
 from benchmarks.stability.verdict import judge
 from flocsim.integrators import Status
+from tests.reference.closed_forms import impact
 
 LONG = 600
 """Cases of the long run: the first of the table."""
@@ -31,7 +28,6 @@ FEW_SCENES = (
 SHORT = [index for index in range(130) if family_of(index) in FEW_SCENES]
 
 TYPED = {"REFUSED", *(status.name for status in Status)}
-
 
 KNOWN_WRONG = 364
 
@@ -88,8 +84,6 @@ def test_draws_cover_their_ranges():
 @pytest.mark.parametrize("z", [0.0, 0.05, 0.3, 0.7, 0.95, 1.0, 1.5, 3.0])
 def test_closed_form_of_an_impact(z, tension):
     """Parting at the restitution of Schwager & Pöschel, as the plain reference integrates it."""
-    from tests.reference.closed_forms import impact
-
     restitution, lasted, deepest = impact(z, tension)
     end = min(lasted, 50.0)
     gaps = [bounce(0.0, 1.0, 1.0, z, tension, end + after)[0] for after in (1.0, 2.0)]

@@ -1,14 +1,15 @@
 """What the rows of a study follow from, as a flat table: two runs that agree on it agree on rows.
 
-Seed, scene, bodies, fluid, forces, method, the flocs themselves, and the code: of the compiled
-kernels (their fingerprint covers bytecode, constants, Python, numba and numpy) and of the modules
-that prepare a replicate. How many replicates, which types, N and δ there are is not part of it, as
-no row depends on the others.
+Seed, scene, bodies, fluid, forces, method, the flocs themselves, how the machine rounds, and the
+code: of the compiled kernels (their fingerprint covers bytecode, constants, Python, numba and
+numpy) and of the modules that prepare a replicate. How many replicates, which types, N and δ there
+are is not part of it, as no row depends on the others.
 """
 
 import ast
 import hashlib
 import json
+import math
 from pathlib import Path
 
 import attrs
@@ -38,7 +39,7 @@ makes shapes: what it made is compared itself."""
 def identity_of(study):
     """{name: text or number} of all that the rows of a Study follow from."""
     config = study.config
-    facts = {"seed": config.seed, "code": physics_digest()}
+    facts = {"seed": config.seed, "code": physics_digest(), "arithmetic": arithmetic_digest()}
     for table in ("scene", "shapes", "bodies", "fluid", "zone"):
         facts |= settings(table, getattr(config, table))
     facts |= settings("integrator", make_integrator(config))
@@ -106,6 +107,23 @@ def kernel_facts(config):
     return facts
 
 
+def arithmetic_digest():
+    """A hash of how this machine rounds sin, exp and their like.
+
+    numpy and the C library choose their code for these by the processor: on another kind of it
+    rows differ in their last digits, and so do the flocs.
+    """
+    x = np.linspace(0.01, 3.0, 1000)
+    pairs = list(zip(x.tolist(), x[::-1].tolist(), strict=True))
+    found = [each(x) for each in (np.sin, np.cos, np.exp, np.expm1, np.log)]
+    found += [each(x, x[::-1]) for each in (np.hypot, np.arctan2, np.power)]
+    for one in (math.sin, math.cos, math.exp, math.expm1, math.log):
+        found.append(np.array([one(a) for a, _ in pairs]))
+    for two in (math.hypot, math.atan2, math.pow):
+        found.append(np.array([two(a, b) for a, b in pairs]))
+    return digest(np.concatenate(found))
+
+
 def physics_digest():
     """A hash of the modules that decide what is in a row: of what they do, not how they look."""
     found = hashlib.blake2b(digest_size=16)
@@ -158,6 +176,8 @@ def differences(stored, current):
     ]
     # What the user has changed comes first; what follows from it need not be said.
     telling = [name for name in both if name.partition(".")[0] not in EXPLAINED] or both
+    if "arithmetic" in telling:
+        telling = [name for name in telling if not name.startswith("flocs.")]
     return [difference(name, stored.get(name), current.get(name)) for name in telling]
 
 
@@ -170,6 +190,8 @@ def difference(name, stored, current):
 
 
 EXPLAINED = {
+    "arithmetic": "this machine rounds sin, exp and the like otherwise (another kind of processor, "
+    "another C library or numpy): go on where the run was begun, or begin anew",
     "code": "flocsim's own code has changed",
     "flocs": "the flocs with N = {} have changed",
     "numbers": "the numbers that the forces work with have changed for type {}",

@@ -31,7 +31,8 @@ table["pr_a"].sel(type="I", vertices=64, delta=0.5)
 The file ends in a blake2b-256 checksum behind the HDF5 data, where HDF5 ignores it; flocsim checks
 it before HDF5 parses anything. All that may differ between two runs of one config is in the group
 `run`: the bytes of every other dataset are the same for any number of ranks, after any number of
-interruptions. (This page is made from the schema by `python -m flocsim.io.results.page`.)
+interruptions, on processors of one kind ([cluster.md](cluster.md) says what differs between kinds).
+(This page is made from the schema by `python -m flocsim.io.results.page`.)
 """
 
 GROUPS = (

@@ -5,7 +5,7 @@ import pytest
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.toml_text import key_lines
 from flocsim.errors import ConfigError
-from tests.helpers.config_files import VALID, load_text, problem_lines
+from tests.helpers.small_study import VALID, load_text, problem_lines
 
 # One wrong entry laid into an otherwise valid file → what its line says.
 WRONG = {

@@ -4,7 +4,7 @@ import attrs
 import pytest
 
 from flocsim.ensembles.config.force_tables import FORCES
-from tests.helpers.config_files import VALID, load_text, problem_lines
+from tests.helpers.small_study import VALID, load_text, problem_lines
 
 
 def test_every_value_arrives_in_si_units(tmp_path):

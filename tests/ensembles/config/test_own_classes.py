@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from flocsim.ensembles.config.loader import load_config
-from tests.helpers.config_files import load_text, problem_lines
+from tests.helpers.small_study import load_text, problem_lines
 
 OWN_FORCE = """\
 import attrs

@@ -3,18 +3,13 @@
 import random
 import resource
 import signal
-import sys
 
 import numpy as np
 import pytest
 
-from tests.helpers.small_study import ROOT, mpirun
-
-sys.path.append(str(ROOT / "benchmarks"))
-
-from benchmarks.faults import damage as faults_damage
-from benchmarks.faults import job as faults_job
-from benchmarks.faults import run as faults
+from benchmarks.faults import damage
+from benchmarks.faults.job import Job, Tally, make_study, run_here, verdict
+from tests.helpers.small_study import mpirun
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +21,14 @@ def root(tmp_path_factory):
 @pytest.fixture(scope="module")
 def reference(root):
     """The results of an undisturbed run, which also compiles."""
-    return faults_job.run_here(faults_job.make_study(root / "ref"))
+    return run_here(make_study(root / "ref"))
 
 
 def job(folder, kind):
     """A job that has begun to write."""
     if kind.startswith("mpirun"):
         mpirun()
-    started = faults_job.Job.start(folder, kind)
+    started = Job.start(folder, kind)
     started.wait_for_journal()
     return started
 
@@ -43,12 +38,12 @@ def job(folder, kind):
     [("mpirun -n 2", "rank"), ("mpirun -n 3", "launcher"), ("--jobs 2", "group")],
 )
 def test_a_kill_costs_nothing_that_was_finished(root, reference, kind, target):
-    folder = faults_job.make_study(root / f"kill {kind} {target}")
+    folder = make_study(root / f"kill {kind} {target}")
     started = job(folder, kind)
     pids = started.send(signal.SIGKILL, target, random.Random(1))
     code, _ = started.finish(pids)
     assert code is not None
-    assert faults_job.verdict(folder, reference) == ""
+    assert verdict(folder, reference) == ""
 
 
 @pytest.mark.parametrize(
@@ -56,40 +51,40 @@ def test_a_kill_costs_nothing_that_was_finished(root, reference, kind, target):
     [("serial", signal.SIGTERM), ("mpirun -n 2", signal.SIGUSR1), ("--jobs 2", signal.SIGINT)],
 )
 def test_a_signal_ends_with_75_and_a_journal(root, reference, kind, sign):
-    folder = faults_job.make_study(root / f"signal {kind}")
+    folder = make_study(root / f"signal {kind}")
     started = job(folder, kind)
     code, _ = started.finish(started.send(sign, "launcher", random.Random(1)))
     assert code == 75
     errors = (folder / "errors.txt").read_text()
     assert f"stopped by {sign.name}" in errors
     assert "Traceback" not in errors
-    assert faults_job.verdict(folder, reference) == ""
+    assert verdict(folder, reference) == ""
 
 
 @pytest.mark.parametrize(("kind", "size"), [("serial", 60_000), ("--jobs 2", 500)])
 def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
-    folder = faults_job.make_study(root / f"disk {kind} {size}")
+    folder = make_study(root / f"disk {kind} {size}")
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))  # noqa: E731
-    started = faults_job.Job.start(folder, kind, preexec_fn=limit)
+    started = Job.start(folder, kind, preexec_fn=limit)
     code, _ = started.finish([started.process.pid])
     assert code == 74
     errors = (folder / "errors.txt").read_text()
     assert len(errors.splitlines()) == 1
     assert "study.h5.journal could not be written: File too large" in errors
-    assert faults_job.verdict(folder, reference) == ""
+    assert verdict(folder, reference) == ""
 
 
 def test_every_damage_is_found_and_nothing_wrong_is_believed(root, reference, monkeypatch):
-    monkeypatch.setattr(faults_damage, "WHOLE_RERUNS", 3)
+    monkeypatch.setattr(damage, "WHOLE_RERUNS", 3)
     rng = np.random.default_rng(2)
-    tallies = faults_damage.damage_journal(root, reference, 60, rng)
-    tallies |= faults_damage.damage_results(root, reference, 100, rng)
+    tallies = damage.damage_journal(root, reference, 60, rng)
+    tallies |= damage.damage_results(root, reference, 100, rng)
     assert sum(tally.faults for tally in tallies.values()) == 160
     assert [problem for tally in tallies.values() for problem in tally.wrong] == []
 
 
 def test_a_problem_is_counted():
-    tally = faults.Tally()
+    tally = Tally()
     tally.add("", 1.0)
     tally.add("lost", 2.0)
     assert (tally.faults, tally.right, tally.slowest, tally.wrong) == (2, 1, 2.0, ["lost"])

@@ -121,6 +121,26 @@ def test_other_physics_are_refused(stopped, monkeypatch):
         go_on(stopped)
 
 
+def test_another_kind_of_processor_is_refused_and_said(stopped, monkeypatch):
+    monkeypatch.setattr(identity, "arithmetic_digest", lambda: "other")
+    with pytest.raises(Told, match="rounds sin, exp and the like otherwise"):
+        go_on(stopped)
+
+
+def test_flocs_that_another_processor_made_are_not_said_to_have_changed():
+    here, there = ({"arithmetic": each, "flocs.4": each, "seed": 1} for each in "ab")
+    [line] = identity.differences(here, there)
+    assert "another kind of processor" in line
+    assert identity.differences(here, there | {"seed": 2}) == ["seed is 1 in the file, 2 now"]
+
+
+def test_the_digest_of_the_arithmetic_sees_last_digits(monkeypatch):
+    before = identity.arithmetic_digest()
+    assert identity.arithmetic_digest() == before
+    monkeypatch.setattr(np, "exp", lambda x, exp=np.exp: np.nextafter(exp(x), np.inf))
+    assert identity.arithmetic_digest() != before
+
+
 def test_the_digest_of_the_physics_sees_code_and_nothing_else():
     source = 'def f(x):\n    """Words."""\n    return 2.0 * x  # why\n'
     same = 'def f(x):\n    """Other words."""\n\n    return 2.0 * (x)\n'

@@ -54,6 +54,7 @@ def test_touching_points_are_the_contact_points(seed):
                 placed[i], scene.bodies[i].radius, placed[j], scene.bodies[j].radius
             )
             # Two spheres touch once, but each is asked for its touching point.
-            assert {tuple(point) for point in found.round(15)} == {
-                tuple(point) for point in wanted.round(15)
-            }
+            assert (len(found) > 0) == (len(wanted) > 0)
+            apart = np.hypot(*(found[:, None] - wanted[None]).transpose(2, 0, 1))
+            assert np.all(apart.min(axis=0, initial=np.inf) < 1e-15)
+            assert np.all(apart.min(axis=1, initial=np.inf) < 1e-15)

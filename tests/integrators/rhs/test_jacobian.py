@@ -14,8 +14,7 @@ from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST_S
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
-from tests.helpers.fast_cases import FORCES, GAPS, random_case
-from tests.helpers.fast_scene import FastScene
+from tests.helpers.fast_scene import FORCES, GAPS, FastScene, random_case
 from tests.helpers.trial_scenes import (
     Hertz,
     Lubrication,

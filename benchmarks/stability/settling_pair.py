@@ -9,10 +9,10 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.stability.case import Answer, Case, ReferenceGaveUpError
-from benchmarks.stability.ranges import WATER_DENSITY
-from benchmarks.stability.spheres import GRAVITY, contact_of, drag_of, mass_between
+from benchmarks.stability.case import WATER_DENSITY, Answer, Case, ReferenceGaveUpError
+from benchmarks.stability.spheres import contact_of, drag_of, mass_between
 from flocsim import Body, Fluid, Sphere
+from flocsim.constants import STANDARD_GRAVITY
 from flocsim.forces import DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from tests.reference.forces import Contact as PlainContact
 from tests.reference.forces import DoubleLayer as PlainDoubleLayer
@@ -56,7 +56,9 @@ def falling(body, fluid):
     """The body at its terminal velocity."""
     if body.fixed:
         return body
-    speed = body.buoyant_mass(fluid) * GRAVITY / drag_of(fluid.viscosity, body.shape.radius)
+    speed = (
+        body.buoyant_mass(fluid) * STANDARD_GRAVITY / drag_of(fluid.viscosity, body.shape.radius)
+    )
     return Body(body.shape, body.position, 0.0, (0.0, -speed), density=body.density)
 
 
@@ -85,7 +87,7 @@ class Approach:
         drags = [drag_of(fluid.viscosity, body.shape.radius) for body in bodies]
         free = [0.0 if body.fixed else 1.0 / body.mass for body in bodies]
         self.decays = [drag * one * self.time for drag, one in zip(drags, free, strict=True)]
-        weights = [body.buoyant_mass(fluid) * GRAVITY for body in bodies]
+        weights = [body.buoyant_mass(fluid) * STANDARD_GRAVITY for body in bodies]
         self.falls = [w * one * self.time / unit for w, one in zip(weights, free, strict=True)]
         self.gains = [one * self.time / unit for one in free]
         omega = math.sqrt(contact.k_n / self.mass)

@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 
-from benchmarks.stability.approach import approach, approach_at_surfaces
+from benchmarks.stability.case import Draw
 from benchmarks.stability.polygons import (
     full_scene,
     interlocked,
@@ -14,7 +14,7 @@ from benchmarks.stability.polygons import (
     spinning_impact,
     unloaded_rest,
 )
-from benchmarks.stability.ranges import Draw
+from benchmarks.stability.settling_pair import approach, approach_at_surfaces
 from benchmarks.stability.spheres import (
     deep_overlap,
     free_settling,
