@@ -13,22 +13,78 @@ import numpy as np
 MASS, BUOYANT_MASS, INERTIA, FREE, EQUIVALENT_RADIUS, BOUNDING_RADIUS, RADIUS = range(7)
 """Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one."""
 
-NOW, FIRST, SECOND, NEW, SCRATCH, START = range(6)
-"""States in ``Work.motion``; all but the last in ``geometry``, the first four in ``slip``: now,
-inside the step twice, at its end; wherever something is tried out (or how wrong NEW is); where the
-step began whose stages are still there."""
+X, Y, ANGLE, VX, VY, SPIN, MOTION_COLUMNS = range(7)
+"""Columns of ``Work.motion``: place [m], counter-clockwise angle [rad] and their rates."""
 
-SLIP_RATES = 4
-"""Rows of ``Work.slip`` from here on hold the rates of the displacements, one row a stage."""
+RECORD_TIME, RECORD_MOTION = range(2)
+"""First columns of a record: time, then the motion of one body after another."""
 
-STAGES = 7
-"""Most stages of an integrator: places in ``Work.rates`` and behind ``SLIP_RATES``."""
+VELOCITY = VX
+"""First column of the velocity in ``Work.motion``, for loops over axes."""
 
-LISTED, COSINE, SINE, MEMORY, CLUSTER, FRAMES, BODY_COLUMNS = 0, 3, 4, 5, 6, 7, 19
-"""First columns in ``Work.bodies``, and how many there are."""
+FX, FY, TORQUE = range(3, 6)
+"""Columns of the force in ``Work.rates``, behind those of the velocity [N, N m]."""
 
-CLOSED, CLOSEST = 5, 6
-"""Columns of ``Work.candidates`` that say how a listed pair acts in this step."""
+FORCE = FX
+"""First column of the force in ``Work.rates``, for loops over axes."""
+
+NOW, NEW, TRIAL, FIRST_STAGE = range(4)
+"""States, rows of ``motion``, ``rates``, ``geometry`` and ``slip`` in Work: now, at the end of the
+step, wherever something is tried out in it, and the first of its stages."""
+
+MOST_STAGES = 6
+"""Most stages of an integrator that are neither NOW nor NEW."""
+
+STATES = FIRST_STAGE + MOST_STAGES
+"""How many states there are with all that belongs to them."""
+
+START, CHANGE, DEVIATION, MOTION_ROWS = range(STATES, STATES + 4)
+"""Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
+change of velocities that Newton's method makes; by how much NEW is likely to be wrong."""
+
+SLIP_RATES = STATES
+"""Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
+
+KEPT_SLIP = 2 * STATES
+"""The row of ``Work.slip`` for displacements that are set aside while the list is made anew."""
+
+SLIP_ROWS = KEPT_SLIP + 1
+
+LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM, FRAMES = 0, 3, 4, 5, 6, 8, 9
+"""First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
+sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
+(x, y) and of mass; its frames at the stages of an implicit step."""
+
+TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
+"""Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
+
+MOST_FRAMES = 3
+"""Stages for which a body keeps a frame."""
+
+BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
+
+VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, CLOSEST = range(7)
+"""Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
+point of the edge; 1 where the pair is closed in this step, 1 where it is its bodies' closest."""
+
+(
+    NORMAL_X,
+    NORMAL_Y,
+    GAP,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    TURNING,
+    GEOMETRY_COLUMNS,
+) = range(9)
+"""Columns of ``Work.geometry``: unit normal from the foot on the edge to the vertex; gap [m]; arms
+[m], which are the moments of unit forces along n and t, applied at the middle of the overlap, about
+the centroid of the vertex's body and about that of the edge's; the angle by which the normal turns
+for every metre of the vertex along t [1/m].  See flocsim.geometry.contact.points."""
+
+KEPT_VERTEX, KEPT_EDGE = range(2)
+"""Columns of ``Work.kept``: core point of the vertex, first core point of the edge."""
 
 DAMPING, STIFFNESS = range(2)
 """Matrices in ``Work.jacobian``: minus the derivatives of the forces by velocity and by place."""
@@ -137,28 +193,28 @@ class Scene(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (6, n, 6): x, y, angle, vx, vy, spin in the states of flocsim.arrays.
-    ``rates`` (7, n, 6): velocity and force (with torque) at the stages of a step.
-    ``slip`` (11, capacity): tangential displacements in the four states, then their rates.
-    ``bodies`` (n, 19): place at the last listing, cosine and sine of the angle, how long a velocity
-    is remembered, first body of those it touches, then for each of three stages how its contacts
-    have turned and wandered.
-    ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 2), complex:
-    factorised systems, then the load and the pivots.
-    ``candidates`` (capacity, 7): body of the vertex, its core point, body of the edge, first and
-    last core point of the edge, 1 where the pair is closed, 1 where its bodies are closest.
-    ``geometry`` (5, capacity, 8): see flocsim.geometry.contact.points.
-    ``kept`` (capacity, 3): point, edge and displacement of pairs while the list is made anew.
-    ``budget`` (n (n − 1)/2,): how far two bodies may move until it must be.
-    ``tally``: counts, see flocsim.arrays.
+    ``motion`` (12, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION.
+    ``rates`` (9, n, 6): velocity and force (with torque) in the states.
+    ``slip`` (19, capacity): tangential displacements in the states, their rates there, and those
+    set aside while the list is made anew.
+    ``bodies`` (n, 21): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    directly or through others.
+    ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:
+    factorised systems, then the load.  ``pivots`` (2, 3n): which rows have changed places.
+    ``candidates`` (capacity, 7): see VERTEX_BODY.  ``geometry`` (9, capacity, 8): see NORMAL_X.
+    ``kept`` (capacity, 2): the pairs whose displacements are set aside.
+    ``budget`` (n (n − 1)/2,): how far two bodies may move until the list must be made anew.
+    ``tally``: counts, see CANDIDATES.
     """
 
     motion: np.ndarray
     rates: np.ndarray
     slip: np.ndarray
     bodies: np.ndarray
+    cluster: np.ndarray
     jacobian: np.ndarray
     system: np.ndarray
+    pivots: np.ndarray
     candidates: np.ndarray
     geometry: np.ndarray
     kept: np.ndarray
@@ -169,18 +225,20 @@ class Work(NamedTuple):
 def work_of(scene, position, velocity, capacity=256):
     """Work arrays for a scene at the given position and velocity (n, 3), no contact yet."""
     n = len(scene.bodies)
-    motion = np.zeros((6, n, 6))
+    motion = np.zeros((MOTION_ROWS, n, MOTION_COLUMNS))
     motion[NOW] = np.hstack([position, velocity])
     return Work(
         motion=motion,
-        rates=np.zeros((STAGES, n, 6)),
-        slip=np.zeros((SLIP_RATES + STAGES, capacity)),
+        rates=np.zeros((STATES, n, MOTION_COLUMNS)),
+        slip=np.zeros((SLIP_ROWS, capacity)),
         bodies=np.zeros((n, BODY_COLUMNS)),
+        cluster=np.zeros(n, dtype=np.int64),
         jacobian=np.zeros((2, 3 * n, 3 * n)),
-        system=np.zeros((2, 3 * n, 3 * n + 2), dtype=complex),
-        candidates=np.zeros((capacity, 7), dtype=np.int64),
-        geometry=np.zeros((5, capacity, 8)),
-        kept=np.zeros((capacity, 3)),
+        system=np.zeros((2, 3 * n, 3 * n + 1), dtype=complex),
+        pivots=np.zeros((2, 3 * n), dtype=np.int64),
+        candidates=np.zeros((capacity, CLOSEST + 1), dtype=np.int64),
+        geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
+        kept=np.zeros((capacity, 2), dtype=np.int64),
         budget=np.full(n * (n - 1) // 2, -1.0),
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )

@@ -6,7 +6,19 @@ listed pair.
 
 import math
 
-from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, FREE, NOW, SLIP_RATES
+from flocsim.arrays import (
+    BOUNDING_RADIUS,
+    CANDIDATES,
+    CLOSED,
+    FORCE,
+    FREE,
+    MOTION_COLUMNS,
+    NOW,
+    SLIP_RATES,
+    SPIN,
+    VX,
+    VY,
+)
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
@@ -21,7 +33,7 @@ def read_state(work, vector):
     """Write a state vector into NOW."""
     bodies = work.motion.shape[1]
     for body in range(bodies):
-        for axis in range(6):
+        for axis in range(MOTION_COLUMNS):
             work.motion[NOW, body, axis] = vector[6 * body + axis]
     for row in range(work.tally[CANDIDATES]):
         work.slip[NOW, row] = vector[6 * bodies + row]
@@ -30,14 +42,14 @@ def read_state(work, vector):
 def rate_state(scene, work, time, vector, rates):
     """Derivative of a state vector by time, every listed pair flagged as it is there."""
     read_state(work, vector)
-    locate_and_rate(scene, work, NOW, NOW)
-    sum_forces(scene, work, time, NOW, NOW)
+    locate_and_rate(scene, work, NOW)
+    sum_forces(scene, work, time, NOW)
     bodies = work.motion.shape[1]
     for body in range(bodies):
         for axis in range(3):
             gain = scene.bodies[body, FREE] / inertia(scene, body, axis)
             rates[6 * body + axis] = vector[6 * body + 3 + axis]
-            rates[6 * body + 3 + axis] = gain * work.rates[NOW, body, 3 + axis]
+            rates[6 * body + 3 + axis] = gain * work.rates[NOW, body, FORCE + axis]
     for row in range(work.tally[CANDIDATES]):
         closed = work.candidates[row, CLOSED] == 1
         rates[6 * bodies + row] = work.slip[SLIP_RATES + NOW, row] if closed else 0.0
@@ -52,8 +64,9 @@ def locate_now(scene, work):
 
 def outline_speed(scene, work, body):
     """Upper bound of the speed of any point of a body's outline [m/s]."""
-    vx, vy, spin = work.motion[NOW, body, 3], work.motion[NOW, body, 4], work.motion[NOW, body, 5]
-    return math.hypot(vx, vy) + abs(spin) * scene.bodies[body, BOUNDING_RADIUS]
+    motion = work.motion
+    speed = math.hypot(motion[NOW, body, VX], motion[NOW, body, VY])
+    return speed + abs(motion[NOW, body, SPIN]) * scene.bodies[body, BOUNDING_RADIUS]
 
 
 def longest_step(scene, work):

@@ -10,7 +10,17 @@ import attrs
 import numpy as np
 
 from benchmarks.speed.scenes import rolling_pair
-from flocsim.arrays import CANDIDATES, CLOSED, FREE, NOW, REBUILDS, SLIP_RATES, work_of
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FORCE,
+    FREE,
+    NOW,
+    REBUILDS,
+    SLIP_RATES,
+    VELOCITY,
+    work_of,
+)
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.integrators import Implicit, VelocityVerlet
@@ -32,8 +42,8 @@ def push(scene, work, step):
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
             gain = step * scene.bodies[body, FREE] / inertia(scene, body, axis)
-            work.motion[NOW, body, 3 + axis] += gain * work.rates[NOW, body, 3 + axis]
-            work.motion[NOW, body, axis] += step * work.motion[NOW, body, 3 + axis]
+            work.motion[NOW, body, VELOCITY + axis] += gain * work.rates[NOW, body, FORCE + axis]
+            work.motion[NOW, body, axis] += step * work.motion[NOW, body, VELOCITY + axis]
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             work.slip[NOW, row] += step * work.slip[SLIP_RATES + NOW, row]
@@ -48,8 +58,8 @@ def evaluate_and_push(scene, work, step, count, turn):
     for k in range(count):
         if spent(scene, work, NOW) > 0.5 and not list_candidates(scene, work):
             return -1
-        locate_and_rate(scene, work, NOW, NOW)
-        sum_forces(scene, work, 0.0, NOW, NOW)
+        locate_and_rate(scene, work, NOW)
+        sum_forces(scene, work, 0.0, NOW)
         hand_over(work)
         for row in range(work.tally[CANDIDATES]):
             if work.candidates[row, CLOSED] == 1:

@@ -7,7 +7,7 @@ from flocsim.integrators.rhs import forces as explicit
 from flocsim.integrators.rhs import jacobian
 
 
-def no_forces(scene, work, time, state, rate):
+def no_forces(scene, work, time, state):
     """No such forces."""
 
 

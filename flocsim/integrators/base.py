@@ -16,6 +16,7 @@ from flocsim.arrays import (
     COUNTS_SIZE,
     LARGEST_STEP,
     MAX_STEPS,
+    MOTION_COLUMNS,
     PAUSE_AT,
     PREVIOUS_STEP,
     SETTLED_STEP,
@@ -64,7 +65,7 @@ __all__ = ["Integrator", "Status", "all_finite"]
 def all_finite(work, state):
     """Whether every place and velocity of a state is finite."""
     for body in range(work.motion.shape[1]):
-        for axis in range(6):
+        for axis in range(MOTION_COLUMNS):
             if not math.isfinite(work.motion[state, body, axis]):
                 return False
     return True

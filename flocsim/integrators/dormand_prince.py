@@ -6,20 +6,22 @@ from flocsim import hooks as slots
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
-    FIRST,
+    DEVIATION,
+    FIRST_STAGE,
     FREE,
+    MOTION_COLUMNS,
     NEW,
     NOW,
-    SCRATCH,
     SLIP_RATES,
     TIME,
     UNTIL,
+    VELOCITY,
 )
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import copy_state, limit_slips, locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
 
@@ -44,22 +46,27 @@ ORDER_OF_ESTIMATE = 5.0
 """The estimate goes with this power of the step."""
 
 
-def rate_of(scene, work, stage, body, axis):
-    """Rate of a place (axis 0–2) or of a velocity (axis 3–5) at a stage."""
-    rate = work.rates[stage, body, axis]
-    if axis < 3:
+def state_of(stage):
+    """The state of a stage: the first one is NOW."""
+    return NOW if stage == 0 else FIRST_STAGE + stage - 1
+
+
+def rate_of(scene, work, state, body, axis):
+    """Rate of a place (axis 0–2) or of a velocity (axis 3–5) in a state."""
+    rate = work.rates[state, body, axis]
+    if axis < VELOCITY:
         return rate
-    return rate * scene.bodies[body, FREE] / inertia(scene, body, axis - 3)
+    return rate * scene.bodies[body, FREE] / inertia(scene, body, axis - VELOCITY)
 
 
 def combine(scene, work, weights, stages, base, end):
     """State ``end`` = ``base`` times state NOW + the weighted rates of the first stages."""
     for body in range(scene.bodies.shape[0]):
-        for axis in range(6):
+        for axis in range(MOTION_COLUMNS):
             total = 0.0
             for stage in range(stages):
                 if weights[stage] != 0.0:
-                    total += weights[stage] * rate_of(scene, work, stage, body, axis)
+                    total += weights[stage] * rate_of(scene, work, state_of(stage), body, axis)
             work.motion[end, body, axis] = base * work.motion[NOW, body, axis] + total
 
 
@@ -69,28 +76,27 @@ def combine_slips(work, weights, stages, step, end):
         if work.candidates[row, CLOSED] == 1:
             total = 0.0
             for stage in range(stages):
-                total += weights[stage] * work.slip[SLIP_RATES + stage, row]
+                total += weights[stage] * work.slip[SLIP_RATES + state_of(stage), row]
             work.slip[end, row] = work.slip[NOW, row] + step * total
 
 
 def times(weights, step):
     """Seven weights times a number."""
-    return (
-        weights[0] * step, weights[1] * step, weights[2] * step, weights[3] * step,
-        weights[4] * step, weights[5] * step, weights[6] * step,
-    )  # fmt: skip
+    a, b, c, d, e, f, g = weights
+    return a * step, b * step, c * step, d * step, e * step, f * step, g * step
 
 
 def evaluate_stages(scene, work, time, step):
-    """Rates of all seven stages; the last one's state is NEW."""
+    """Rates of all seven stages; the last one becomes NEW."""
     for stage in range(7):
-        state = NOW if stage == 0 else NEW if stage == 6 else FIRST
+        state = state_of(stage)
         if stage > 0:
             combine(scene, work, times(MATRIX[stage], step), stage, 1.0, state)
-        locate_and_rate(scene, work, state, stage)
+        locate_and_rate(scene, work, state)
         if stage > 0:
             combine_slips(work, MATRIX[stage], stage, step, state)
-        sum_forces(scene, work, time + NODES[stage] * step, state, stage)
+        sum_forces(scene, work, time + NODES[stage] * step, state)
+    copy_state(work, state, NEW)
 
 
 def dormand_prince_attempt(scene, work, clock, step):
@@ -98,7 +104,7 @@ def dormand_prince_attempt(scene, work, clock, step):
     time = clock[TIME]
     evaluate_stages(scene, work, time, step)
     weigh_velocities(scene, work, time, max(clock[UNTIL] - time, step))
-    combine(scene, work, times(ESTIMATE, step), 7, 0.0, SCRATCH)
+    combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
     limit_slips(scene, work)
     return error_ratio(scene, work, clock, step)
 

@@ -3,7 +3,19 @@
 import attrs
 
 from flocsim import hooks as slots
-from flocsim.arrays import FIRST, FREE, NOW, PACE, SCRATCH, STIFFNESS, TIME, UNTIL
+from flocsim.arrays import (
+    DEVIATION,
+    FIRST_STAGE,
+    FORCE,
+    FREE,
+    NOW,
+    PACE,
+    STIFFNESS,
+    TIME,
+    UNTIL,
+    VELOCITY,
+    X,
+)
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
@@ -12,7 +24,7 @@ from flocsim.integrators.radau.collocation import collocate
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
-from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE
+from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.forces import limit_slips
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
@@ -25,51 +37,52 @@ COMFORTABLE_PACE = 0.4
 """Newton's pace goes about with the square of the step; the next step aims at this."""
 
 
-def estimated_rate(work, row, part, step):
-    """Weighted mean of the stages' increments of a place (part 0) or velocity (part 3), over h."""
-    body, axis = row // 3, row % 3 + part
+def estimated_rate(work, row, first, step):
+    """Weighted mean of the stages' increments over h, of a place or, ``first`` being VELOCITY, of a
+    velocity."""
+    body, axis = row // 3, first + row % 3
     now = work.motion[NOW, body, axis]
     total = 0.0
     for stage in range(3):
-        total += ESTIMATE[stage] * (work.motion[FIRST + stage, body, axis] - now)
+        total += ESTIMATE[stage] * (work.motion[FIRST_STAGE + stage, body, axis] - now)
     return total / step
 
 
 def write_error_load(scene, work, step):
     """The load whose solution is the error of the velocities."""
     size = work.jacobian.shape[1]
-    damped = step / EIGENVALUES[0].real
+    damped = step / EIGENVALUES[REAL].real
     for row in range(size):
         body, axis = row // 3, row % 3
-        load = work.rates[NOW, body, 3 + axis]
-        load += inertia(scene, body, axis) * estimated_rate(work, row, 3, step)
+        load = work.rates[NOW, body, FORCE + axis]
+        load += inertia(scene, body, axis) * estimated_rate(work, row, VELOCITY, step)
         for column in range(size):
-            drift = work.motion[NOW, column // 3, 3 + column % 3]
-            drift += estimated_rate(work, column, 0, step)
+            drift = work.motion[NOW, column // 3, VELOCITY + column % 3]
+            drift += estimated_rate(work, column, X, step)
             load -= damped * work.jacobian[STIFFNESS, row, column] * drift
-        work.system[0, row, size] = load * scene.bodies[body, FREE]
+        work.system[REAL, row, size] = load * scene.bodies[body, FREE]
 
 
 def estimate_error(scene, work, step):
-    """Write the error of the step into SCRATCH."""
+    """Write the error of the step into DEVIATION."""
     write_error_load(scene, work, step)
     size = work.jacobian.shape[1]
-    sum_over_clusters(work, 0, size, size + 1)
-    solve(work.system, 0)
-    damped = step / EIGENVALUES[0].real
+    sum_over_clusters(work, REAL, size, size + 1)
+    solve(work.system, work.pivots, REAL)
+    damped = step / EIGENVALUES[REAL].real
     for row in range(size):
         body, axis = row // 3, row % 3
-        speed = work.system[0, row, size].real
-        drift = work.motion[NOW, body, 3 + axis] + estimated_rate(work, row, 0, step)
+        speed = work.system[REAL, row, size].real
+        drift = work.motion[NOW, body, VELOCITY + axis] + estimated_rate(work, row, X, step)
         free = scene.bodies[body, FREE]
-        work.motion[SCRATCH, body, axis] = free * damped * (speed + drift)
-        work.motion[SCRATCH, body, 3 + axis] = free * speed
+        work.motion[DEVIATION, body, axis] = free * damped * (speed + drift)
+        work.motion[DEVIATION, body, VELOCITY + axis] = free * speed
 
 
 def implicit_attempt(scene, work, clock, step):
     """One step: error over tolerance, or −1 where Newton's method fails."""
     time = clock[TIME]
-    evaluate_states(scene, work, time, 0.0, NOW, FIRST)
+    evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
     gather_clusters(scene, work)
     assemble_jacobian(scene, work, time, max(clock[UNTIL] - time, step))
     if not factorise_systems(scene, work, step):

@@ -3,13 +3,28 @@
 import attrs
 
 from flocsim import hooks as slots
-from flocsim.arrays import CANDIDATES, CLOSED, FIRST, FREE, LARGEST_STEP, NEW, NOW, TIME
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FIRST_STAGE,
+    FORCE,
+    FREE,
+    GAP,
+    LARGEST_STEP,
+    NEW,
+    NOW,
+    TIME,
+    VELOCITY,
+)
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator, all_finite
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
 from flocsim.integrators.rhs.views import inertia, tangential_rate
+
+HALFWAY = FIRST_STAGE
+"""The state whose velocity is that of the middle of the step."""
 
 
 def locate_and_flag(scene, work, state):
@@ -18,31 +33,33 @@ def locate_and_flag(scene, work, state):
     set_modes(scene, work, state)
 
 
-def gain(scene, work, body, axis, step):
-    """Change of a velocity in a step at the force in place NOW of ``work.rates``."""
-    force = work.rates[NOW, body, 3 + axis]
+def gain(scene, work, state, body, axis, step):
+    """Change of a velocity in a step at the force of a state."""
+    force = work.rates[state, body, FORCE + axis]
     return step * scene.bodies[body, FREE] * force / inertia(scene, body, axis)
 
 
 def kick_and_drift(scene, work, step):
-    """Half a kick into FIRST, whose velocity carries to the place of NEW; NEW has a whole kick."""
+    """Half a kick into HALFWAY, whose velocity leads to the place of NEW; NEW has a whole kick."""
     motion = work.motion
     for body in range(motion.shape[1]):
         for axis in range(3):
-            speed = motion[NOW, body, 3 + axis]
-            kick = gain(scene, work, body, axis, step)
-            motion[FIRST, body, 3 + axis] = speed + 0.5 * kick
+            speed = motion[NOW, body, VELOCITY + axis]
+            kick = gain(scene, work, NOW, body, axis, step)
+            motion[HALFWAY, body, VELOCITY + axis] = speed + 0.5 * kick
             motion[NEW, body, axis] = motion[NOW, body, axis] + step * (speed + 0.5 * kick)
             # Drag at the half step's velocity would be half a step late: take a whole kick's.
-            motion[NEW, body, 3 + axis] = speed + kick
+            motion[NEW, body, VELOCITY + axis] = speed + kick
 
 
 def finish_kick(scene, work, step):
-    """The velocity of NEW: that of FIRST and half a kick at the force of NEW."""
+    """The velocity of NEW: that of HALFWAY and half a kick at the force of NEW."""
     for body in range(work.motion.shape[1]):
         for axis in range(3):
-            kick = gain(scene, work, body, axis, 0.5 * step)
-            work.motion[NEW, body, 3 + axis] = work.motion[FIRST, body, 3 + axis] + kick
+            kick = gain(scene, work, NEW, body, axis, 0.5 * step)
+            work.motion[NEW, body, VELOCITY + axis] = (
+                work.motion[HALFWAY, body, VELOCITY + axis] + kick
+            )
 
 
 def slip_new(work, step):
@@ -52,7 +69,7 @@ def slip_new(work, step):
         slip[NEW, row] = 0.0
         if work.candidates[row, CLOSED] == 1:
             rate = tangential_rate(work, NEW, row)
-            if work.geometry[NOW, row, 2] < 0.0:
+            if work.geometry[NOW, row, GAP] < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))
             slip[NEW, row] = slip[NOW, row] + step * rate
 
@@ -62,10 +79,10 @@ def verlet_attempt(scene, work, clock, step):
     for state in (NOW, NEW):
         if state == NEW:
             kick_and_drift(scene, work, step)
-        locate_and_rate(scene, work, state, NOW)
+        locate_and_rate(scene, work, state)
         if state == NEW:
             slip_new(work, step)
-        sum_forces(scene, work, clock[TIME] + step * (state == NEW), state, NOW)
+        sum_forces(scene, work, clock[TIME] + step * (state == NEW), state)
     finish_kick(scene, work, step)
     limit_slips(scene, work)
     return 0.0 if all_finite(work, NEW) else -1.0

@@ -19,8 +19,8 @@ def right_hand_side(scene, work):
         return False
     locate_contacts(scene, work, NOW)
     set_modes(scene, work, NOW)
-    locate_and_rate(scene, work, NOW, NOW)
-    sum_forces(scene, work, 0.0, NOW, NOW)
+    locate_and_rate(scene, work, NOW)
+    sum_forces(scene, work, 0.0, NOW)
     return True
 
 

@@ -15,7 +15,7 @@ cannot turn, so it need not).
 
 import math
 
-from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, FREE, NOW
+from flocsim.arrays import ANGLE, BOUNDING_RADIUS, CANDIDATES, FREE, GAP, NOW, SPIN, VX, VY, X, Y
 from flocsim.ensembles.collision.memo import (
     DRIFT_X,
     DRIFT_Y,
@@ -27,8 +27,12 @@ from flocsim.ensembles.collision.memo import (
     REST_X,
     REST_Y,
 )
+from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.hooks import centre_force, has_centre_force, surface_force, surface_reach
 from flocsim.integrators.rhs.views import centre_view, closest_rows, effective_mass, surface_view
+
+BODY_I, BODY_J = range(2)
+"""The two bodies of an encounter: the receiver, and the one that it meets."""
 
 SAFETY = 3.0
 """Factor by which attraction must outweigh the load in a certificate."""
@@ -47,12 +51,12 @@ HANGING = 0.99
 def relative_speeds(scene, work, nx, ny):
     """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
     v = work.motion
-    ux, uy = v[NOW, 1, 3] - v[NOW, 0, 3], v[NOW, 1, 4] - v[NOW, 0, 4]
-    rx, ry = v[NOW, 1, 0] - v[NOW, 0, 0], v[NOW, 1, 1] - v[NOW, 0, 1]
-    spin = v[NOW, 0, 5]
+    ux, uy = v[NOW, BODY_J, VX] - v[NOW, BODY_I, VX], v[NOW, BODY_J, VY] - v[NOW, BODY_I, VY]
+    rx, ry = v[NOW, BODY_J, X] - v[NOW, BODY_I, X], v[NOW, BODY_J, Y] - v[NOW, BODY_I, Y]
+    spin = v[NOW, BODY_I, SPIN]
     shear = math.hypot(ux + spin * ry, uy - spin * rx)
-    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
-    return abs(ux * nx + uy * ny), shear + abs(v[NOW, 1, 5] - spin) * size
+    size = min(scene.bodies[BODY_I, BOUNDING_RADIUS], scene.bodies[BODY_J, BOUNDING_RADIUS])
+    return abs(ux * nx + uy * ny), shear + abs(v[NOW, BODY_J, SPIN] - spin) * size
 
 
 def largest_load(memo):
@@ -73,13 +77,9 @@ def arms_hold(work, attraction, load, nx, ny, distance):
     """Whether the attraction along the centres holds against prying about both outer contacts."""
     left_holds, right_holds = False, False
     for row in range(work.tally[CANDIDATES]):
-        if work.geometry[NOW, row, 2] >= 0.0:
+        if work.geometry[NOW, row, GAP] >= 0.0:
             continue
-        # The contact point relative to body 0, from its components along n and t of the pair.
-        g = work.geometry[NOW]
-        shift = 3 if work.candidates[row, 0] == 0 else 5
-        x = g[row, shift + 1] * g[row, 0] + g[row, shift] * g[row, 1]
-        y = g[row, shift + 1] * g[row, 1] - g[row, shift] * g[row, 0]
+        x, y = contact_point(work, row, BODY_I)
         side = nx * y - ny * x
         lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny))
         holds = attraction * abs(side) > load * lever
@@ -92,16 +92,16 @@ def is_certain(scene, work, memo, time, nx, ny, distance):
     """Whether no later load can open the bond."""
     along, shear = relative_speeds(scene, work, nx, ny)
     drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
-    spin = work.motion[NOW, 0, 5]
-    centrifugal = effective_mass(scene, 0, 1) * spin * spin * distance
+    spin = work.motion[NOW, BODY_I, SPIN]
+    centrifugal = effective_mass(scene, BODY_I, BODY_J) * spin * spin * distance
     load = SAFETY * (largest_load(memo) + centrifugal)
     centres = 0.0
     if has_centre_force():
-        view = centre_view(scene, work, time, NOW, 1, 0)
+        view = centre_view(scene, work, time, NOW, BODY_J, BODY_I)
         centres = -centre_force(view, scene.parameters)
     surfaces = surface_attraction(scene, work, time)
-    points = scene.first[2]
-    if points == 2 or surfaces > load - min(centres, 0.0):
+    spheres = len(scene.vertices) == 2
+    if spheres or surfaces > load - min(centres, 0.0):
         return along < CALM * drift and centres + surfaces > load
     if shear > CALM * drift or centres <= load:
         return False
@@ -110,15 +110,15 @@ def is_certain(scene, work, memo, time, nx, ny, distance):
 
 def outer_size(scene):
     """R_i + R_j [m]."""
-    return scene.bodies[0, BOUNDING_RADIUS] + scene.bodies[1, BOUNDING_RADIUS]
+    return scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
 
 
 def doublet_pose(work):
     """Place and angle of body 1 in the frame of body 0, which turns with it."""
     now = work.motion
-    x, y = now[NOW, 1, 0] - now[NOW, 0, 0], now[NOW, 1, 1] - now[NOW, 0, 1]
-    c, s = math.cos(now[NOW, 0, 2]), math.sin(now[NOW, 0, 2])
-    return c * x + s * y, c * y - s * x, now[NOW, 1, 2] - now[NOW, 0, 2]
+    x, y = now[NOW, BODY_J, X] - now[NOW, BODY_I, X], now[NOW, BODY_J, Y] - now[NOW, BODY_I, Y]
+    c, s = math.cos(now[NOW, BODY_I, ANGLE]), math.sin(now[NOW, BODY_I, ANGLE])
+    return c * x + s * y, c * y - s * x, now[NOW, BODY_J, ANGLE] - now[NOW, BODY_I, ANGLE]
 
 
 def start_rest(work, memo, time):
@@ -130,16 +130,16 @@ def start_rest(work, memo, time):
 def has_rested(scene, work, memo, time, nx, ny):
     """Whether the doublet has kept its pose for long enough, its load at the worst."""
     x, y, angle = doublet_pose(work)
-    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
+    size = min(scene.bodies[BODY_I, BOUNDING_RADIUS], scene.bodies[BODY_J, BOUNDING_RADIUS])
     moved = math.hypot(x - memo[REST_X], y - memo[REST_Y]) + abs(angle - memo[REST_ANGLE]) * size
     drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
     if moved > REST * drift * memo[REST_TIME]:
         start_rest(work, memo, time)
         return False
     # A doublet that still swings passes the worst direction, but may yet be thrown open.
-    swing = abs(work.motion[NOW, 0, 5]) * outer_size(scene)
+    swing = abs(work.motion[NOW, BODY_I, SPIN]) * outer_size(scene)
     if swing > CALM * drift:
         return False
     hanging = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y] >= HANGING * drift
-    hanging = hanging or scene.bodies[0, FREE] == 0.0
+    hanging = hanging or scene.bodies[BODY_I, FREE] == 0.0
     return hanging and time - memo[REST_SINCE] >= memo[REST_TIME]

@@ -6,8 +6,8 @@ Departed is a pair that touched, whose outlines are further apart than the escap
 parting now and would part at the steady drift that weight and centre forces give it there.
 """
 
-from flocsim.arrays import BOUNDING_RADIUS, NOW
-from flocsim.ensembles.collision.bonds import has_rested, is_certain, start_rest
+from flocsim.arrays import BOUNDING_RADIUS, NOW, VX, VY
+from flocsim.ensembles.collision.bonds import BODY_I, BODY_J, has_rested, is_certain, start_rest
 from flocsim.ensembles.collision.memo import (
     COLLIDED,
     CROSSED,
@@ -39,7 +39,7 @@ def has_not_touched(memo):
 
 def outline_gap(scene, work):
     """Distance between the two outlines now [m], negative where they overlap."""
-    return gap_between(scene, work, 1, 0)
+    return gap_between(scene, work, BODY_J, BODY_I)
 
 
 def note_collision(work, memo, time, distance):
@@ -54,18 +54,20 @@ def note_collision(work, memo, time, distance):
 def is_parting(scene, work, memo, time, nx, ny):
     """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
     motion = work.motion
-    rate = nx * (motion[NOW, 1, 3] - motion[NOW, 0, 3])
-    rate += ny * (motion[NOW, 1, 4] - motion[NOW, 0, 4])
+    rate = nx * (motion[NOW, BODY_J, VX] - motion[NOW, BODY_I, VX])
+    rate += ny * (motion[NOW, BODY_J, VY] - motion[NOW, BODY_I, VY])
     drift = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y]
     if has_centre_force():
-        repulsion = centre_force(centre_view(scene, work, time, NOW, 1, 0), scene.parameters)
+        repulsion = centre_force(
+            centre_view(scene, work, time, NOW, BODY_J, BODY_I), scene.parameters
+        )
         drift += repulsion * (memo[MOBILITY_I] + memo[MOBILITY_J])
     return rate > 0.0 and drift > 0.0
 
 
 def is_away(scene, work, memo, distance, gap):
     """Whether the outlines are further apart than the escape gap."""
-    far = distance - scene.bodies[0, BOUNDING_RADIUS] - scene.bodies[1, BOUNDING_RADIUS]
+    far = distance - scene.bodies[BODY_I, BOUNDING_RADIUS] - scene.bodies[BODY_J, BOUNDING_RADIUS]
     if far > memo[ESCAPE]:
         return True
     return gap > 0.0 and gap > memo[ESCAPE] * 0.25 and outline_gap(scene, work) > memo[ESCAPE]
@@ -83,7 +85,7 @@ def follow(scene, work, memo, distance):
 
 def watch_pair(scene, work, memo, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
-    nx, ny, distance = centre_line(work, NOW, 1, 0)
+    nx, ny, distance = centre_line(work, NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if memo[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(work, memo, time, distance)

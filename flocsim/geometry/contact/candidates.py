@@ -7,6 +7,7 @@ motion of the two bodies stays within a budget.
 import math
 
 from flocsim.arrays import (
+    ANGLE,
     BOUNDING_RADIUS,
     CANDIDATES,
     EQUIVALENT_RADIUS,
@@ -14,6 +15,11 @@ from flocsim.arrays import (
     NOW,
     RADIUS,
     REBUILDS,
+    SPIN,
+    VX,
+    VY,
+    X,
+    Y,
 )
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
@@ -56,8 +62,8 @@ def list_for_surface_force(scene, work, a, b, skin, reach):
 
 def list_pair(scene, work, a, b):
     """List the candidates of two bodies; how far they may move before it must be made again."""
-    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    ox = work.motion[NOW, a, X] - work.motion[NOW, b, X]
+    oy = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
     reach = surface_reach(scene.parameters)
     skin = skin_of(scene, a, b)
     apart = (
@@ -101,12 +107,12 @@ def moved(scene, work, state, a, b, enough):
     times its size; seen from a, the same holds of b: a doublet that turns as one does not count.
     Where a plainer bound, which needs no turning, stays below ``enough``, that one is given.
     """
-    ox = work.bodies[a, LISTED] - work.bodies[b, LISTED]
-    oy = work.bodies[a, LISTED + 1] - work.bodies[b, LISTED + 1]
-    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
-    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
-    turn_a = since_listing(work, state, a, 2)
-    turn_b = since_listing(work, state, b, 2)
+    ox = work.bodies[a, LISTED + X] - work.bodies[b, LISTED + X]
+    oy = work.bodies[a, LISTED + Y] - work.bodies[b, LISTED + Y]
+    dx = work.motion[state, a, X] - work.motion[state, b, X]
+    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    turn_a = since_listing(work, state, a, ANGLE)
+    turn_b = since_listing(work, state, b, ANGLE)
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
     plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
     if plain < enough:
@@ -134,9 +140,9 @@ def spent(scene, work, state):
 def relative_speed(scene, work, a, b):
     """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
     v = work.motion
-    x, y = v[NOW, a, 0] - v[NOW, b, 0], v[NOW, a, 1] - v[NOW, b, 1]
-    vx, vy = v[NOW, a, 3] - v[NOW, b, 3], v[NOW, a, 4] - v[NOW, b, 4]
-    spin_a, spin_b = v[NOW, a, 5], v[NOW, b, 5]
+    x, y = v[NOW, a, X] - v[NOW, b, X], v[NOW, a, Y] - v[NOW, b, Y]
+    vx, vy = v[NOW, a, VX] - v[NOW, b, VX], v[NOW, a, VY] - v[NOW, b, VY]
+    spin_a, spin_b = v[NOW, a, SPIN], v[NOW, b, SPIN]
     turning = abs(spin_a - spin_b)
     seen_from_b = math.hypot(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
     seen_from_a = math.hypot(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flocsim.arrays import X, Y
 from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
 
 LEAF = 2
@@ -185,11 +186,11 @@ def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, 0], vertices[point, 1])
+        x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(side_b[0], side_b[1], start)
             distance2 = segment_distance2(
-                x, y, vertices[start, 0], vertices[start, 1], vertices[end, 0], vertices[end, 1]
+                x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
             )
             least = min(least, distance2)
     return least

@@ -5,7 +5,21 @@ Both trees of circles are walked against each other (see hierarchy.py), in the f
 
 import math
 
-from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, NOW, RADIUS
+from flocsim.arrays import (
+    ANGLE,
+    CANDIDATES,
+    CLOSED,
+    CLOSEST,
+    EDGE_BODY,
+    EDGE_END,
+    EDGE_START,
+    NOW,
+    RADIUS,
+    VERTEX,
+    VERTEX_BODY,
+    X,
+    Y,
+)
 from flocsim.geometry.contact.circle_tree import (
     START,
     at_leaves,
@@ -24,10 +38,10 @@ from flocsim.geometry.contact.segments import edge_count, edge_end, segment_dist
 
 def pose_of(work, a, b):
     """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
-    x = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    y = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
-    turn = work.motion[NOW, a, 2] - work.motion[NOW, b, 2]
-    c, s = math.cos(work.motion[NOW, b, 2]), math.sin(work.motion[NOW, b, 2])
+    x = work.motion[NOW, a, X] - work.motion[NOW, b, X]
+    y = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
+    turn = work.motion[NOW, a, ANGLE] - work.motion[NOW, b, ANGLE]
+    c, s = math.cos(work.motion[NOW, b, ANGLE]), math.sin(work.motion[NOW, b, ANGLE])
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
@@ -36,8 +50,12 @@ def add_pair(work, a, point, b, start, end):
     row = work.tally[CANDIDATES]
     if row == work.candidates.shape[0]:
         return False
-    work.candidates[row, 0], work.candidates[row, 1] = a, point
-    work.candidates[row, 2], work.candidates[row, 3], work.candidates[row, 4] = b, start, end
+    work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX] = a, point
+    (
+        work.candidates[row, EDGE_BODY],
+        work.candidates[row, EDGE_START],
+        work.candidates[row, EDGE_END],
+    ) = b, start, end
     work.candidates[row, CLOSED], work.candidates[row, CLOSEST] = 0, 0
     work.tally[CANDIDATES] = row + 1
     return True
@@ -51,11 +69,11 @@ def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach)
     start_b, end_b = run_of(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, 0], vertices[point, 1])
+        x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(side_b[0], side_b[1], start)
             distance2 = segment_distance2(
-                x, y, vertices[start, 0], vertices[start, 1], vertices[end, 0], vertices[end, 1]
+                x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
             )
             if distance2 < reach * reach:
                 room = add_pair(work, a, point, b, start, end) and room
@@ -97,8 +115,8 @@ def list_spheres(scene, work, a, b, cutoff):
 
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
-    ox = work.motion[NOW, a, 0] - work.motion[NOW, b, 0]
-    oy = work.motion[NOW, a, 1] - work.motion[NOW, b, 1]
+    ox = work.motion[NOW, a, X] - work.motion[NOW, b, X]
+    oy = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
     return math.sqrt(ox * ox + oy * oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
 
 

@@ -3,16 +3,39 @@
 A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
 vertex–edge method); two spheres are one pair of points.
 
-A row of ``geometry`` is (n_x, n_y, gap, a_n, a_t, b_n, b_t, c): n points from the foot on the edge
-to the vertex, t = (−n_y, n_x), and a_n, a_t are the moments of unit forces n and t, applied at the
-middle of the overlap, about the centroid of the vertex's body; b_n, b_t about that of the edge's.
-The normal turns by c for every metre by which the vertex is shifted along t: 0 where the foot lies
-inside the edge, which alone turns it then, 1/distance where it is an end.
+A row of ``geometry`` has the columns NORMAL_X … TURNING of flocsim.arrays. The normal n points from
+the foot on the edge to the vertex, t = (−n_y, n_x). It turns by TURNING for every metre by which
+the vertex is shifted along t: 0 where the foot lies inside the edge, which alone turns it then,
+1/distance where it is an end.
 """
 
 import math
 
-from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, COSINE, NOW, RADIUS, SINE
+from flocsim.arrays import (
+    ANGLE,
+    CANDIDATES,
+    CLOSED,
+    CLOSEST,
+    COSINE,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
+    EDGE_END,
+    EDGE_START,
+    GAP,
+    NORMAL_X,
+    NORMAL_Y,
+    NOW,
+    RADIUS,
+    SINE,
+    TURNING,
+    VERTEX,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
+    X,
+    Y,
+)
 from flocsim.geometry.contact.segments import closest_share
 
 TINY = 1e-300
@@ -22,14 +45,14 @@ TINY = 1e-300
 def turn_bodies(work, state):
     """Cosine and sine of every body's angle in a state, into ``work.bodies``."""
     for body in range(work.bodies.shape[0]):
-        work.bodies[body, COSINE] = math.cos(work.motion[state, body, 2])
-        work.bodies[body, SINE] = math.sin(work.motion[state, body, 2])
+        work.bodies[body, COSINE] = math.cos(work.motion[state, body, ANGLE])
+        work.bodies[body, SINE] = math.sin(work.motion[state, body, ANGLE])
 
 
 def turned(scene, work, body, point):
     """A core point relative to its body's centroid, in the frame of the scene."""
-    x = scene.vertices[point, 0]
-    y = scene.vertices[point, 1]
+    x = scene.vertices[point, X]
+    y = scene.vertices[point, Y]
     c = work.bodies[body, COSINE]
     s = work.bodies[body, SINE]
     return c * x - s * y, s * x + c * y
@@ -38,25 +61,29 @@ def turned(scene, work, body, point):
 def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning):
     """Write one geometry row from the normal and the two arms of the contact point."""
     geometry = work.geometry
-    geometry[state, row, 0] = nx
-    geometry[state, row, 1] = ny
-    geometry[state, row, 2] = gap
-    geometry[state, row, 3] = ax * ny - ay * nx
-    geometry[state, row, 4] = ax * nx + ay * ny
-    geometry[state, row, 5] = bx * ny - by * nx
-    geometry[state, row, 6] = bx * nx + by * ny
-    geometry[state, row, 7] = turning
+    geometry[state, row, NORMAL_X] = nx
+    geometry[state, row, NORMAL_Y] = ny
+    geometry[state, row, GAP] = gap
+    geometry[state, row, VERTEX_ARM_N] = ax * ny - ay * nx
+    geometry[state, row, VERTEX_ARM_T] = ax * nx + ay * ny
+    geometry[state, row, EDGE_ARM_N] = bx * ny - by * nx
+    geometry[state, row, EDGE_ARM_T] = bx * nx + by * ny
+    geometry[state, row, TURNING] = turning
 
 
 def locate_polygons(scene, work, state, row):
     """Geometry of one vertex–edge pair; a vertex right on the edge gets an arbitrary normal."""
-    a, point = work.candidates[row, 0], work.candidates[row, 1]
-    b, start, end = work.candidates[row, 2], work.candidates[row, 3], work.candidates[row, 4]
+    a, point = work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX]
+    b, start, end = (
+        work.candidates[row, EDGE_BODY],
+        work.candidates[row, EDGE_START],
+        work.candidates[row, EDGE_END],
+    )
     px, py = turned(scene, work, a, point)
     sx, sy = turned(scene, work, b, start)
     ex, ey = turned(scene, work, b, end)
-    ox = work.motion[state, a, 0] - work.motion[state, b, 0]
-    oy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    ox = work.motion[state, a, X] - work.motion[state, b, X]
+    oy = work.motion[state, a, Y] - work.motion[state, b, Y]
     share = closest_share(px + ox, py + oy, sx, sy, ex, ey)
     fx = sx + share * (ex - sx)
     fy = sy + share * (ey - sy)
@@ -76,10 +103,10 @@ def locate_polygons(scene, work, state, row):
 
 def locate_spheres(scene, work, state, row):
     """Geometry of two spheres: nothing to turn."""
-    a = work.candidates[row, 0]
-    b = work.candidates[row, 2]
-    ox = work.motion[state, a, 0] - work.motion[state, b, 0]
-    oy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    a = work.candidates[row, VERTEX_BODY]
+    b = work.candidates[row, EDGE_BODY]
+    ox = work.motion[state, a, X] - work.motion[state, b, X]
+    oy = work.motion[state, a, Y] - work.motion[state, b, Y]
     distance = math.sqrt(ox * ox + oy * oy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:
@@ -97,7 +124,7 @@ def locate_contacts(scene, work, state):
     least = math.inf
     for row in range(work.tally[CANDIDATES]):
         locate_polygons(scene, work, state, row)
-        least = min(least, work.geometry[state, row, 2])
+        least = min(least, work.geometry[state, row, GAP])
     return least
 
 
@@ -113,5 +140,5 @@ def least_listed_gap(work):
     """The smallest gap among the listed pairs now (inf where none is listed)."""
     least = math.inf
     for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[NOW, row, 2])
+        least = min(least, work.geometry[NOW, row, GAP])
     return least

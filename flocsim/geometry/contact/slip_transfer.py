@@ -2,7 +2,25 @@
 
 import math
 
-from flocsim.arrays import CANDIDATES, KEPT, NOW
+from flocsim.arrays import (
+    CANDIDATES,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
+    EDGE_START,
+    GAP,
+    KEPT,
+    KEPT_EDGE,
+    KEPT_SLIP,
+    KEPT_VERTEX,
+    NORMAL_X,
+    NORMAL_Y,
+    NOW,
+    VERTEX,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
+)
 
 
 def keep_slips(work):
@@ -15,9 +33,9 @@ def keep_slips(work):
     count = 0
     for row in range(work.tally[CANDIDATES]):
         if work.slip[NOW, row] != 0.0:
-            work.kept[count, 0] = work.candidates[row, 1]
-            work.kept[count, 1] = work.candidates[row, 3]
-            work.kept[count, 2] = work.slip[NOW, row]
+            work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
+            work.kept[count, KEPT_EDGE] = work.candidates[row, EDGE_START]
+            work.slip[KEPT_SLIP, count] = work.slip[NOW, row]
             count += 1
     work.tally[KEPT] = count + 1
     return count
@@ -28,9 +46,9 @@ def restore_slips(work, count):
     for row in range(work.tally[CANDIDATES]):
         work.slip[NOW, row] = 0.0
         for k in range(count):
-            same = work.kept[k, 0] == work.candidates[row, 1]
-            if same and work.kept[k, 1] == work.candidates[row, 3]:
-                work.slip[NOW, row] = work.kept[k, 2]
+            same = work.kept[k, KEPT_VERTEX] == work.candidates[row, VERTEX]
+            if same and work.kept[k, KEPT_EDGE] == work.candidates[row, EDGE_START]:
+                work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
     work.tally[KEPT] = 0
 
 
@@ -38,12 +56,12 @@ def nearest_active(work, row):
     """The closed pair of the same two bodies nearest to an opening one, −1 where none is left."""
     found = -1
     least = math.inf
-    low = min(work.candidates[row, 0], work.candidates[row, 2])
-    high = max(work.candidates[row, 0], work.candidates[row, 2])
+    low = min(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
+    high = max(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
     x, y = contact_point(work, row, low)
     for other in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[other, 0], work.candidates[other, 2]
-        if work.geometry[NOW, other, 2] < 0.0 and min(a, b) == low and max(a, b) == high:
+        a, b = work.candidates[other, VERTEX_BODY], work.candidates[other, EDGE_BODY]
+        if work.geometry[NOW, other, GAP] < 0.0 and min(a, b) == low and max(a, b) == high:
             ox, oy = contact_point(work, other, low)
             distance = (ox - x) ** 2 + (oy - y) ** 2
             if distance < least:
@@ -55,9 +73,11 @@ def nearest_active(work, row):
 def contact_point(work, row, body):
     """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
     geometry = work.geometry[NOW]
-    nx, ny = geometry[row, 0], geometry[row, 1]
-    shift = 3 if work.candidates[row, 0] == body else 5
-    across, along = geometry[row, shift], geometry[row, shift + 1]
+    nx, ny = geometry[row, NORMAL_X], geometry[row, NORMAL_Y]
+    if work.candidates[row, VERTEX_BODY] == body:
+        across, along = geometry[row, VERTEX_ARM_N], geometry[row, VERTEX_ARM_T]
+    else:
+        across, along = geometry[row, EDGE_ARM_N], geometry[row, EDGE_ARM_T]
     return along * nx + across * ny, along * ny - across * nx
 
 
@@ -68,7 +88,7 @@ def hand_over(work):
     last pair it vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[CANDIDATES]):
-        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, 2] >= 0.0:
+        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0:
             heir = nearest_active(work, row)
             if heir >= 0:
                 work.slip[NOW, heir] += work.slip[NOW, row] * tangent_agreement(work, row, heir)
@@ -81,7 +101,10 @@ def tangent_agreement(work, row, other):
     A pair listed the other way round has the opposite tangent, and its slip the same sign.
     """
     geometry = work.geometry[NOW]
-    cosine = geometry[row, 0] * geometry[other, 0] + geometry[row, 1] * geometry[other, 1]
-    if work.candidates[row, 0] == work.candidates[other, 0]:
+    cosine = (
+        geometry[row, NORMAL_X] * geometry[other, NORMAL_X]
+        + geometry[row, NORMAL_Y] * geometry[other, NORMAL_Y]
+    )
+    if work.candidates[row, VERTEX_BODY] == work.candidates[other, VERTEX_BODY]:
         return cosine
     return -cosine

@@ -3,7 +3,17 @@
 The motion in the step is interpolated; the integrator then takes a shorter step that ends there.
 """
 
-from flocsim.arrays import CANDIDATES, CLOSEST, NEW, NOW, SCRATCH
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSEST,
+    EDGE_BODY,
+    GAP,
+    NEW,
+    NOW,
+    TRIAL,
+    VELOCITY,
+    VERTEX_BODY,
+)
 from flocsim.geometry.contact.points import locate_polygons, turn_bodies
 from flocsim.hooks import surface_reach
 from flocsim.integrators.events.resolution import memory_of, release_grain, touch_grain
@@ -17,26 +27,26 @@ MOST_TRIALS = 60
 
 
 def interpolate(work, step, share):
-    """Write the motion at a share of the step into SCRATCH: the cubic through both of its ends."""
+    """Write the motion at a share of the step into TRIAL: the cubic through both of its ends."""
     motion = work.motion
     rest = 1.0 - share
     for body in range(motion.shape[1]):
         for axis in range(3):
             change = motion[NEW, body, axis] - motion[NOW, body, axis]
-            start = step * motion[NOW, body, 3 + axis] - change
-            end = change - step * motion[NEW, body, 3 + axis]
+            start = step * motion[NOW, body, VELOCITY + axis] - change
+            end = change - step * motion[NEW, body, VELOCITY + axis]
             bend = rest * start + share * end
-            motion[SCRATCH, body, axis] = (
+            motion[TRIAL, body, axis] = (
                 motion[NOW, body, axis] + share * change + share * rest * bend
             )
             slope = change + (rest - share) * bend + share * rest * (end - start)
-            motion[SCRATCH, body, 3 + axis] = slope / step
+            motion[TRIAL, body, VELOCITY + axis] = slope / step
 
 
 def same_bodies(work, row, other):
     """Whether two rows belong to the same two bodies, either way round."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
-    c, d = work.candidates[other, 0], work.candidates[other, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    c, d = work.candidates[other, VERTEX_BODY], work.candidates[other, EDGE_BODY]
     return (a == c and b == d) or (a == d and b == c)
 
 
@@ -54,10 +64,10 @@ def margin(work, state, row, rival):
     Without a rival: the gap of a pair that is open now, the overlap of a closed one; otherwise how
     much further the pair is apart than its closest rival.
     """
-    gap = work.geometry[state, row, 2]
+    gap = work.geometry[state, row, GAP]
     if rival >= 0:
-        return gap - work.geometry[state, rival, 2]
-    return -gap if work.geometry[NOW, row, 2] < 0.0 else gap
+        return gap - work.geometry[state, rival, GAP]
+    return -gap if work.geometry[NOW, row, GAP] < 0.0 else gap
 
 
 def margin_rate(work, state, row, rival):
@@ -65,17 +75,17 @@ def margin_rate(work, state, row, rival):
     rate = normal_rate(work, state, row)
     if rival >= 0:
         return rate - normal_rate(work, state, rival)
-    return -rate if work.geometry[NOW, row, 2] < 0.0 else rate
+    return -rate if work.geometry[NOW, row, GAP] < 0.0 else rate
 
 
 def look_at(scene, work, step, share, row, rival):
     """Locate a pair and its rival at a share of the step; the margin."""
     interpolate(work, step, share)
-    turn_bodies(work, SCRATCH)
-    locate_polygons(scene, work, SCRATCH, row)
+    turn_bodies(work, TRIAL)
+    locate_polygons(scene, work, TRIAL, row)
     if rival >= 0:
-        locate_polygons(scene, work, SCRATCH, rival)
-    return margin(work, SCRATCH, row, rival)
+        locate_polygons(scene, work, TRIAL, rival)
+    return margin(work, TRIAL, row, rival)
 
 
 def lowest_share(scene, work, step, row, rival):
@@ -85,16 +95,16 @@ def lowest_share(scene, work, step, row, rival):
     rate_high = step * margin_rate(work, NEW, row, rival)
     if not rate_low < 0.0 < rate_high:
         return NEVER
-    margins = margin(work, NOW, row, rival), margin(work, NEW, row, rival)
+    at_start, at_end = margin(work, NOW, row, rival), margin(work, NEW, row, rival)
     # Straight lines from both ends bound what a convex margin can fall to.
-    if margins[0] + rate_low * 0.5 > 0.0 and margins[1] - rate_high * 0.5 > 0.0:
+    if at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0:
         return NEVER
     share = 0.5
     for _ in range(8):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
         share = min(max(share, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
         look_at(scene, work, step, share, row, rival)
-        rate = step * margin_rate(work, SCRATCH, row, rival)
+        rate = step * margin_rate(work, TRIAL, row, rival)
         if rate < 0.0:
             low, rate_low = share, rate
         else:
@@ -141,7 +151,7 @@ def collides(work, step, row, depth):
 
 def unnoticed(scene, work, step, row, grain, depth):
     """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
-    before, after = work.geometry[NOW, row, 2], work.geometry[NEW, row, 2]
+    before, after = work.geometry[NOW, row, GAP], work.geometry[NEW, row, GAP]
     if before < 0.0 <= after:
         return release_grain(scene, work, NEW, row, grain)
     if before >= 0.0 > after and collides(work, step, row, depth):
@@ -156,7 +166,7 @@ def switch_of(scene, work, step, row, rival, earliest, grain, depth):
         limit = unnoticed(scene, work, step, row, grain, depth)
         grain = min(grain, limit)
     if margin(work, NEW, row, rival) >= -limit:
-        if rival < 0 and work.geometry[NOW, row, 2] < 0.0:
+        if rival < 0 and work.geometry[NOW, row, GAP] < 0.0:
             return earliest
         lowest = lowest_share(scene, work, step, row, rival)
         if lowest > high:

@@ -2,7 +2,7 @@
 
 import math
 
-from flocsim.arrays import CANDIDATES, NEW, NOW, TOLERANCE
+from flocsim.arrays import CANDIDATES, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import awaits_touch
@@ -25,7 +25,7 @@ def deepest_overlap(work):
     """The largest overlap of a listed pair now [m], at least 0."""
     deepest = 0.0
     for row in range(work.tally[CANDIDATES]):
-        deepest = max(deepest, -work.geometry[NOW, row, 2])
+        deepest = max(deepest, -work.geometry[NOW, row, GAP])
     return deepest
 
 

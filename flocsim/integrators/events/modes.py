@@ -5,7 +5,7 @@ step the flags stay as they are, so that the forces are smooth functions of the 
 ends the step where a flag would change (see switches.py).
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, NOW
+from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, GAP, NOW
 from flocsim.hooks import surface_reach
 from flocsim.integrators.rhs.views import closest_rows
 
@@ -24,7 +24,7 @@ def set_modes(scene, work, state=NOW):
         if work.candidates[closest, CLOSEST] != wanted:
             changed = max(changed, OTHER_CLOSEST)
         for each in range(row, end):
-            closed = 1 if work.geometry[state, each, 2] < 0.0 else 0
+            closed = 1 if work.geometry[state, each, GAP] < 0.0 else 0
             if work.candidates[each, CLOSED] != closed:
                 changed = OTHER_CONTACTS
             work.candidates[each, CLOSED] = closed

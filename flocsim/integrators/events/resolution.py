@@ -6,7 +6,7 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 
 import math
 
-from flocsim.arrays import MEMORY
+from flocsim.arrays import EDGE_BODY, MEMORY, VERTEX_BODY
 from flocsim.hooks import contact_force
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
 
@@ -45,7 +45,7 @@ def bounces(view, speed, frequency, parameters):
 
 def memory_of(work, row):
     """How long a velocity of either body of a pair is remembered [s]."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
 
 

@@ -4,15 +4,19 @@ import math
 
 from flocsim.arrays import (
     CANDIDATES,
-    CLOSED,
     CODE,
+    EDGE_BODY,
     ERROR,
+    GAP,
     LOCATED,
     MAX_STEPS,
+    MOTION_COLUMNS,
     NEW,
     NOW,
     PAUSE_AT,
     RADIUS,
+    RECORD_MOTION,
+    RECORD_TIME,
     RECORDED,
     REJECTED,
     STEP_ERROR,
@@ -20,6 +24,7 @@ from flocsim.arrays import (
     TIME,
     TOLERANCE,
     UNTIL,
+    VERTEX_BODY,
 )
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.candidates import list_candidates, spent
@@ -29,6 +34,7 @@ from flocsim.hooks import attempt, has_contact, observe, surface_reach
 from flocsim.integrators.events.first_event import switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
+from flocsim.integrators.rhs.forces import copy_state
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10
@@ -42,29 +48,17 @@ MOST_TRIALS = 12
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
     for row in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[row, 0], work.candidates[row, 2]
-        if -work.geometry[NOW, row, 2] > DEEPEST_OVERLAP * (
+        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        if -work.geometry[NOW, row, GAP] > DEEPEST_OVERLAP * (
             scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
         ):
             return True
     return False
 
 
-def take_new_state(work):
-    """Make the new state the current one."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            work.motion[NOW, body, axis] = work.motion[NEW, body, axis]
-    for row in range(work.tally[CANDIDATES]):
-        for column in range(work.geometry.shape[2]):
-            work.geometry[NOW, row, column] = work.geometry[NEW, row, column]
-        if work.candidates[row, CLOSED] == 1:
-            work.slip[NOW, row] = work.slip[NEW, row]
-
-
 def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
-    take_new_state(work)
+    copy_state(work, NEW, NOW)
     clock[TIME] += step
     counts[STEPS] += 1
     clock[ERROR] += clock[STEP_ERROR]
@@ -78,10 +72,10 @@ def accept(scene, work, clock, counts, step, lists):
 def record_row(work, clock, counts, record):
     """Write the current state to the record (rows of time, then six numbers for each body)."""
     row = counts[RECORDED]
-    record[row, 0] = clock[TIME]
+    record[row, RECORD_TIME] = clock[TIME]
     for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            record[row, 1 + 6 * body + axis] = work.motion[NOW, body, axis]
+        for axis in range(MOTION_COLUMNS):
+            record[row, RECORD_MOTION + MOTION_COLUMNS * body + axis] = work.motion[NOW, body, axis]
     counts[RECORDED] = row + 1
 
 

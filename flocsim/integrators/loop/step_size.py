@@ -8,6 +8,7 @@ import math
 from flocsim.arrays import (
     BEARABLE_STEP,
     CANDIDATES,
+    GAP,
     LARGEST_STEP,
     NOW,
     PREVIOUS_RATIO,
@@ -89,7 +90,7 @@ def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
     grain = grain_of(work, clock)
     for row in range(work.tally[CANDIDATES]):
-        gap = work.geometry[NOW, row, 2]
+        gap = work.geometry[NOW, row, GAP]
         if 0.0 <= gap < clock[TOLERANCE]:
             rate = normal_rate(work, NOW, row)
             if gap * rate < 0.0:

@@ -1,7 +1,7 @@
 """The cubic through the stages of a Radau IIA step: the motion in it, the guess for the next."""
 
-from flocsim.arrays import FIRST, NEW, NOW, SCRATCH, SECOND, STAGED_AT, STAGED_STEP, START, TIME
-from flocsim.integrators.radau.tableau import NODES
+from flocsim.arrays import FIRST_STAGE, NOW, STAGED_AT, STAGED_STEP, START, TIME, TRIAL, VELOCITY
+from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 
 LONGEST_GUESS = 2.0
 """The last step's cubic is carried on for a step that is at most so many times as long."""
@@ -26,39 +26,43 @@ def stage_weights(share):
 def weighted(work, body, axis, weights):
     """The cubic through START and the stages."""
     motion = work.motion
-    value = weights[0] * motion[START, body, axis] + weights[1] * motion[FIRST, body, axis]
-    return value + weights[2] * motion[SECOND, body, axis] + weights[3] * motion[NEW, body, axis]
+    start, first, second, third = weights
+    value = start * motion[START, body, axis] + first * motion[FIRST_STAGE, body, axis]
+    value += second * motion[SECOND_STAGE, body, axis]
+    return value + third * motion[THIRD_STAGE, body, axis]
 
 
 def collocate(work, step, share):
-    """Write the motion at a share of the step into SCRATCH: the cubic through the stages."""
+    """Write the motion at a share of the step into TRIAL: the cubic through the stages."""
     weights = stage_weights(share)
     for body in range(work.motion.shape[1]):
         for axis in range(6):
-            work.motion[SCRATCH, body, axis] = weighted(work, body, axis, weights)
+            work.motion[TRIAL, body, axis] = weighted(work, body, axis, weights)
 
 
 def keep_velocities(work):
     """First guess: the velocities stay as they are."""
     for body in range(work.motion.shape[1]):
-        for axis in range(3, 6):
+        for axis in range(VELOCITY, VELOCITY + 3):
             for stage in range(3):
-                work.motion[FIRST + stage, body, axis] = work.motion[NOW, body, axis]
+                work.motion[FIRST_STAGE + stage, body, axis] = work.motion[NOW, body, axis]
 
 
 def carry_on(work, begin, scale):
     """First guess: the cubic of the stages that are there, whose step began ``begin`` of it ago."""
-    first = stage_weights(begin + NODES[0] * scale)
-    second = stage_weights(begin + NODES[1] * scale)
-    third = stage_weights(begin + NODES[2] * scale)
+    one, two, three = NODES
+    first = stage_weights(begin + one * scale)
+    second = stage_weights(begin + two * scale)
+    third = stage_weights(begin + three * scale)
     for body in range(work.motion.shape[1]):
-        for axis in range(3, 6):
-            one = weighted(work, body, axis, first)
-            two = weighted(work, body, axis, second)
-            three = weighted(work, body, axis, third)
-            work.motion[FIRST, body, axis] = one
-            work.motion[SECOND, body, axis] = two
-            work.motion[NEW, body, axis] = three
+        for axis in range(VELOCITY, VELOCITY + 3):
+            guesses = (
+                weighted(work, body, axis, first),
+                weighted(work, body, axis, second),
+                weighted(work, body, axis, third),
+            )
+            for stage in range(3):
+                work.motion[FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
 def guess_stages(work, clock, step):

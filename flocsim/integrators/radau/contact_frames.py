@@ -15,21 +15,42 @@ Newton's method adds keeps their momentum however far it has come.
 import math
 
 from flocsim.arrays import (
+    BODY_COLUMNS,
     CANDIDATES,
+    CHANGE,
     CLOSED,
     CLOSEST,
-    CLUSTER,
-    FIRST,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
+    FIRST_STAGE,
+    FRAME_COLUMNS,
     FRAMES,
     FREE,
     MASS,
+    MASS_SUM,
+    MOST_FRAMES,
+    NORMAL_X,
+    NORMAL_Y,
     NOW,
-    SCRATCH,
+    SHIFT_SUM,
+    SHIFT_X,
+    SHIFT_Y,
+    SPIN,
+    TURN_COSINE,
+    TURN_SINE,
+    VELOCITY,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
 )
 from flocsim.hooks import has_centre_force
 
-COLUMNS = 4
-"""For each stage: cosine and sine of the turn, and both entries of s."""
+SIDES = (
+    (VERTEX_BODY, VERTEX_ARM_N, VERTEX_ARM_T),
+    (EDGE_BODY, EDGE_ARM_N, EDGE_ARM_T),
+)
+"""Columns of the vertex's and of the edge's body in a pair: its number, its arms."""
 
 
 def acts(work, row):
@@ -39,73 +60,75 @@ def acts(work, row):
 
 def join(scene, work, a, b):
     """Make one cluster of those of two bodies, named by its first body, if both are free."""
-    one, other = work.bodies[a, CLUSTER], work.bodies[b, CLUSTER]
+    one, other = work.cluster[a], work.cluster[b]
     if one != other and scene.bodies[a, FREE] * scene.bodies[b, FREE] == 1.0:
         for body in range(work.bodies.shape[0]):
-            if work.bodies[body, CLUSTER] == max(one, other):
-                work.bodies[body, CLUSTER] = min(one, other)
+            if work.cluster[body] == max(one, other):
+                work.cluster[body] = min(one, other)
 
 
 def gather_clusters(scene, work):
     """Name, for each free body, the first one of those that it acts on, directly or not."""
     for body in range(work.bodies.shape[0]):
-        work.bodies[body, CLUSTER] = body
+        work.cluster[body] = body
     if has_centre_force():
         for body in range(1, work.bodies.shape[0]):
             join(scene, work, body - 1, body)
     for row in range(work.tally[CANDIDATES]):
         if acts(work, row):
-            join(scene, work, work.candidates[row, 0], work.candidates[row, 2])
+            join(scene, work, work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
 
 
 def clear_frames(work):
     """No contact seen yet."""
     for body in range(work.bodies.shape[0]):
-        for column in range(FRAMES, FRAMES + 3 * COLUMNS):
+        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
             work.bodies[body, column] = 0.0
 
 
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
-    g = work.geometry
-    ox, oy = g[NOW, row, 0], g[NOW, row, 1]
-    nx, ny = g[FIRST + stage, row, 0], g[FIRST + stage, row, 1]
-    column = FRAMES + COLUMNS * stage
-    for which in range(2):
-        body = work.candidates[row, 2 * which]
-        across = g[NOW, row, 3 + 2 * which] - g[FIRST + stage, row, 3 + 2 * which]
-        along = g[NOW, row, 4 + 2 * which] - g[FIRST + stage, row, 4 + 2 * which]
-        work.bodies[body, column] += ox * nx + oy * ny
-        work.bodies[body, column + 1] += ox * ny - oy * nx
-        work.bodies[body, column + 2] += across * nx - along * ny
-        work.bodies[body, column + 3] += across * ny + along * nx
+    g, state = work.geometry, FIRST_STAGE + stage
+    ox, oy = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    nx, ny = g[state, row, NORMAL_X], g[state, row, NORMAL_Y]
+    frame = FRAMES + FRAME_COLUMNS * stage
+    for body_column, arm_n, arm_t in SIDES:
+        body = work.candidates[row, body_column]
+        across = g[NOW, row, arm_n] - g[state, row, arm_n]
+        along = g[NOW, row, arm_t] - g[state, row, arm_t]
+        work.bodies[body, frame + TURN_COSINE] += ox * nx + oy * ny
+        work.bodies[body, frame + TURN_SINE] += ox * ny - oy * nx
+        work.bodies[body, frame + SHIFT_X] += across * nx - along * ny
+        work.bodies[body, frame + SHIFT_Y] += across * ny + along * nx
 
 
 def average_shifts(work):
     """Make means of the sums of s, and add each body's turns to its cluster's."""
     for body in range(work.bodies.shape[0]):
-        leader = int(work.bodies[body, CLUSTER])
-        for column in range(FRAMES, FRAMES + 3 * COLUMNS, COLUMNS):
-            cosine, sine = work.bodies[body, column], work.bodies[body, column + 1]
+        leader = work.cluster[body]
+        for frame in range(FRAMES, BODY_COLUMNS, FRAME_COLUMNS):
+            cosine = work.bodies[body, frame + TURN_COSINE]
+            sine = work.bodies[body, frame + TURN_SINE]
             size = math.hypot(cosine, sine)
             if size > 0.0:
-                work.bodies[body, column + 2] /= size
-                work.bodies[body, column + 3] /= size
+                work.bodies[body, frame + SHIFT_X] /= size
+                work.bodies[body, frame + SHIFT_Y] /= size
             if leader != body:
-                work.bodies[leader, column] += cosine
-                work.bodies[leader, column + 1] += sine
+                work.bodies[leader, frame + TURN_COSINE] += cosine
+                work.bodies[leader, frame + TURN_SINE] += sine
 
 
 def share_turns(work):
     """Give each body its cluster's turns; none where nothing touches."""
     for body in range(work.bodies.shape[0]):
-        leader = int(work.bodies[body, CLUSTER])
-        for column in range(FRAMES, FRAMES + 3 * COLUMNS, COLUMNS):
+        leader = work.cluster[body]
+        for frame in range(FRAMES, BODY_COLUMNS, FRAME_COLUMNS):
             # Leaders come first, and have the cosine and sine of their sums by then.
-            cosine, sine = work.bodies[leader, column], work.bodies[leader, column + 1]
+            cosine = work.bodies[leader, frame + TURN_COSINE]
+            sine = work.bodies[leader, frame + TURN_SINE]
             size = math.hypot(cosine, sine)
-            work.bodies[body, column] = cosine / size if size > 0.0 else 1.0
-            work.bodies[body, column + 1] = sine / size if size > 0.0 else 0.0
+            work.bodies[body, frame + TURN_COSINE] = cosine / size if size > 0.0 else 1.0
+            work.bodies[body, frame + TURN_SINE] = sine / size if size > 0.0 else 0.0
 
 
 def follow_contacts(work):
@@ -119,38 +142,50 @@ def follow_contacts(work):
     share_turns(work)
 
 
+def turn_at(work, body, stage):
+    """Cosine and sine of the turn of a body's frame at a stage."""
+    frame = FRAMES + FRAME_COLUMNS * stage
+    return work.bodies[body, frame + TURN_COSINE], work.bodies[body, frame + TURN_SINE]
+
+
+def shift_at(work, body, stage):
+    """s of a body's frame at a stage [m]."""
+    frame = FRAMES + FRAME_COLUMNS * stage
+    return work.bodies[body, frame + SHIFT_X], work.bodies[body, frame + SHIFT_Y]
+
+
 def velocity_on(work, body, stage, x, y):
     """A velocity of the start's frame as it stands at a stage."""
-    column = FRAMES + COLUMNS * stage
-    cosine, sine = work.bodies[body, column], work.bodies[body, column + 1]
+    cosine, sine = turn_at(work, body, stage)
     return cosine * x - sine * y, sine * x + cosine * y
 
 
 def force_back(work, body, stage, x, y, torque):
     """A force with its torque at a stage, as it is in the start's frame: of the same power."""
-    column = FRAMES + COLUMNS * stage
-    cosine, sine = work.bodies[body, column], work.bodies[body, column + 1]
-    torque += x * work.bodies[body, column + 2] + y * work.bodies[body, column + 3]
+    cosine, sine = turn_at(work, body, stage)
+    shift_x, shift_y = shift_at(work, body, stage)
+    torque += x * shift_x + y * shift_y
     return cosine * x + sine * y, cosine * y - sine * x, torque
 
 
 def add_shifts(scene, work, stage):
-    """Add s ω less its mean over the cluster, for the changes of velocity that SCRATCH holds."""
-    changes, column = work.motion, FRAMES + COLUMNS * stage + 2
-    for body in range(work.bodies.shape[0]):
-        for axis in range(3):
-            changes[SCRATCH, body, axis] = 0.0
-    for body in range(work.bodies.shape[0]):
-        leader = int(work.bodies[body, CLUSTER])
-        mass, spin = scene.bodies[body, MASS], changes[SCRATCH, body, 5]
-        changes[SCRATCH, leader, 2] += mass
+    """Add s ω less its mean over the cluster, for the changes of velocity that CHANGE holds."""
+    change, bodies = work.motion, work.bodies
+    for body in range(bodies.shape[0]):
+        bodies[body, MASS_SUM] = 0.0
         for axis in range(2):
-            shift = spin * work.bodies[body, column + axis]
-            changes[SCRATCH, leader, axis] += mass * shift
-            changes[SCRATCH, body, 3 + axis] += shift
-    for body in range(work.bodies.shape[0]):
-        leader = int(work.bodies[body, CLUSTER])
+            bodies[body, SHIFT_SUM + axis] = 0.0
+    for body in range(bodies.shape[0]):
+        leader = work.cluster[body]
+        mass, spin = scene.bodies[body, MASS], change[CHANGE, body, SPIN]
+        bodies[leader, MASS_SUM] += mass
+        for axis in range(2):
+            shift = spin * bodies[body, FRAMES + FRAME_COLUMNS * stage + SHIFT_X + axis]
+            bodies[leader, SHIFT_SUM + axis] += mass * shift
+            change[CHANGE, body, VELOCITY + axis] += shift
+    for body in range(bodies.shape[0]):
+        leader = work.cluster[body]
         if scene.bodies[body, FREE] == 1.0:
             for axis in range(2):
-                mean = changes[SCRATCH, leader, axis] / changes[SCRATCH, leader, 2]
-                changes[SCRATCH, body, 3 + axis] -= mean
+                mean = bodies[leader, SHIFT_SUM + axis] / bodies[leader, MASS_SUM]
+                change[CHANGE, body, VELOCITY + axis] -= mean

@@ -9,22 +9,24 @@ import math
 
 from flocsim.arrays import (
     CANDIDATES,
+    CHANGE,
     CLOSED,
-    FIRST,
+    FIRST_STAGE,
     MEMORY,
+    NEW,
     NOW,
     PACE,
-    SCRATCH,
     SLIP_RATES,
     SOLVES,
     TIME,
+    VELOCITY,
 )
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve, write_changes, write_loads
-from flocsim.integrators.radau.tableau import MATRIX, NODES
+from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
-from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces
+from flocsim.integrators.rhs.forces import copy_state, locate_and_rate, rate_slips, sum_forces
 from flocsim.integrators.rhs.views import lever
 
 MOST_ITERATIONS = 10
@@ -43,35 +45,35 @@ def place_stages(work, step):
     for body in range(motion.shape[1]):
         for axis in range(3):
             for stage in range(3):
-                weights = MATRIX[stage]
-                mean = weights[0] * motion[FIRST, body, 3 + axis]
-                mean += weights[1] * motion[FIRST + 1, body, 3 + axis]
-                mean += weights[2] * motion[FIRST + 2, body, 3 + axis]
-                motion[FIRST + stage, body, axis] = motion[NOW, body, axis] + step * mean
+                first, second, third = MATRIX[stage]
+                mean = first * motion[FIRST_STAGE, body, VELOCITY + axis]
+                mean += second * motion[SECOND_STAGE, body, VELOCITY + axis]
+                mean += third * motion[THIRD_STAGE, body, VELOCITY + axis]
+                motion[FIRST_STAGE + stage, body, axis] = motion[NOW, body, axis] + step * mean
 
 
 def slip_stages(work, step):
     """Tangential displacements at the stages from their rates there."""
     slip = work.slip
-    rates = SLIP_RATES + FIRST
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             for stage in range(3):
-                weights = MATRIX[stage]
-                mean = weights[0] * slip[rates, row] + weights[1] * slip[rates + 1, row]
-                mean += weights[2] * slip[rates + 2, row]
-                slip[FIRST + stage, row] = slip[NOW, row] + step * mean
+                first, second, third = MATRIX[stage]
+                mean = first * slip[SLIP_RATES + FIRST_STAGE, row]
+                mean += second * slip[SLIP_RATES + SECOND_STAGE, row]
+                mean += third * slip[SLIP_RATES + THIRD_STAGE, row]
+                slip[FIRST_STAGE + stage, row] = slip[NOW, row] + step * mean
 
 
 def evaluate_states(scene, work, time, step, first, last):
-    """Forces in the states from ``first`` to before ``last``; NOW is state 0, the stages follow."""
+    """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
-        locate_and_rate(scene, work, state, state)
-    if last > FIRST:
+        locate_and_rate(scene, work, state)
+    if first == FIRST_STAGE:
         slip_stages(work, step)
     for state in range(first, last):
-        node = 0.0 if state == NOW else NODES[state - FIRST]
-        sum_forces(scene, work, time + node * step, state, state)
+        node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
+        sum_forces(scene, work, time + node * step, state)
 
 
 def correct_stages(scene, work, step):
@@ -82,10 +84,10 @@ def correct_stages(scene, work, step):
         for body in range(work.motion.shape[1]):
             memory = step + work.bodies[body, MEMORY]
             for axis in range(3):
-                change = work.motion[SCRATCH, body, 3 + axis]
+                change = work.motion[CHANGE, body, VELOCITY + axis]
                 if not abs(change) < math.inf:
                     return math.inf
-                work.motion[FIRST + stage, body, 3 + axis] += change
+                work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
     return largest
 
@@ -93,21 +95,22 @@ def correct_stages(scene, work, step):
 def newton_step(scene, work, time, step):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
-    evaluate_states(scene, work, time, step, FIRST, FIRST + 3)
+    evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
     follow_contacts(work)
     write_loads(scene, work, step)
     for which in range(2):
-        solve(work.system, which)
+        solve(work.system, work.pivots, which)
     work.tally[SOLVES] += 1
     return correct_stages(scene, work, step)
 
 
 def finish_stages(work, step):
-    """Places and tangential displacements that go with the last correction of the velocities."""
+    """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
-    for state in range(FIRST, FIRST + 3):
-        rate_slips(work, state, state)
+    for state in range(FIRST_STAGE, FIRST_STAGE + 3):
+        rate_slips(work, state)
     slip_stages(work, step)
+    copy_state(work, THIRD_STAGE, NEW)
 
 
 def solve_stages(scene, work, clock, step):

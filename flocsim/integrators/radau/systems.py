@@ -5,12 +5,33 @@ the contacts (frames.py).
 
 Small dense complex systems, factorised in place: compiles fast, unlike numpy.linalg in a kernel.
 
-System k is (m, m + 2): the matrix, then its factors; the load, then the solution; the pivots.
+System k is (m, m + 1): the matrix, then its factors; the load, then the solution.
 """
 
-from flocsim.arrays import CLUSTER, DAMPING, FIRST, FREE, NOW, SCRATCH, STIFFNESS
+from flocsim.arrays import (
+    CHANGE,
+    DAMPING,
+    FIRST_STAGE,
+    FORCE,
+    FREE,
+    NOW,
+    SPIN,
+    STIFFNESS,
+    VELOCITY,
+    VX,
+    VY,
+)
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
-from flocsim.integrators.radau.tableau import EIGENVALUES, FROM_VECTORS, INVERSE, TO_VECTORS
+from flocsim.integrators.radau.tableau import (
+    EIGENVALUES,
+    FROM_VECTORS,
+    INVERSE,
+    PAIR,
+    REAL,
+    SECOND_STAGE,
+    THIRD_STAGE,
+    TO_VECTORS,
+)
 from flocsim.integrators.rhs.views import inertia
 
 
@@ -46,34 +67,34 @@ def eliminate(system, which, pivot):
                 system[which, row, column] -= share * system[which, pivot, column]
 
 
-def factorise(system, which):
-    """Factorise a matrix with row pivoting; False where it is singular."""
+def factorise(system, pivots, which):
+    """Factorise a matrix with row pivoting (pivots (2, m)); False where it is singular."""
     size = system.shape[1]
     for pivot in range(size):
         best = pivot_row(system, which, pivot)
         if not abs(system[which, best, pivot]) > 0.0:
             return False
-        system[which, pivot, size + 1] = best
+        pivots[which, pivot] = best
         if best != pivot:
             swap_rows(system, which, pivot, best, size)
         eliminate(system, which, pivot)
     return True
 
 
-def order_load(system, which):
+def order_load(system, pivots, which):
     """Bring the load into the order of the pivots."""
     size = system.shape[1]
     for row in range(size):
-        other = int(system[which, row, size + 1].real)
+        other = pivots[which, row]
         kept = system[which, row, size]
         system[which, row, size] = system[which, other, size]
         system[which, other, size] = kept
 
 
-def solve(system, which):
+def solve(system, pivots, which):
     """Replace the load of a factorised system by the solution."""
     size = system.shape[1]
-    order_load(system, which)
+    order_load(system, pivots, which)
     for row in range(size):
         for column in range(row):
             system[which, row, size] -= system[which, row, column] * system[which, column, size]
@@ -103,7 +124,7 @@ def sum_over_clusters(work, which, first, last):
     Mutual forces cancel in it, so that rounding in the solution of the rest leaves momentum alone.
     """
     for body in range(work.bodies.shape[0]):
-        leader = int(work.bodies[body, CLUSTER])
+        leader = work.cluster[body]
         if leader != body:
             for axis in range(2):
                 for column in range(first, last):
@@ -115,33 +136,34 @@ def factorise_systems(scene, work, step):
     """Write and factorise both systems; False where one is singular."""
     for which in range(2):
         write_matrix(scene, work, which, step)
-        if not factorise(work.system, which):
+        if not factorise(work.system, work.pivots, which):
             return False
     return True
 
 
 def momentum_rate(scene, work, body, axis, stage, step):
     """Mass times acceleration at a stage, from the stages' velocities."""
-    v, weights = work.motion, INVERSE[stage]
-    now = v[NOW, body, 3 + axis]
-    change = weights[0] * (v[FIRST, body, 3 + axis] - now)
-    change += weights[1] * (v[FIRST + 1, body, 3 + axis] - now)
-    change += weights[2] * (v[FIRST + 2, body, 3 + axis] - now)
+    v = work.motion
+    first, second, third = INVERSE[stage]
+    now = v[NOW, body, VELOCITY + axis]
+    change = first * (v[FIRST_STAGE, body, VELOCITY + axis] - now)
+    change += second * (v[SECOND_STAGE, body, VELOCITY + axis] - now)
+    change += third * (v[THIRD_STAGE, body, VELOCITY + axis] - now)
     return inertia(scene, body, axis) * change / step
 
 
 def imbalance(scene, work, body, axis, stage, step):
     """Force less mass times acceleration at a stage."""
     rate = momentum_rate(scene, work, body, axis, stage, step)
-    return work.rates[FIRST + stage, body, 3 + axis] - rate
+    return work.rates[FIRST_STAGE + stage, body, FORCE + axis] - rate
 
 
 def cluster_imbalance(scene, work, leader, axis, stage, step):
     """The same for all bodies of a cluster; forces first, so that what is mutual cancels."""
     force, rate = 0.0, 0.0
     for body in range(leader, work.bodies.shape[0]):
-        if work.bodies[body, CLUSTER] == leader:
-            force += work.rates[FIRST + stage, body, 3 + axis]
+        if work.cluster[body] == leader:
+            force += work.rates[FIRST_STAGE + stage, body, FORCE + axis]
             rate += momentum_rate(scene, work, body, axis, stage, step)
     return force - rate
 
@@ -152,7 +174,7 @@ def stage_load(scene, work, body, stage, step):
     y = imbalance(scene, work, body, 1, stage, step)
     torque = imbalance(scene, work, body, 2, stage, step)
     x, y, torque = force_back(work, body, stage, x, y, torque)
-    if work.bodies[body, CLUSTER] == body:
+    if work.cluster[body] == body:
         x = cluster_imbalance(scene, work, body, 0, stage, step)
         y = cluster_imbalance(scene, work, body, 1, stage, step)
         x, y, _ = force_back(work, body, stage, x, y, 0.0)
@@ -178,18 +200,18 @@ def write_loads(scene, work, step):
 def stage_change(work, row, stage):
     """The solution for one coordinate of one stage, taken back from the eigenvectors."""
     size = work.jacobian.shape[1]
-    columns = FROM_VECTORS[stage]
-    real, pair = work.system[0, row, size], work.system[1, row, size]
-    return (columns[0] * real).real + 2.0 * (columns[1] * pair).real
+    of_real, of_pair = FROM_VECTORS[stage]
+    real, pair = work.system[REAL, row, size], work.system[PAIR, row, size]
+    return (of_real * real).real + 2.0 * (of_pair * pair).real
 
 
 def write_changes(scene, work, stage):
-    """The solutions for one stage, as changes of its velocities in SCRATCH."""
+    """The solutions for one stage, as changes of its velocities in CHANGE."""
     changes = work.motion
     for body in range(changes.shape[1]):
         x, y = stage_change(work, 3 * body, stage), stage_change(work, 3 * body + 1, stage)
         x, y = velocity_on(work, body, stage, x, y)
-        changes[SCRATCH, body, 3] = x
-        changes[SCRATCH, body, 4] = y
-        changes[SCRATCH, body, 5] = stage_change(work, 3 * body + 2, stage)
+        changes[CHANGE, body, VX] = x
+        changes[CHANGE, body, VY] = y
+        changes[CHANGE, body, SPIN] = stage_change(work, 3 * body + 2, stage)
     add_shifts(scene, work, stage)

@@ -7,6 +7,11 @@ along their vectors, as in RADAU5 (Hairer & Wanner, Solving Ordinary Differentia
 
 import numpy as np
 
+from flocsim.arrays import FIRST_STAGE
+
+SECOND_STAGE, THIRD_STAGE = FIRST_STAGE + 1, FIRST_STAGE + 2
+"""States of the later stages; the third one is the end of the step."""
+
 ROOT = 6.0**0.5
 
 NODES = ((4.0 - ROOT) / 10.0, (4.0 + ROOT) / 10.0, 1.0)
@@ -36,6 +41,9 @@ def decoupled():
     chosen = tuple(values[k].item() for k in order)
     return chosen, rows_of(inverse[list(order)]), rows_of(vectors[:, list(order)])
 
+
+REAL, PAIR = range(2)
+"""The systems that Newton's method is decoupled into: of the real eigenvalue, of the pair."""
 
 EIGENVALUES, TO_VECTORS, FROM_VECTORS = decoupled()
 """The real eigenvalue and the one of the pair above the axis (all complex numbers); rows that take

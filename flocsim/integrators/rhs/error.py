@@ -3,12 +3,19 @@
 import math
 
 from flocsim.arrays import (
+    ANGLE,
     BOUNDING_RADIUS,
+    DEVIATION,
     MEMORY,
     NEW,
-    SCRATCH,
+    SPIN,
     STEP_ERROR,
     TOLERANCE,
+    VELOCITY,
+    VX,
+    VY,
+    X,
+    Y,
 )
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.rhs.views import lever
@@ -39,11 +46,15 @@ def error_ratio(scene, work, clock, step):
 
 
 def body_error(scene, work, body):
-    """The error of one body, from SCRATCH: displacement of its outline, now and later [m]."""
+    """The error of one body, from DEVIATION: displacement of its outline, now and later [m]."""
     e = work.motion
     size = scene.bodies[body, BOUNDING_RADIUS]
-    place = math.hypot(e[SCRATCH, body, 0], e[SCRATCH, body, 1]) + size * abs(e[SCRATCH, body, 2])
-    speed = math.hypot(e[SCRATCH, body, 3], e[SCRATCH, body, 4]) + size * abs(e[SCRATCH, body, 5])
+    place = math.hypot(e[DEVIATION, body, X], e[DEVIATION, body, Y]) + size * abs(
+        e[DEVIATION, body, ANGLE]
+    )
+    speed = math.hypot(e[DEVIATION, body, VX], e[DEVIATION, body, VY]) + size * abs(
+        e[DEVIATION, body, SPIN]
+    )
     return place + speed * work.bodies[body, MEMORY]
 
 
@@ -65,7 +76,7 @@ def rounding_size(scene, work, step):
         memory = work.bodies[body, MEMORY]
         for axis in range(3):
             place = abs(work.motion[NEW, body, axis])
-            speed = abs(work.motion[NEW, body, 3 + axis])
+            speed = abs(work.motion[NEW, body, VELOCITY + axis])
             size = place * (1.0 + memory / step) + speed * (step + memory)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest

@@ -6,7 +6,18 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 What contacts can hold: the limit of their tangential displacements.
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, EVALUATIONS, NEW, SLIP_RATES
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    CLOSEST,
+    EVALUATIONS,
+    FORCE,
+    GEOMETRY_COLUMNS,
+    MOTION_COLUMNS,
+    NEW,
+    SLIP_RATES,
+    VELOCITY,
+)
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.hooks import (
     body_force,
@@ -38,72 +49,84 @@ def limit_slips(scene, work):
             work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
 
 
-def start_rates(work, state, rate):
+def copy_state(work, source, target):
+    """Make one state the same as another: motion, geometry of the listed pairs, displacements."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[target, body, axis] = work.motion[source, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        for column in range(GEOMETRY_COLUMNS):
+            work.geometry[target, row, column] = work.geometry[source, row, column]
+        if work.candidates[row, CLOSED] == 1:
+            work.slip[target, row] = work.slip[source, row]
+
+
+def start_rates(work, state):
     """The velocities of a state, and no force yet."""
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
-            work.rates[rate, body, axis] = work.motion[state, body, 3 + axis]
-            work.rates[rate, body, 3 + axis] = 0.0
+            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
+            work.rates[state, body, FORCE + axis] = 0.0
 
 
-def add_body_forces(scene, work, time, state, rate):
+def add_body_forces(scene, work, time, state):
     """Weight, drag and their like."""
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, state, body)
         fx, fy, torque = body_force(view, scene.parameters)
-        add_force(work, rate, body, fx, fy, torque)
+        add_force(work, state, body, fx, fy, torque)
 
 
-def add_centre_forces(scene, work, time, state, rate):
+def add_centre_forces(scene, work, time, state):
     """Forces along the lines of centres."""
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             view = centre_view(scene, work, time, state, a, b)
             nx, ny, _ = centre_line(work, state, a, b)
             repulsion = centre_force(view, scene.parameters)
-            add_force(work, rate, a, repulsion * nx, repulsion * ny, 0.0)
-            add_force(work, rate, b, -repulsion * nx, -repulsion * ny, 0.0)
+            add_force(work, state, a, repulsion * nx, repulsion * ny, 0.0)
+            add_force(work, state, b, -repulsion * nx, -repulsion * ny, 0.0)
 
 
-def add_surface_forces(scene, work, time, state, rate):
+def add_surface_forces(scene, work, time, state):
     """Forces at the closest points of the outlines."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSEST] == 1:
             view = surface_view(scene, work, time, state, row)
-            push_pair(work, state, rate, row, surface_force(view, scene.parameters), 0.0)
+            push_pair(work, state, row, surface_force(view, scene.parameters), 0.0)
 
 
-def add_contact_forces(scene, work, state, rate):
+def add_contact_forces(scene, work, state):
     """Visco-elastic forces of all closed pairs."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(view, scene.parameters)
-            push_pair(work, state, rate, row, normal, tangential)
+            push_pair(work, state, row, normal, tangential)
 
 
-def rate_slips(work, state, rate):
+def rate_slips(work, state):
     """Rates of the tangential displacements of all closed pairs."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
-            work.slip[SLIP_RATES + rate, row] = tangential_rate(work, state, row)
+            work.slip[SLIP_RATES + state, row] = tangential_rate(work, state, row)
 
 
-def locate_and_rate(scene, work, state, rate):
+def locate_and_rate(scene, work, state):
     """Contact geometry of a state, and the rates of its tangential displacements."""
     if has_contact() or surface_reach(scene.parameters) > 0.0:
         locate_acting(scene, work, state)
-        rate_slips(work, state, rate)
+        rate_slips(work, state)
 
 
-def sum_forces(scene, work, time, state, rate):
-    """All forces and torques of a state into ``work.rates[rate]``; its geometry is located."""
+def sum_forces(scene, work, time, state):
+    """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
     work.tally[EVALUATIONS] += 1
-    start_rates(work, state, rate)
-    add_body_forces(scene, work, time, state, rate)
+    start_rates(work, state)
+    add_body_forces(scene, work, time, state)
     if has_centre_force():
-        add_centre_forces(scene, work, time, state, rate)
+        add_centre_forces(scene, work, time, state)
     if surface_reach(scene.parameters) > 0.0:
-        add_surface_forces(scene, work, time, state, rate)
+        add_surface_forces(scene, work, time, state)
     if has_contact():
-        add_contact_forces(scene, work, state, rate)
+        add_contact_forces(scene, work, state)

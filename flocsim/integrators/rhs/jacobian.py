@@ -17,13 +17,24 @@ Derivatives of the contact forces, taken from the kernels by differences.
 """
 
 from flocsim.arrays import (
+    ANGLE,
     CANDIDATES,
     CLOSED,
     CLOSEST,
     DAMPING,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
+    GAP,
+    NORMAL_X,
+    NORMAL_Y,
     NOW,
     RADIUS,
     STIFFNESS,
+    TURNING,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
     BodyView,
     ContactView,
 )
@@ -56,15 +67,15 @@ from flocsim.integrators.rhs.views import (
 def normal_rows(work, row):
     """Entries of a pair's normal direction on its two bodies, now."""
     g = work.geometry
-    nx, ny = g[NOW, row, 0], g[NOW, row, 1]
-    return (nx, ny, g[NOW, row, 3]), (-nx, -ny, -g[NOW, row, 5])
+    nx, ny = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    return (nx, ny, g[NOW, row, VERTEX_ARM_N]), (-nx, -ny, -g[NOW, row, EDGE_ARM_N])
 
 
 def tangent_rows(work, row):
     """Entries of a pair's tangential direction on its two bodies, now."""
     g = work.geometry
-    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
-    return (tx, ty, g[NOW, row, 4]), (-tx, -ty, -g[NOW, row, 6])
+    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
+    return (tx, ty, g[NOW, row, VERTEX_ARM_T]), (-tx, -ty, -g[NOW, row, EDGE_ARM_T])
 
 
 def add_product(work, which, a, b, out, by, weight):
@@ -72,12 +83,13 @@ def add_product(work, which, a, b, out, by, weight):
     if weight == 0.0:
         return
     matrix = work.jacobian
+    (out_a, out_b), (by_a, by_b) = out, by
     for i in range(3):
         for j in range(3):
-            matrix[which, 3 * a + i, 3 * a + j] += weight * out[0][i] * by[0][j]
-            matrix[which, 3 * a + i, 3 * b + j] += weight * out[0][i] * by[1][j]
-            matrix[which, 3 * b + i, 3 * a + j] += weight * out[1][i] * by[0][j]
-            matrix[which, 3 * b + i, 3 * b + j] += weight * out[1][i] * by[1][j]
+            matrix[which, 3 * a + i, 3 * a + j] += weight * out_a[i] * by_a[j]
+            matrix[which, 3 * a + i, 3 * b + j] += weight * out_a[i] * by_b[j]
+            matrix[which, 3 * b + i, 3 * a + j] += weight * out_b[i] * by_a[j]
+            matrix[which, 3 * b + i, 3 * b + j] += weight * out_b[i] * by_b[j]
 
 
 NOTHING = (0.0, 0.0, 0.0)
@@ -89,33 +101,34 @@ def sliding_row(scene, work, row):
 
     The arms are p·n and the same for the foot.
     """
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g = work.geometry
-    tx, ty = -g[NOW, row, 1], g[NOW, row, 0]
+    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
     difference = scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
-    distance = g[NOW, row, 2] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    arm_a = g[NOW, row, 4] + 0.5 * (distance + difference)
-    arm_b = g[NOW, row, 6] - 0.5 * (distance - difference)
+    distance = g[NOW, row, GAP] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    arm_a = g[NOW, row, VERTEX_ARM_T] + 0.5 * (distance + difference)
+    arm_b = g[NOW, row, EDGE_ARM_T] - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
-    beside = distance if g[NOW, row, 7] == 0.0 else 0.0
+    beside = distance if g[NOW, row, TURNING] == 0.0 else 0.0
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
 def scaled(row, share):
     """A direction's entries on one body, times a number."""
-    return row[0] * share, row[1] * share, row[2] * share
+    x, y, angle = row
+    return x * share, y * share, angle * share
 
 
 def add_turning(scene, work, row, normal, tangential):
     """Derivative by the places of a pair's force whose size stays the same."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g, stiffness = work.geometry, work.jacobian
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
-    nx, ny, turning = g[NOW, row, 0], g[NOW, row, 1], g[NOW, row, 7]
+    nx, ny, turning = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y], g[NOW, row, TURNING]
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
-    torque_a = normal * arm_a - tangential * g[NOW, row, 3]
-    torque_b = normal * arm_b - tangential * g[NOW, row, 5]
-    stiffness[STIFFNESS, 3 * a + 2, 3 * a + 2] += torque_a
+    torque_a = normal * arm_a - tangential * g[NOW, row, VERTEX_ARM_N]
+    torque_b = normal * arm_b - tangential * g[NOW, row, EDGE_ARM_N]
+    stiffness[STIFFNESS, 3 * a + ANGLE, 3 * a + ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
         add_product(work, STIFFNESS, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
@@ -125,7 +138,7 @@ def add_turning(scene, work, row, normal, tangential):
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
         by = scaled(slide_a, turning), scaled(slide_b, turning)
         add_product(work, STIFFNESS, a, b, out, by, -1.0)
-        stiffness[STIFFNESS, 3 * b + 2, 3 * b + 2] -= torque_b
+        stiffness[STIFFNESS, 3 * b + ANGLE, 3 * b + ANGLE] -= torque_b
 
 
 def changed_view(view, axis, by):
@@ -146,7 +159,7 @@ def change_of(view, axis):
 
 def add_contact(scene, work, row):
     """The derivatives of one contact's forces."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     view = contact_view(scene, work, NOW, row)
     normal, tangential = contact_force(view, scene.parameters)
     along, across = normal_rows(work, row), tangent_rows(work, row)
@@ -243,7 +256,7 @@ def add_surfaces(scene, work, time):
         if work.candidates[row, CLOSEST] == 1:
             view = surface_view(scene, work, time, NOW, row)
             along = normal_rows(work, row)
-            a, b = work.candidates[row, 0], work.candidates[row, 2]
+            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
             slope = surface_slope(view, scene.parameters)
             damping = surface_damping(view, scene.parameters)
             add_product(work, STIFFNESS, a, b, along, along, -slope)

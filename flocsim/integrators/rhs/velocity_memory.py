@@ -6,7 +6,7 @@ A velocity error e displaces a body by e·T until drag, or the next encounter, h
 
 import math
 
-from flocsim.arrays import BOUNDING_RADIUS, DAMPING, MEMORY, NOW
+from flocsim.arrays import BOUNDING_RADIUS, DAMPING, MEMORY, NOW, SPIN, VX, VY
 from flocsim.integrators.rhs.views import inertia
 
 TINY = 1e-300
@@ -24,9 +24,9 @@ def mean_velocity(work, axis):
 def turnover_rate(scene, work, body):
     """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
     motion = work.motion
-    vx = motion[NOW, body, 3] - mean_velocity(work, 3)
-    vy = motion[NOW, body, 4] - mean_velocity(work, 4)
-    return math.hypot(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, 5])
+    vx = motion[NOW, body, VX] - mean_velocity(work, 3)
+    vy = motion[NOW, body, VY] - mean_velocity(work, 4)
+    return math.hypot(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, SPIN])
 
 
 def remember_velocities(scene, work, remaining):

@@ -3,17 +3,35 @@
 import math
 
 from flocsim.arrays import (
+    ANGLE,
     BOUNDING_RADIUS,
     BUOYANT_MASS,
     CANDIDATES,
+    EDGE_ARM_N,
+    EDGE_ARM_T,
+    EDGE_BODY,
     EQUIVALENT_RADIUS,
     FREE,
+    FX,
+    FY,
+    GAP,
     INERTIA,
     MASS,
+    NORMAL_X,
+    NORMAL_Y,
     RADIUS,
+    SPIN,
+    TORQUE,
+    VERTEX_ARM_N,
+    VERTEX_ARM_T,
+    VERTEX_BODY,
+    VX,
+    VY,
     BodyView,
     ContactView,
     PairView,
+    X,
+    Y,
 )
 
 
@@ -22,8 +40,8 @@ def body_view(scene, work, time, state, body):
     motion, known = work.motion, scene.bodies
     return BodyView(
         time,
-        motion[state, body, 0], motion[state, body, 1], motion[state, body, 2],
-        motion[state, body, 3], motion[state, body, 4], motion[state, body, 5],
+        motion[state, body, X], motion[state, body, Y], motion[state, body, ANGLE],
+        motion[state, body, VX], motion[state, body, VY], motion[state, body, SPIN],
         known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
         known[body, EQUIVALENT_RADIUS],
     )  # fmt: skip
@@ -51,27 +69,35 @@ def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
 
 def normal_rate(work, state, row):
     """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g, motion = work.geometry, work.motion
-    rate = g[state, row, 0] * (motion[state, a, 3] - motion[state, b, 3])
-    rate += g[state, row, 1] * (motion[state, a, 4] - motion[state, b, 4])
-    return rate + motion[state, a, 5] * g[state, row, 3] - motion[state, b, 5] * g[state, row, 5]
+    rate = g[state, row, NORMAL_X] * (motion[state, a, VX] - motion[state, b, VX])
+    rate += g[state, row, NORMAL_Y] * (motion[state, a, VY] - motion[state, b, VY])
+    return (
+        rate
+        + motion[state, a, SPIN] * g[state, row, VERTEX_ARM_N]
+        - motion[state, b, SPIN] * g[state, row, EDGE_ARM_N]
+    )
 
 
 def tangential_rate(work, state, row):
     """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g, motion = work.geometry, work.motion
-    rate = g[state, row, 0] * (motion[state, a, 4] - motion[state, b, 4])
-    rate -= g[state, row, 1] * (motion[state, a, 3] - motion[state, b, 3])
-    return rate + motion[state, a, 5] * g[state, row, 4] - motion[state, b, 5] * g[state, row, 6]
+    rate = g[state, row, NORMAL_X] * (motion[state, a, VY] - motion[state, b, VY])
+    rate -= g[state, row, NORMAL_Y] * (motion[state, a, VX] - motion[state, b, VX])
+    return (
+        rate
+        + motion[state, a, SPIN] * g[state, row, VERTEX_ARM_T]
+        - motion[state, b, SPIN] * g[state, row, EDGE_ARM_T]
+    )
 
 
 def contact_view(scene, work, state, row):
     """The ContactView of a listed pair in a state."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     return ContactView(
-        -work.geometry[state, row, 2], -normal_rate(work, state, row),
+        -work.geometry[state, row, GAP], -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
         scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
     )  # fmt: skip
@@ -94,35 +120,35 @@ def lever(scene, body, axis):
     return scene.bodies[body, BOUNDING_RADIUS] if axis == 2 else 1.0
 
 
-def add_force(work, rate, body, fx, fy, torque):
-    """Add to the force and torque on a body at a stage."""
-    work.rates[rate, body, 3] += fx
-    work.rates[rate, body, 4] += fy
-    work.rates[rate, body, 5] += torque
+def add_force(work, state, body, fx, fy, torque):
+    """Add to the force and torque on a body in a state."""
+    work.rates[state, body, FX] += fx
+    work.rates[state, body, FY] += fy
+    work.rates[state, body, TORQUE] += torque
 
 
-def push_pair(work, state, rate, row, normal, tangential):
+def push_pair(work, state, row, normal, tangential):
     """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g = work.geometry
-    fx = normal * g[state, row, 0] - tangential * g[state, row, 1]
-    fy = normal * g[state, row, 1] + tangential * g[state, row, 0]
-    torque_a = normal * g[state, row, 3] + tangential * g[state, row, 4]
-    torque_b = normal * g[state, row, 5] + tangential * g[state, row, 6]
-    add_force(work, rate, a, fx, fy, torque_a)
-    add_force(work, rate, b, -fx, -fy, -torque_b)
+    fx = normal * g[state, row, NORMAL_X] - tangential * g[state, row, NORMAL_Y]
+    fy = normal * g[state, row, NORMAL_Y] + tangential * g[state, row, NORMAL_X]
+    torque_a = normal * g[state, row, VERTEX_ARM_N] + tangential * g[state, row, VERTEX_ARM_T]
+    torque_b = normal * g[state, row, EDGE_ARM_N] + tangential * g[state, row, EDGE_ARM_T]
+    add_force(work, state, a, fx, fy, torque_a)
+    add_force(work, state, b, -fx, -fy, -torque_b)
 
 
 def closest_rows(work, state, row):
     """(end of the run of rows that belong to the same two bodies, row with the smallest gap)."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     closest = row
     end = row
     while end < work.tally[CANDIDATES]:
-        c, d = work.candidates[end, 0], work.candidates[end, 2]
+        c, d = work.candidates[end, VERTEX_BODY], work.candidates[end, EDGE_BODY]
         if not ((c == a and d == b) or (c == b and d == a)):
             break
-        if work.geometry[state, end, 2] < work.geometry[state, closest, 2]:
+        if work.geometry[state, end, GAP] < work.geometry[state, closest, GAP]:
             closest = end
         end += 1
     return end, closest
@@ -130,8 +156,8 @@ def closest_rows(work, state, row):
 
 def centre_line(work, state, a, b):
     """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
-    dx = work.motion[state, a, 0] - work.motion[state, b, 0]
-    dy = work.motion[state, a, 1] - work.motion[state, b, 1]
+    dx = work.motion[state, a, X] - work.motion[state, b, X]
+    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0
@@ -142,15 +168,15 @@ def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
     nx, ny, distance = centre_line(work, state, a, b)
     motion = work.motion
-    rate = nx * (motion[state, a, 3] - motion[state, b, 3])
-    rate += ny * (motion[state, a, 4] - motion[state, b, 4])
+    rate = nx * (motion[state, a, VX] - motion[state, b, VX])
+    rate += ny * (motion[state, a, VY] - motion[state, b, VY])
     gap = distance - scene.bodies[a, EQUIVALENT_RADIUS] - scene.bodies[b, EQUIVALENT_RADIUS]
     return pair_view(scene, time, a, b, gap, rate, distance)
 
 
 def surface_view(scene, work, time, state, row):
     """The PairView of the two bodies of a listed pair, their gap being the pair's."""
-    a, b = work.candidates[row, 0], work.candidates[row, 2]
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     _, _, distance = centre_line(work, state, a, b)
     rate = normal_rate(work, state, row)
-    return pair_view(scene, time, a, b, work.geometry[state, row, 2], rate, distance)
+    return pair_view(scene, time, a, b, work.geometry[state, row, GAP], rate, distance)

@@ -49,9 +49,9 @@ def slide(scene, work, length, passing_on=hand_over, steps=400):
     pulls = []
     for _ in range(steps):
         set_modes(scene, work)
-        rate_slips(work, NOW, 0)
+        rate_slips(work, NOW)
         closed = work.candidates[:, CLOSED] == 1
-        work.slip[NOW, closed] += step * work.slip[SLIP_RATES, closed]
+        work.slip[NOW, closed] += step * work.slip[SLIP_RATES + NOW, closed]
         work.motion[NOW, 1, 0] += length / steps
         locate_contacts(scene, work, NOW)
         passing_on(work)

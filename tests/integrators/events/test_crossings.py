@@ -9,7 +9,7 @@ import pytest
 
 from flocsim import Body, Fluid, Sphere
 from flocsim import hooks as slots
-from flocsim.arrays import CANDIDATES, CLOSEST, NEW, NOW, SCRATCH, work_of
+from flocsim.arrays import CANDIDATES, CLOSEST, NEW, NOW, TRIAL, work_of
 from flocsim.body import scene_of
 from flocsim.composer import compose
 from flocsim.geometry.contact.candidates import list_candidates
@@ -119,8 +119,8 @@ def worst_margin(scene, work, shares, reaching):
     worst = []
     for share in shares:
         interpolate(work, 1.0, share)
-        locate_contacts(scene, work, SCRATCH)
-        gaps = work.geometry[SCRATCH, : len(rows), 2]
+        locate_contacts(scene, work, TRIAL)
+        gaps = work.geometry[TRIAL, : len(rows), 2]
         least = np.where(closed, -gaps, gaps).min(initial=math.inf)
         worst.append(min(least, (gaps - gaps[rivals]).min(initial=math.inf) if reaching else least))
     return np.array(worst)

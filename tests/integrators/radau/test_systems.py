@@ -7,19 +7,19 @@ from flocsim.integrators.radau.systems import factorise, solve
 
 
 def systems(matrix, load, which=0):
-    """Two systems in the layout of `linear`, one of them the given one, the other at random."""
+    """Two systems with their pivots, one of them the given one, the other at random."""
     size = len(load)
-    made = np.random.default_rng(size).normal(size=(2, size, size + 2)).astype(complex)
+    made = np.random.default_rng(size).normal(size=(2, size, size + 1)).astype(complex)
     made[which, :, :size], made[which, :, size] = matrix, load
-    return made
+    return made, np.zeros((2, size), dtype=np.int64)
 
 
 def solved(matrix, load, which=0):
-    """The solution by `linear`; None where it finds the matrix singular."""
-    system = systems(matrix, load, which)
-    if not factorise(system, which):
+    """The solution; None where it finds the matrix singular."""
+    system, pivots = systems(matrix, load, which)
+    if not factorise(system, pivots, which):
         return None
-    solve(system, which)
+    solve(system, pivots, which)
     return system[which, :, len(load)]
 
 
@@ -41,22 +41,22 @@ def test_random_systems_agree_with_numpy(size, which):
 @pytest.mark.parametrize("which", [0, 1])
 def test_the_other_system_is_left_alone(which):
     rng = np.random.default_rng(7)
-    system = systems(random_complex(rng, 6, 6), random_complex(rng, 6), which)
+    system, pivots = systems(random_complex(rng, 6, 6), random_complex(rng, 6), which)
     before = system[1 - which].copy()
-    assert factorise(system, which)
-    solve(system, which)
+    assert factorise(system, pivots, which)
+    solve(system, pivots, which)
     assert np.array_equal(system[1 - which], before)
 
 
 def test_a_factorised_system_serves_many_loads():
     rng = np.random.default_rng(8)
     matrix = random_complex(rng, 9, 9)
-    system = systems(matrix, np.zeros(9))
-    assert factorise(system, 0)
+    system, pivots = systems(matrix, np.zeros(9))
+    assert factorise(system, pivots, 0)
     for _ in range(5):
         load = random_complex(rng, 9)
         system[0, :, 9] = load
-        solve(system, 0)
+        solve(system, pivots, 0)
         assert np.abs(matrix @ system[0, :, 9] - load).max() < 1e-11
 
 

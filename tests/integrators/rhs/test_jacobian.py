@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body
-from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST, NOW, STIFFNESS
+from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST_STAGE, NOW, STIFFNESS
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
@@ -31,9 +31,9 @@ ALL = {gap: tuple(name for name in FORCES if not name.endswith(gap)) for gap in 
 
 
 def forces_in_first(scene, work):
-    """Forces in state FIRST by the flags that are there."""
-    locate_and_rate(scene, work, FIRST, FIRST)
-    sum_forces(scene, work, 0.0, FIRST, FIRST)
+    """Forces in state FIRST_STAGE by the flags that are there."""
+    locate_and_rate(scene, work, FIRST_STAGE)
+    sum_forces(scene, work, 0.0, FIRST_STAGE)
 
 
 def derivatives_now(scene, work):
@@ -73,13 +73,13 @@ class Differences:
     def loads(self, body, axis, by):
         """All forces (3n,) with one coordinate (axis 0–2) or velocity (3–5) changed."""
         work = self.work
-        work.motion[FIRST] = work.motion[NOW]
-        work.motion[FIRST, body, axis] += by
-        work.slip[FIRST] = work.slip[NOW]
+        work.motion[FIRST_STAGE] = work.motion[NOW]
+        work.motion[FIRST_STAGE, body, axis] += by
+        work.slip[FIRST_STAGE] = work.slip[NOW]
         if axis < 3:
-            work.slip[FIRST, : work.tally[CANDIDATES]] += by * self.carried(body, axis)
+            work.slip[FIRST_STAGE, : work.tally[CANDIDATES]] += by * self.carried(body, axis)
         self.evaluate(self.scene, work)
-        return work.rates[FIRST, :, 3:].ravel().copy()
+        return work.rates[FIRST_STAGE, :, 3:].ravel().copy()
 
     def measured(self, part, size):
         """Minus the derivatives by places (part 0) or velocities (part 3), per metre of outline."""
