@@ -115,7 +115,7 @@ def write_once(path, text):
 
 
 def linked_module(entry, fillings, name, options):
-    """(module ``name`` whose function ``run`` calls the linked entry, whether the disk keeps it)."""
+    """(module ``name``, whose ``run`` calls the linked entry; whether the disk keeps it)."""
     import numba
 
     from flocsim.numba_internals import inner_compiler, typed_once

@@ -178,13 +178,23 @@ class System:
         check_limits(until, max_steps)
         self.check_overlaps()
         began = time.perf_counter()
-        scene = self.scene(jit=jit)
-        run = Run(
-            self.compose(jit=jit), scene, work_of(scene, *self.motion()), self.integrator, until,
-            max_steps=max_steps, record=record,
-        )  # fmt: skip
+        run = self.begin(until, max_steps=max_steps, record=record, jit=jit)
         status = run.to_end()
         return Trajectory.of(run, status, time.perf_counter() - began)
+
+    def begin(
+        self, until, *, max_steps=1_000_000, record=False, observer=None, memo=None, jit=True
+    ):
+        """A Run to a time [s] that has yet to take its first step.
+
+        ``observer`` {hook: function} may stand in for hooks.observe and hooks.awaits_touch, and
+        ``memo`` is the array that they see.
+        """
+        scene = self.scene(jit=jit)
+        return Run(
+            self.compose(observer=observer, jit=jit), scene, work_of(scene, *self.motion()),
+            self.integrator, until, max_steps=max_steps, memo=memo, record=record,
+        )  # fmt: skip
 
     def explain(self):
         """What is compiled into this scene and what is left out, each with its reason, as text.

@@ -4,14 +4,17 @@ import importlib.util
 import sys
 import warnings
 
+import numba
+import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, System, composer
-from flocsim.composer import compose
+from flocsim.composer import compile_law, compose
 from flocsim.errors import KernelError
 from flocsim.fingerprint import fingerprint
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
-from flocsim.integrators.rhs.forces import sum_forces
+from flocsim.integrators.loop.driver import advance
+from flocsim.numba_internals import call_by_address
 
 MODULE = """\
 import math
@@ -55,6 +58,14 @@ def mutable(x):
     return TABLE[0] * x
 
 
+def scaled_view(x, parameters):
+    return SCALE * x
+
+
+def unknown(x, parameters):
+    return math.no_such_function(x)
+
+
 def outside(x):
     return math.sqrt(x) + numpy.pi
 """
@@ -87,6 +98,14 @@ def load(tmp_path, monkeypatch):
         return loaded
 
     return write
+
+
+SIGNATURE = numba.float64(numba.float64, numba.float64[::1])
+by_address = call_by_address(SIGNATURE)
+
+
+def entry_by_address(address, x, parameters):
+    return by_address(address, x, parameters)
 
 
 EDITS = {
@@ -157,20 +176,51 @@ def test_an_edited_kernel_returns_the_new_physics_from_a_warm_cache(load, tmp_pa
     assert answer() == 6.0 and len(files()) == 2 * len(first)
 
 
-def scene_fingerprint(*forces, density=2650.0):
+def fingerprints(*forces, density=2650.0):
+    """{what is compiled: its fingerprint} of two spheres with these forces."""
     system = System([Body(Sphere(5e-6), density=density)] * 2, forces)
-    return fingerprint(sum_forces, system.fillings())
+    laws = {name: fingerprint(law, {}) for name, law in system.pieces.laws.items()}
+    return {"engine": fingerprint(advance, system.fillings()), **laws}
 
 
-def test_parameter_values_leave_the_hash_alone_and_other_forces_change_it():
-    names = {
-        scene_fingerprint(Gravity(9.81), VanDerWaals(1e-18), Contact(20.0)),
-        scene_fingerprint(Gravity(1.6), VanDerWaals(1e-20), Contact(7.0, tension=False)),
-        scene_fingerprint(Gravity(), VanDerWaals(), Contact(friction=0.5), density=1100.0),
-    }
-    assert len(names) == 1
-    assert scene_fingerprint(Gravity(), VanDerWaals(gap="surface"), Contact()) not in names
-    assert scene_fingerprint(Gravity(), StokesDrag(), VanDerWaals(), Contact()) not in names
+def test_parameter_values_leave_the_hashes_alone_and_other_forces_change_laws_only():
+    found = fingerprints(Gravity(9.81), VanDerWaals(1e-18), Contact(20.0))
+    assert found == fingerprints(Gravity(1.6), VanDerWaals(1e-20), Contact(7.0))
+    assert found == fingerprints(Gravity(), VanDerWaals(), Contact(), density=1100.0)
+    surface = fingerprints(Gravity(), VanDerWaals(gap="surface"), Contact())
+    assert surface.keys() ^ found.keys() == {
+        "centre_force", "centre_derivatives", "surface_force", "surface_derivatives",
+    }  # fmt: skip
+    dragged = fingerprints(Gravity(), StokesDrag(), VanDerWaals(), Contact())
+    assert dragged["body_force"] != found["body_force"]
+    for others in (surface, dragged):
+        for name in ("engine", "contact_force"):
+            assert others[name] == found[name]
+
+
+def test_a_law_is_called_by_its_address_and_compiled_anew_only_where_it_was_edited(
+    load, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    scale = numba.njit(entry_by_address)
+
+    def answer(*edits):
+        monkeypatch.setattr(composer, "_composed", {})
+        return scale(compile_law(load(*edits).scaled_view, SIGNATURE), 3.0, np.ones(1))
+
+    def files():
+        return sorted(path.name for path in (tmp_path / "cache").rglob("*.nbc"))
+
+    assert answer() == 6.0
+    first = files()
+    assert len(first) == 1
+    assert answer() == 6.0 and files() == first
+    assert answer(EDITS["scaled"]) == 7.5 and len(files()) == 2
+
+
+def test_a_law_that_cannot_be_compiled_is_named_by_file_and_line(load):
+    with pytest.raises(KernelError, match=r"kernels\.py:\d+: .*use plain arithmetic on scalars"):
+        compile_law(load().unknown, SIGNATURE)
 
 
 def test_a_closure_is_refused_by_file_and_line():
@@ -195,7 +245,7 @@ def test_uncompiled_functions_are_linked_to_the_same_answers(load, name):
     assert compose(function, {}, jit=False)(*arguments) == function(*arguments)
 
 
-def slot(x):
+def hooked(x):
     return 0.0
 
 
@@ -204,13 +254,13 @@ def filling(x):
 
 
 def entry(x):
-    return 10.0 * slot(x)
+    return 10.0 * hooked(x)
 
 
-def test_slots_are_filled_in_the_clone_and_nowhere_else():
-    assert compose(entry, {slot: filling}, jit=False)(1.0) == 20.0
+def test_hooks_are_filled_in_the_clone_and_nowhere_else():
+    assert compose(entry, {hooked: filling}, jit=False)(1.0) == 20.0
     assert compose(entry, {}, jit=False)(1.0) == 0.0 == entry(1.0)
-    assert fingerprint(entry, {slot: filling}) != fingerprint(entry, {})
+    assert fingerprint(entry, {hooked: filling}) != fingerprint(entry, {})
 
 
 def test_a_cache_folder_that_cannot_be_written_is_said_once_and_costs_no_result(
@@ -222,7 +272,7 @@ def test_a_cache_folder_that_cannot_be_written_is_said_once_and_costs_no_result(
     monkeypatch.setattr(composer, "_warned", [])
     monkeypatch.setattr(composer, "_composed", {})
     with pytest.warns(UserWarning, match="FLOCSIM_CACHE") as caught:
-        assert compose(entry, {slot: filling})(1.0) == 20.0
+        assert compose(entry, {hooked: filling})(1.0) == 20.0
     assert len(caught) == 1 and str(tmp_path / "file" / "cache") in str(caught[0].message)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

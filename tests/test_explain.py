@@ -7,7 +7,6 @@ import attrs
 import pytest
 
 from flocsim import Body, Fluid, Sphere, System
-from flocsim import hooks as slots
 from flocsim.explain import all_scales, explain
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Overdamped, VelocityVerlet
@@ -62,17 +61,17 @@ def test_a_force_out_of_range_is_named(distance, out):
     assert (distance - 1e-5 >= force.reach) == out == ("out of range at the start" in line)
 
 
-def test_slots_left_empty_are_said_to_be_out():
+def test_laws_that_a_scene_has_not_are_said_to_be_out():
     names = {
-        slots.centre_force: "forces along lines of centres",
-        slots.surface_force: "forces at closest points",
-        slots.position_force: "derivative by the place",
-        slots.velocity_force: "derivative by the velocity",
+        "centre_force": "forces along lines of centres",
+        "surface_force": "forces at closest points",
+        "position_force": "derivative by the place",
+        "velocity_force": "derivative by the velocity",
     }
     for forces in ([], [VanDerWaals()], [VanDerWaals(gap="surface"), Trap()], [StokesDrag()]):
-        filled, out = System(FAR, forces).fillings(), lines_of("out:", FAR, forces)
-        for slot, name in names.items():
-            assert has(out, name) == (slot not in filled)
+        laws, out = System(FAR, forces).pieces.laws, lines_of("out:", FAR, forces)
+        for law, name in names.items():
+            assert has(out, name) == (law not in laws)
 
 
 EXPLICIT = "out: Jacobian of the forces: the method is explicit"

@@ -6,7 +6,6 @@ import time
 import attrs
 import numpy as np
 
-from flocsim.arrays import CODE, PAUSE_AT, STEPS, TIME, UNTIL, with_capacity
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter
 from flocsim.ensembles.collision.failures import outcome_of
 from flocsim.ensembles.collision.sampling import draws, orientations
@@ -65,21 +64,13 @@ def run_case(case, encounter, driver, limits):
 
     ``limits``: most simulated time [s] and most CPU time [s]; beyond them it is undecided.
     """
-    work, memo = encounter.start(case.angles, case.share), encounter.memo()
-    integrator = encounter.system.integrator
-    clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**12)
-    clock[UNTIL] = min(encounter.time_limit(), limits[0])
-    rows, began = np.zeros((0, 13)), time.process_time()
-    while True:
-        counts[PAUSE_AT] = counts[STEPS] + CHUNK
-        status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
-        if status == Status.NO_ROOM:
-            work = with_capacity(work, 2 * len(work.candidates))
-        elif status != Status.PAUSED or time.process_time() - began > limits[1]:
+    run = encounter.begin(driver, case.angles, case.share, 10**12, limits[0])
+    began = time.process_time()
+    while (status := run.advance(CHUNK)) == Status.PAUSED:
+        if time.process_time() - began > limits[1]:
+            status = Status.STEP_BUDGET
             break
-    if status == Status.PAUSED:
-        status = Status.STEP_BUDGET
-    return outcome_of(status, counts[CODE], memo)[0], clock[TIME]
+    return outcome_of(status, run.code, run.memo)[0], run.time
 
 
 def run_cases(cases, integrator, limits=None, allowed=None, exact=None):

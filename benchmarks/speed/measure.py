@@ -6,18 +6,13 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import (
-    EVALUATIONS,
     NOW,
-    PAUSE_AT,
-    REJECTED,
-    STEPS,
-    UNTIL,
-    with_capacity,
     work_of,
 )
 from flocsim.ensembles.collision.precision import end_distance
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Status
+from flocsim.run import Run
 
 CHUNK = 100_000
 """Steps between two looks at the clock."""
@@ -47,23 +42,15 @@ def run_once(system, driver, until, budget):
     """One run of a composed driver; "TIME_BUDGET" where it takes more CPU seconds than that."""
     scene = system.scene()
     work = work_of(scene, *system.motion())
-    clock, counts = system.integrator.fresh_clock(), system.integrator.fresh_counts(10**12)
-    clock[UNTIL] = until
-    rows, memo = np.zeros((0, 1 + 6 * len(system.bodies))), np.zeros(1)
+    run = Run(driver, scene, work, system.integrator, until, max_steps=10**12)
     began = time.process_time()
-    while True:
-        counts[PAUSE_AT] = counts[STEPS] + CHUNK
-        code = driver(scene, work, memo, clock, counts, rows)
-        cpu = time.process_time() - began
-        if code == Status.NO_ROOM:
-            work = with_capacity(work, 2 * len(work.candidates))
-        elif code != Status.PAUSED or cpu > budget:
+    while (status := run.advance(CHUNK)) == Status.PAUSED:
+        if time.process_time() - began > budget:
             break
-    status = "TIME_BUDGET" if code == Status.PAUSED else Status(code).name
-    return Measured(
-        work.motion[NOW].copy(), status, cpu, int(counts[STEPS]), int(counts[REJECTED]),
-        int(work.tally[EVALUATIONS]),
-    )  # fmt: skip
+    cpu = time.process_time() - began
+    name = "TIME_BUDGET" if status == Status.PAUSED else status.name
+    motion = run.work.motion[NOW].copy()
+    return Measured(motion, name, cpu, run.steps, run.rejected, run.evaluations)
 
 
 def measure(scene, integrator, budget=20.0, repeat_for=0.1):

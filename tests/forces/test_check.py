@@ -24,7 +24,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.check import check_kernel
-from flocsim.forces.codegen import scene_functions
+from flocsim.forces.codegen import laws_of
 
 
 @attrs.frozen
@@ -246,22 +246,22 @@ def test_closures_are_refused_with_what_they_capture():
 @pytest.mark.parametrize("reach", [math.nan, None, "far"])
 def test_a_reach_that_is_no_gap_is_refused(reach):
     with pytest.raises(KernelError, match="Reaching: its reach is"):
-        scene_functions([Reaching(reach)], Fluid())
+        laws_of([Reaching(reach)], Fluid())
 
 
 @pytest.mark.parametrize("kind", [CentreForce, SurfaceForce, BodyForce, ContactForce])
 def test_a_force_without_a_kernel_is_refused(kind):
     with pytest.raises(KernelError, match="no kernel"):
-        scene_functions([attrs.frozen(type("Mine", (kind,), {}))()], Fluid())
+        laws_of([attrs.frozen(type("Mine", (kind,), {}))()], Fluid())
 
 
 def test_a_force_of_no_kind_is_refused():
     with pytest.raises(KernelError, match="must subclass CentreForce or SurfaceForce"):
-        scene_functions([attrs.frozen(type("Mine", (PairForce,), {}))()], Fluid())
+        laws_of([attrs.frozen(type("Mine", (PairForce,), {}))()], Fluid())
     with pytest.raises(UsageError, match="must subclass BodyForce"):
-        scene_functions([attrs.frozen(type("Mine", (Force,), {}))()], Fluid())
+        laws_of([attrs.frozen(type("Mine", (Force,), {}))()], Fluid())
     with pytest.raises(UsageError, match="found 3"):
-        scene_functions([3], Fluid())
+        laws_of([3], Fluid())
 
 
 @attrs.frozen

@@ -6,12 +6,12 @@ import attrs
 import pytest
 
 from flocsim import Fluid
-from flocsim import hooks as slots
 from flocsim.fields import quantity
 from flocsim.forces import (
     BodyForce,
     CentreForce,
     Contact,
+    ContactForce,
     DoubleLayer,
     Gravity,
     StokesDrag,
@@ -19,7 +19,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.check import SAMPLE_BODIES, SAMPLE_CONTACTS, sample_pairs
-from flocsim.forces.codegen import scene_functions
+from flocsim.forces.codegen import laws_of
 
 PAIRS = sample_pairs(1e-6)
 
@@ -92,17 +92,17 @@ class Unpacked(BodyForce):
         return -1e-6 * body[4], 0.0, 0.0
 
 
-def call(pieces, slot, view):
-    """What the scene's function for a slot returns."""
-    return pieces.fillings.get(slot, slot)(view, pieces.parameters)
+def call(pieces, law, view, *more):
+    """What a law of the scene returns."""
+    return pieces.laws[law](view, pieces.parameters, *more)
 
 
 def test_body_forces_add_up():
     fluid = Fluid(gradient=(0.1, 0.2, 0.3, -0.1))
     forces = [Gravity(), StokesDrag(), Trap()]
     for body in SAMPLE_BODIES:
-        parts = [call(scene_functions([force], fluid), slots.body_force, body) for force in forces]
-        total = call(scene_functions(forces, fluid), slots.body_force, body)
+        parts = [call(laws_of([force], fluid), "body_force", body) for force in forces]
+        total = call(laws_of(forces, fluid), "body_force", body)
         assert total == pytest.approx([sum(part) for part in zip(*parts, strict=True)], rel=1e-14)
 
 
@@ -115,20 +115,20 @@ def test_body_forces_add_up():
     ids=lambda value: type(value).__name__ if isinstance(value, BodyForce) else "",
 )  # fmt: skip
 def test_derivatives_are_asked_of_the_forces_that_have_them(force, velocity, position):
-    pieces = scene_functions([force], Fluid())
-    assert pieces.fillings[slots.reads_velocity]() is velocity
-    assert pieces.fillings[slots.reads_position]() is position
+    pieces = laws_of([force], Fluid())
+    assert ("velocity_force" in pieces.laws) is velocity
+    assert ("position_force" in pieces.laws) is position
 
 
 def test_a_flow_that_varies_makes_drag_a_function_of_place():
-    shear = scene_functions([StokesDrag()], Fluid(gradient=(0.0, 1.0, 0.0, 0.0)))
-    assert shear.fillings[slots.reads_position]()
+    shear = laws_of([StokesDrag()], Fluid(gradient=(0.0, 1.0, 0.0, 0.0)))
+    assert "position_force" in shear.laws
 
 
-def central_difference(pieces, slot, pair, field, size):
+def central_difference(pieces, law, pair, field, size):
     """Derivative of a pair's force by a field of its view."""
     high, low = (
-        call(pieces, slot, pair._replace(**{field: getattr(pair, field) + by}))
+        call(pieces, law, pair._replace(**{field: getattr(pair, field) + by}))
         for by in (size, -size)
     )
     return (high - low) / (2.0 * size)
@@ -138,55 +138,83 @@ def central_difference(pieces, slot, pair, field, size):
     "force", [VanDerWaals(d_min=1e-8), DoubleLayer(debye_length=1e-7), Screened()]
 )
 def test_slopes_are_the_derivative_by_the_gap(force):
-    pieces = scene_functions([force], Fluid())
+    pieces = laws_of([force], Fluid())
     for pair in PAIRS:
         if abs(pair.gap) > 5e-10:
-            slope = call(pieces, slots.centre_slope, pair)
-            wanted = central_difference(pieces, slots.centre_force, pair, "gap", 1e-11)
+            slope = call(pieces, "centre_derivatives", pair)[0]
+            wanted = central_difference(pieces, "centre_force", pair, "gap", 1e-11)
             assert slope == pytest.approx(wanted, rel=1e-5, abs=1e-12)
 
 
 def test_damping_is_minus_the_derivative_by_the_rate():
-    pieces = scene_functions([Lubrication(), VanDerWaals(gap="surface")], Fluid())
+    pieces = laws_of([Lubrication(), VanDerWaals(gap="surface")], Fluid())
     for pair in PAIRS:
-        damping = call(pieces, slots.surface_damping, pair)
-        wanted = -central_difference(pieces, slots.surface_force, pair, "gap_rate", 1e-6)
+        damping = call(pieces, "surface_derivatives", pair)[1]
+        wanted = -central_difference(pieces, "surface_force", pair, "gap_rate", 1e-6)
         assert damping == pytest.approx(wanted, rel=1e-6)
 
 
 def test_a_force_ends_at_its_reach_and_the_scene_at_the_farthest():
-    pieces = scene_functions([Lubrication(), Lubrication(reach=2e-7)], Fluid())
-    assert pieces.fillings[slots.surface_reach](pieces.parameters) == 5e-7
+    pieces = laws_of([Lubrication(), Lubrication(reach=2e-7)], Fluid())
+    assert pieces.surface_reach == 5e-7
     near, middle, far = (PAIRS[-1]._replace(gap=gap) for gap in (1e-7, 3e-7, 6e-7))
-    alone = scene_functions([Lubrication()], Fluid())
+    alone = laws_of([Lubrication()], Fluid())
     for pair, count in ((near, 2), (middle, 1), (far, 0)):
         single = Lubrication.kernel(pair, 1e-12, 1e-8)
-        assert call(pieces, slots.surface_force, pair) == pytest.approx(count * single)
-    assert call(alone, slots.surface_force, far) == 0.0
+        assert call(pieces, "surface_force", pair) == pytest.approx(count * single)
+    assert call(alone, "surface_force", far) == 0.0
 
 
 def test_contact_forces_and_their_slip_limit():
-    pieces = scene_functions([Contact(k_n=20.0, k_t=2.0, friction=0.5)], Fluid())
+    pieces = laws_of([Contact(k_n=20.0, k_t=2.0, friction=0.5)], Fluid())
     for contact in SAMPLE_CONTACTS:
-        limit = call(pieces, slots.slip_limit, contact)
+        limit = call(pieces, "slip_limit", contact)
         assert limit == pytest.approx(0.5 * 20.0 * contact.overlap / 2.0)
-    free = scene_functions([Contact()], Fluid())
-    assert call(free, slots.slip_limit, SAMPLE_CONTACTS[0]) == math.inf
-    assert free.fillings[slots.has_contact]() and not slots.has_contact()
+    free = laws_of([Contact()], Fluid())
+    assert call(free, "slip_limit", SAMPLE_CONTACTS[0]) == math.inf
+    assert "contact_force" in free.laws
 
 
-def test_kinks_of_a_contact_force():
-    assert slots.kink not in scene_functions([Contact()], Fluid()).fillings
+def test_events_of_a_contact_force():
+    none = laws_of([Contact()], Fluid())
+    assert "contact_event" not in none.laws and none.events == 0
     pulling = SAMPLE_CONTACTS[0]._replace(overlap_rate=-1.0)
     pushing = pulling._replace(overlap_rate=0.0)
-    clipped = scene_functions([Contact(tension=False)], Fluid())
-    assert call(clipped, slots.kink, pulling) < 0.0 < call(clipped, slots.kink, pushing)
+    clipped = laws_of([Contact(tension=False)], Fluid())
+    pull, push = (call(clipped, "contact_event", view, 0) for view in (pulling, pushing))
+    assert pull < 0.0 < push
     # Which slides, and which holds, at the same slip.
     slippery, rough = (
-        scene_functions([Contact(k_n=20.0, k_t=2.0, friction=mu)], Fluid()) for mu in (1e-3, 10.0)
+        laws_of([Contact(k_n=20.0, k_t=2.0, friction=mu)], Fluid()) for mu in (1e-3, 10.0)
     )
     slipping = pushing._replace(slip_rate=0.0)
-    assert call(slippery, slots.kink, slipping) < 0.0 < call(rough, slots.kink, slipping)
+    slides, holds = (call(each, "contact_event", slipping, 1) for each in (slippery, rough))
+    assert slides < 0.0 < holds
+
+
+@attrs.frozen
+class Threshold(ContactForce):
+    """A force that sets in at an overlap, with one event."""
+
+    onset: float = 5e-9
+
+    @staticmethod
+    def kernel(contact, onset):
+        return max(contact.overlap - onset, 0.0), 0.0
+
+    @staticmethod
+    def events(contact, onset):
+        return (contact.overlap - onset,)
+
+
+def test_events_of_several_forces_stand_in_a_row():
+    pieces = laws_of([Threshold(), Contact(tension=False), Threshold(2e-8)], Fluid())
+    assert pieces.events == 4
+    contact = SAMPLE_CONTACTS[0]
+    found = [call(pieces, "contact_event", contact, which) for which in range(4)]
+    normal, _ = Contact.events(contact, *range(1, 8))
+    assert found[0] == pytest.approx(5e-9) and found[3] == pytest.approx(-1e-8)
+    assert found[2] == 1.0 and math.isfinite(normal)
 
 
 @pytest.mark.parametrize(
@@ -197,6 +225,6 @@ def test_kinks_of_a_contact_force():
     ],
 )  # fmt: skip
 def test_absent_forces_are_left_out_with_their_reason(force, reason):
-    pieces = scene_functions([force], Fluid())
+    pieces = laws_of([force], Fluid())
     assert pieces.left_out == {type(force).__name__: reason}
-    assert not pieces.parameters and slots.centre_force not in pieces.fillings
+    assert not pieces.parameters and not pieces.laws

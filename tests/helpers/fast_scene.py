@@ -73,7 +73,7 @@ class FastScene:
     def __init__(self, system, *, jit=True, capacity=4096):
         """Compose the right-hand side of the system, compiled or not."""
         self.system = system
-        self.scene = system.scene()
+        self.scene = system.scene(jit=jit)
         self.work = work_of(self.scene, *system.motion(), capacity=capacity)
         self.evaluate = system.compose(entry=right_hand_side, observer=None, jit=jit)
 

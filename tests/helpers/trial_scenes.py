@@ -8,9 +8,8 @@ import math
 import attrs
 import numpy as np
 
-from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim import hooks as slots
-from flocsim.arrays import ERROR, NOW, REJECTED, STEPS, TIME, UNTIL, with_capacity, work_of
+from flocsim import Body, Sphere, SpheroPolygon, System, hooks
+from flocsim.arrays import NOW, with_capacity
 from flocsim.forces import BodyForce, CentreForce, Contact, ContactForce, SurfaceForce
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators import Status
@@ -105,7 +104,7 @@ def watch(scene, work, memo, time):
     return 0
 
 
-WATCH = {slots.awaits_touch: is_awaited, slots.observe: watch}
+WATCH = {hooks.awaits_touch: is_awaited, hooks.observe: watch}
 
 
 @attrs.frozen(eq=False)
@@ -134,18 +133,14 @@ class Watched:
 
 def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit=True):
     """Run a system to a time under the observer above, nothing recorded."""
-    driver = system.compose(observer=WATCH, jit=jit)
-    scene, work = system.scene(), work_of(system.scene(), *system.motion(), capacity)
-    clock, counts = system.integrator.fresh_clock(), system.integrator.fresh_counts(max_steps)
-    clock[UNTIL] = until
     memo = np.zeros(MEMO_SIZE)
     memo[AWAITED] = float(awaited)
-    record = np.zeros((0, 1 + 6 * len(system.bodies)))
-    while (code := driver(scene, work, memo, clock, counts, record)) == Status.NO_ROOM:
-        work = with_capacity(work, 2 * len(work.candidates))
+    run = system.begin(until, max_steps=max_steps, observer=WATCH, memo=memo, jit=jit)
+    run.work = with_capacity(run.work, capacity)
+    status = run.to_end()
     return Watched(
-        motion=work.motion[NOW].copy(), status=Status(code), time=float(clock[TIME]),
-        steps=int(counts[STEPS]), rejected=int(counts[REJECTED]), error=float(clock[ERROR]),
+        motion=run.work.motion[NOW].copy(), status=status, time=run.time, steps=run.steps,
+        rejected=run.rejected, error=run.error,
         contacts=int(memo[CONTACTS]), deepest=float(memo[DEEPEST]),
         touch_time=float(memo[TOUCH_TIME]), touch_gap=float(memo[TOUCH_GAP]),
     )  # fmt: skip

@@ -105,6 +105,13 @@ class Encounter:
         velocity[0, :2], velocity[1, :2] = self.settling[0][0], self.settling[1][0]
         return work_of(self.scene, place, velocity)
 
+    def begin(self, driver, angles, share, max_steps, until=math.inf, record=False):
+        """A Run of a replicate that has yet to take its first step, to a time [s] at most."""
+        return Run(
+            driver, self.scene, self.start(angles, share), self.system.integrator,
+            min(self.time_limit(), until), max_steps=max_steps, memo=self.memo(), record=record,
+        )  # fmt: skip
+
 
 def make_encounter(config, shapes, zone):
     """The Encounter of two shapes under a config."""
@@ -123,11 +130,7 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None, halt
     receive the motion. ``halted()``, optional, is asked every some thousand steps whether to give
     up; the row is None then.
     """
-    run = Run(
-        driver, encounter.scene, encounter.start(angles, share), encounter.system.integrator,
-        encounter.time_limit(), max_steps=max_steps, memo=encounter.memo(),
-        record=record is not None,
-    )  # fmt: skip
+    run = encounter.begin(driver, angles, share, max_steps, record=record is not None)
     status = run.to_end(halted)
     if status == Status.PAUSED:
         return None

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from flocsim import hooks as slots
 from flocsim.arrays import CANDIDATES, NOW, with_capacity, work_of
 from flocsim.body import Fluid, scene_of
-from flocsim.composer import compose
 from flocsim.geometry.contact.candidates import (
     list_candidates,
     list_pair,
@@ -29,14 +27,9 @@ seeds = st.integers(0, 39)
 directions = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9)
 
 
-def given_reach(parameters):
-    """A surface force's reach."""
-    return parameters[0]
-
-
 def arrays(plain, reach=-1.0, capacity=4096):
     """Scene and work arrays of a reference scene."""
-    scene = scene_of(bodies_of(plain, surface_density=2.0), Fluid(), [reach])
+    scene = scene_of(bodies_of(plain, surface_density=2.0), Fluid(), surface_reach=reach)
     return scene, work_of(scene, plain.positions, plain.velocities, capacity)
 
 
@@ -133,7 +126,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
     middle = plain.positions[:, :2].mean(axis=0)
     away = plain.positions[:, :2] - middle
     work.motion[NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
-    assert compose(list_candidates, {slots.surface_reach: given_reach}, jit=False)(scene, work)
+    assert list_candidates(scene, work)
     spend_budget(scene, work, wanted)
     locate_contacts(scene, work, NOW)
     every, listed = pairs_now(plain, work), keys_of(scene, work)

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Fluid, Sphere
-from flocsim import hooks as slots
 from flocsim.arrays import CANDIDATES, CLOSEST, NEW, NOW, TRIAL, work_of
 from flocsim.body import scene_of
-from flocsim.composer import compose
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate, look_at
@@ -26,22 +24,15 @@ RADIUS = 5e-6
 SCENES = range(30)
 
 
-def far_reach(parameters):
-    """A surface force that reaches everywhere, so that the closest pair is flagged."""
-    return 1.0
-
-
-REACHING = {slots.surface_reach: far_reach}
-
-
 def stepped(bodies, change, velocities, reaching=False):
     """Scene and work arrays at the start of a step of 1 s that changes the places by so much."""
-    scene = scene_of(bodies, Fluid(), [])
+    # A surface force that reaches everywhere has the closest pair flagged.
+    scene = scene_of(bodies, Fluid(), surface_reach=1.0 if reaching else -1.0)
     start = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, start, velocities[0], capacity=4096)
     assert list_candidates(scene, work)
     locate_contacts(scene, work, NOW)
-    compose(set_modes, REACHING if reaching else {}, jit=False)(scene, work)
+    set_modes(scene, work)
     work.motion[NEW] = np.hstack([start + change, velocities[1]])
     locate_contacts(scene, work, NEW)
     return scene, work
@@ -130,8 +121,7 @@ def worst_margin(scene, work, shares, reaching):
 def found(seed, reaching):
     """Scene, work arrays, and the share at which the first switch is found."""
     scene, work = wandering(seed, reaching)
-    find = compose(first_switch, REACHING if reaching else {}, jit=False)
-    return scene, work, find(scene, work, 1.0, GRAIN, GRAIN)
+    return scene, work, first_switch(scene, work, 1.0, GRAIN, GRAIN)
 
 
 @pytest.mark.parametrize("reaching", [False, True], ids=["touch", "closest"])
