@@ -14,7 +14,7 @@ import functools
 import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
-from flocsim.composer import compile_law
+from flocsim.compiler.composer import compile_law
 from flocsim.hooks import hook
 
 LAWS = (
@@ -130,7 +130,7 @@ def has_address(scene, law):
 @functools.cache
 def compiled_calls():
     """{hook: function} that let the compiled engine call laws by their addresses."""
-    from flocsim.numba_internals import call_by_address
+    from flocsim.compiler.numba_internals import call_by_address
 
     calls = {has: has_address}
     for index, (law, signature) in enumerate(signatures().items()):

@@ -8,7 +8,7 @@ import numpy as np
 
 from flocsim.arrays import TOLERANCE, work_of
 from flocsim.body import Body, Fluid, scene_of
-from flocsim.composer import compose
+from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.explain import explain
 from flocsim.fields import is_number, is_whole

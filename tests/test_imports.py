@@ -28,13 +28,13 @@ ROWS = [
     ["body"],
     ["geometry", "laws"],
     ["arrays", "hooks"],
-    ["composer"],
-    ["fingerprint", "numba_internals", "fields", "interruption"],
+    ["compiler", "fields", "interruption"],
     ["constants", "errors"],
 ]
 
 # The same inside a room: its sub-rooms and files. A room's own __init__ may import all of them.
 INNER_ROWS = {
+    "compiler": [["composer"], ["fingerprint", "numba_internals"]],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
@@ -238,7 +238,7 @@ def test_version_is_one():
         ("forces/drag.py", "from flocsim.integrators import base", 1),
         ("forces/drag.py", "from ..integrators import base", 1),
         ("forces/drag.py", "from . import base\nfrom .base import Force", 0),
-        ("composer.py", "from flocsim import constants, errors", 0),
+        ("compiler/composer.py", "from flocsim import constants, errors", 0),
         ("fields.py", "from flocsim.errors import RangeError", 0),
         ("io/provenance.py", "from flocsim import __version__", 0),
         (

@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.compiler.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.errors import KernelError
-from flocsim.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 
 SAMPLE_BODIES = (

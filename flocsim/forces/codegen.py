@@ -6,7 +6,6 @@ derivatives of what no kernel reads) is not written, and is no law of the scene.
 """
 
 import functools
-import math
 
 import attrs
 
@@ -28,6 +27,11 @@ VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
 
 
+ROOM = 64
+"""Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
+another kind leave the text of a law as it is."""
+
+
 @attrs.define
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
@@ -42,21 +46,45 @@ class Pieces:
     left_out: dict = attrs.Factory(dict)
 
 
-def append_value(parameters, value):
-    """Append a number or a tuple of numbers; the source text that reads it back."""
-    if isinstance(value, tuple):
-        return "(" + "".join(append_value(parameters, each) + ", " for each in value) + ")"
-    parameters.append(value)
-    return f"parameters[{len(parameters) - 1}]"
+@attrs.define
+class Source:
+    """The source of the laws of one kind of force, the kernels that it names, and the numbers that
+    it reads from ``parameters``, from place ``BASE`` on."""
+
+    fluid: object
+    functions: list = attrs.Factory(list)
+    kernels: dict = attrs.Factory(dict)
+    numbers: list = attrs.Factory(list)
+
+    def value(self, value):
+        """Keep a number or a tuple of numbers; the text that reads it back."""
+        if isinstance(value, tuple):
+            return "(" + "".join(self.value(each) + ", " for each in value) + ")"
+        self.numbers.append(value)
+        return f"parameters[BASE + {len(self.numbers) - 1}]"
+
+    def call(self, force, kernel, view):
+        """Text of a call of a kernel with its parameters read from the array."""
+        name = f"{type(force).__name__}_{kernel.__name__}_{len(self.kernels)}"
+        self.kernels[name] = kernel
+        arguments = kernel_arguments(force, self.fluid, kernel)
+        return f"{name}({', '.join([view, *map(self.value, arguments)])})"
+
+    def laws(self, parameters):
+        """{law: function}; its numbers are appended to ``parameters``."""
+        base = len(parameters)
+        parameters += self.numbers
+        parameters += [0.0] * (-len(parameters) % ROOM or (ROOM if not self.numbers else 0))
+        return made_laws("\n\n".join(self.functions), base, tuple(self.kernels.items()))
 
 
-def call_text(pieces, namespace, force, fluid, kernel, view):
-    """Source of a call of the kernel with its parameters read from the array."""
-    name = f"{type(force).__name__}_{kernel.__name__}_{len(namespace)}"
-    namespace[name] = kernel
-    arguments = kernel_arguments(force, fluid, kernel)
-    values = [append_value(pieces.parameters, value) for value in arguments]
-    return name, f"{name}({', '.join([view, *values])})"
+@functools.lru_cache(maxsize=256)
+def made_laws(text, base, kernels):
+    """{law: function} of a source text; the same functions for the same text and kernels."""
+    namespace = {"PairView": PairView, "BASE": base, "max": max, "min": min, "abs": abs}
+    namespace |= dict(kernels)
+    exec(compile(text, "<scene>", "exec"), namespace)
+    return {name: namespace[name] for name in LAWS if name in namespace}
 
 
 def sum_function(name, view, terms, zeros):
@@ -76,7 +104,7 @@ def sum_function(name, view, terms, zeros):
     return "\n".join(lines) + "\n"
 
 
-def difference_text(call, name, field, size):
+def difference_text(call, field, size):
     """Source of a central difference of a pair kernel by one field of its view."""
     index = PairView._fields.index(field)
     shifted = []
@@ -87,69 +115,67 @@ def difference_text(call, name, field, size):
     return f"({shifted[0]} - {shifted[1]}) / (2.0 * {size})"
 
 
-def body_text(pieces, namespace, forces, fluid):
-    """Source of the body forces and of the parts that the implicit integrators differentiate."""
+def write_body_laws(source, forces):
+    """Body forces, and the parts of them that the implicit integrators differentiate."""
     terms = {"body_force": [], "velocity_force": [], "position_force": []}
     for force in forces:
-        kernel = force.kernel_in(fluid)
-        _, call = call_text(pieces, namespace, force, fluid, kernel, "body")
-        reads = fields_read(force, fluid, kernel, SAMPLE_BODIES)
+        kernel = force.kernel_in(source.fluid)
+        call = source.call(force, kernel, "body")
+        reads = fields_read(force, source.fluid, kernel, SAMPLE_BODIES)
         terms["body_force"].append(("", call))
         if reads & VELOCITIES:
             terms["velocity_force"].append(("", call))
         if reads & PLACES:
             terms["position_force"].append(("", call))
-    return [sum_function(name, "body", some, 3) for name, some in terms.items() if some]
-
-
-def pair_text(pieces, namespace, forces, fluid, kind):
-    """Source of the centre forces or of the surface forces, and of their derivatives."""
-    force_terms, slope_terms, damping_terms = [], [], []
-    for force in forces:
-        reach = append_value(pieces.parameters, reach_of(force))
-        condition = f"pair.gap < {reach}"
-        name, call = call_text(pieces, namespace, force, fluid, force.kernel, "pair")
-        force_terms.append((condition, call))
-        if force.slope is None:
-            size = "(1e-4 * abs(pair.gap) + 1e-13)"
-            slope_terms.append((condition, difference_text(call, name, "gap", size)))
-        else:
-            _, slope = call_text(pieces, namespace, force, fluid, force.slope, "pair")
-            slope_terms.append((condition, slope))
-        samples = sample_pairs(reach_of(force))
-        if "gap_rate" in fields_read(force, fluid, force.kernel, samples):
-            size = "(1e-3 * abs(pair.gap_rate) + 1e-9)"
-            change = difference_text(call, name, "gap_rate", size)
-            damping_terms.append((condition, f"-({change})"))
-    return [
-        sum_function(f"{kind}_force", "pair", force_terms, 1),
-        sum_function(f"{kind}_slope", "pair", slope_terms, 1),
-        sum_function(f"{kind}_damping", "pair", damping_terms, 1),
-        f"def {kind}_derivatives(pair, parameters):\n"
-        f"    return {kind}_slope(pair, parameters), {kind}_damping(pair, parameters)\n",
+    source.functions += [
+        sum_function(name, "body", some, 3) for name, some in terms.items() if some
     ]
 
 
-def contact_text(pieces, namespace, forces, fluid):
-    """Source of the contact forces, the limit of their tangential displacement, their events."""
+def write_pair_laws(source, forces, kind):
+    """Centre forces or surface forces, and their derivatives."""
+    force_terms, slope_terms, damping_terms = [], [], []
+    for force in forces:
+        condition = f"pair.gap < {source.value(reach_of(force))}"
+        call = source.call(force, force.kernel, "pair")
+        force_terms.append((condition, call))
+        if force.slope is None:
+            slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
+        else:
+            slope = source.call(force, force.slope, "pair")
+        slope_terms.append((condition, slope))
+        samples = sample_pairs(reach_of(force))
+        if "gap_rate" in fields_read(force, source.fluid, force.kernel, samples):
+            change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
+            damping_terms.append((condition, f"-({change})"))
+    if forces:
+        source.functions += [
+            sum_function(f"{kind}_force", "pair", force_terms, 1),
+            sum_function(f"{kind}_slope", "pair", slope_terms, 1),
+            sum_function(f"{kind}_damping", "pair", damping_terms, 1),
+            f"def {kind}_derivatives(pair, parameters):\n"
+            f"    return {kind}_slope(pair, parameters), {kind}_damping(pair, parameters)\n",
+        ]
+
+
+def write_contact_laws(source, forces):
+    """Contact forces, the limit of their tangential displacement, and their events; how many."""
     terms, limits, events = [], [], []
     for force in forces:
-        _, call = call_text(pieces, namespace, force, fluid, force.kernel, "contact")
-        terms.append(("", call))
+        terms.append(("", source.call(force, force.kernel, "contact")))
         if force.slip_limit is not None:
-            _, limit = call_text(pieces, namespace, force, fluid, force.slip_limit, "contact")
-            limits.append(limit)
+            limits.append(source.call(force, force.slip_limit, "contact"))
         if force.has_events:
-            _, call = call_text(pieces, namespace, force, fluid, force.events, "contact")
-            events.append((event_count(force, fluid), call))
-    text = [sum_function("contact_force", "contact", terms, 2)]
+            call = source.call(force, force.events, "contact")
+            events.append((event_count(force, source.fluid), call))
+    if terms:
+        source.functions.append(sum_function("contact_force", "contact", terms, 2))
     if limits:
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
-        text.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
+        source.functions.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
     if events:
-        text.append(event_text(events))
-    pieces.events = sum(count for count, _ in events)
-    return text
+        source.functions.append(event_text(events))
+    return sum(count for count, _ in events)
 
 
 def event_text(events):
@@ -194,23 +220,13 @@ def laws_of(forces, fluid):
     """The Pieces of a scene with these forces in this fluid."""
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
-    namespace = {}
-    text = body_text(pieces, namespace, kinds["body"], fluid)
-    for kind in ("centre", "surface"):
-        if kinds[kind]:
-            text += pair_text(pieces, namespace, kinds[kind], fluid, kind)
-    if kinds["contact"]:
-        text += contact_text(pieces, namespace, kinds["contact"], fluid)
+    sources = {kind: Source(fluid) for kind in kinds}
+    write_body_laws(sources["body"], kinds["body"])
+    write_pair_laws(sources["centre"], kinds["centre"], "centre")
+    write_pair_laws(sources["surface"], kinds["surface"], "surface")
+    pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
-    pieces.laws = made_laws("\n\n".join(text), tuple(namespace.items()))
+    for source in sources.values():
+        pieces.laws |= source.laws(pieces.parameters)
     return pieces
-
-
-@functools.lru_cache(maxsize=256)
-def made_laws(text, kernels):
-    """{law: function} of a source text; the same functions for the same text and kernels."""
-    namespace = {"PairView": PairView, "max": max, "min": min, "abs": abs, "math": math}
-    namespace |= dict(kernels)
-    exec(compile(text, "<scene>", "exec"), namespace)
-    return {name: namespace[name] for name in LAWS if name in namespace}

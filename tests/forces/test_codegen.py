@@ -227,4 +227,4 @@ def test_events_of_several_forces_stand_in_a_row():
 def test_absent_forces_are_left_out_with_their_reason(force, reason):
     pieces = laws_of([force], Fluid())
     assert pieces.left_out == {type(force).__name__: reason}
-    assert not pieces.parameters and not pieces.laws
+    assert not any(pieces.parameters) and not pieces.laws

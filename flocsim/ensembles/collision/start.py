@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from flocsim.composer import compose
+from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.circle_tree import core_distance, outlines_of
 
 MOST_ADVANCES = 1000

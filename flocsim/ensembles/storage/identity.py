@@ -15,10 +15,10 @@ from pathlib import Path
 import attrs
 import numpy as np
 
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.config.methods import make_integrator
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
-from flocsim.fingerprint import fingerprint
 from flocsim.integrators.loop.driver import advance
 
 VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file"}}

@@ -14,4 +14,4 @@ FILLINGS = {
     near_pairs.gap_between: near_pairs.sphere_gap,
     contacts.locate_polygons: contacts.locate_spheres,
 }
-"""The replacements, for flocsim.composer.compose."""
+"""The replacements, for flocsim.compiler.composer.compose."""

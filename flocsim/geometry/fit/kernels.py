@@ -1,10 +1,10 @@
-"""The kernels of a fit, compiled on first use and kept on disk (flocsim.composer)."""
+"""The kernels of a fit, compiled on first use and kept on disk (flocsim.compiler.composer)."""
 
 from functools import cache
 
 import numpy as np
 
-from flocsim.composer import compose
+from flocsim.compiler.composer import compose
 from flocsim.geometry.fit.coverage import cover
 from flocsim.geometry.fit.outline import ring_inside
 from flocsim.geometry.fit.pattern import PLAIN, pattern_search

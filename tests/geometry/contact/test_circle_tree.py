@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import CANDIDATES, work_of
 from flocsim.body import scene_of
-from flocsim.composer import compose
+from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.circle_tree import (
     START,
     at_leaves,

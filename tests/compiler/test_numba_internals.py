@@ -11,9 +11,9 @@ import pytest
 from numba.core import types
 
 import flocsim
-from flocsim import composer, numba_internals
-from flocsim.composer import compose
-from flocsim.numba_internals import (
+from flocsim.compiler import composer, numba_internals
+from flocsim.compiler.composer import compose
+from flocsim.compiler.numba_internals import (
     NO_COUNTING,
     address_of,
     call_by_address,

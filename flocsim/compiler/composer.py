@@ -24,8 +24,8 @@ import types
 import warnings
 from pathlib import Path
 
+from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
 from flocsim.errors import KernelError
-from flocsim.fingerprint import fingerprint, reached, refuse_closure
 
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
@@ -101,7 +101,7 @@ def entry_source(entry):
     code = entry.__code__
     arguments = ", ".join(code.co_varnames[: code.co_argcount])
     return (
-        f'"""Made by flocsim.composer from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
+        f'"""Made by flocsim from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
         f"def run({arguments}):\n    return driver({arguments})\n"
     )
 
@@ -118,7 +118,7 @@ def linked_module(entry, fillings, name, options):
     """(module ``name``, whose ``run`` calls the linked entry; whether the disk keeps it)."""
     import numba
 
-    from flocsim.numba_internals import inner_compiler, typed_once
+    from flocsim.compiler.numba_internals import inner_compiler, typed_once
 
     inner = {**options, **UNWRAPPED, **inner_compiler()}
 
@@ -147,7 +147,7 @@ UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 def options_of(allocates):
     """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
-    from flocsim.numba_internals import NO_COUNTING
+    from flocsim.compiler.numba_internals import NO_COUNTING
 
     return {"nogil": True, "error_model": "numpy", **({} if allocates else NO_COUNTING)}
 
@@ -156,7 +156,7 @@ def compiled(entry, fillings, name, allocates):
     """The entry compiled as module ``name`` at its first call, from the disk where it is there."""
     import numba
 
-    from flocsim.numba_internals import quick_typing
+    from flocsim.compiler.numba_internals import quick_typing
 
     options = options_of(allocates)
     module, kept = linked_module(entry, fillings, name, options)
@@ -179,16 +179,20 @@ def compiled(entry, fillings, name, allocates):
 
 
 def compiler_complaint(text):
-    """ "file:line: what is wrong" from numba's many lines: the innermost place that it names."""
+    """ "file:line: what is wrong" from numba's many lines: the innermost place of a kernel in it."""
     words, complaint = "", ""
     for line in text.splitlines():
         found = re.match(r'\s*File "(.+)", line (\d+)', line)
-        if found:
+        if found and not (MADE.search(found[1]) or words.startswith("During:")):
             complaint = f"{found[1]}:{found[2]}: {words}"
         elif line.strip():
             words = line.strip()
     complaint = complaint or text.strip().splitlines()[0]
     return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
+
+
+MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
+"""Files that are made here, and say nothing to a user."""
 
 
 def compose(entry, fillings, *, jit=True, allocates=False):
@@ -217,7 +221,7 @@ def compile_law(law, signature):
     """
     import numba
 
-    from flocsim.numba_internals import address_of, quick_typing
+    from flocsim.compiler.numba_internals import address_of, quick_typing
 
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
@@ -239,7 +243,7 @@ def compile_law(law, signature):
 @functools.cache
 def options_text(allocates):
     """How functions are compiled, for the hash: options, and the code that calls laws."""
-    from flocsim import numba_internals
+    from flocsim.compiler import numba_internals
 
     source = Path(numba_internals.__file__).read_bytes()
     digest = hashlib.blake2b(source, digest_size=8).hexdigest()

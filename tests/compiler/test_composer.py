@@ -8,13 +8,14 @@ import numba
 import numpy as np
 import pytest
 
-from flocsim import Body, Sphere, System, composer
-from flocsim.composer import compile_law, compose
+from flocsim import Body, Sphere, System
+from flocsim.compiler import composer
+from flocsim.compiler.composer import compile_law, compose
+from flocsim.compiler.fingerprint import fingerprint
+from flocsim.compiler.numba_internals import call_by_address
 from flocsim.errors import KernelError
-from flocsim.fingerprint import fingerprint
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators.loop.driver import advance
-from flocsim.numba_internals import call_by_address
 
 MODULE = """\
 import math
@@ -63,7 +64,7 @@ def scaled_view(x, parameters):
 
 
 def unknown(x, parameters):
-    return math.no_such_function(x)
+    return x.no_such_attribute
 
 
 def outside(x):

@@ -1,0 +1,5 @@
+"""From plain Python functions to machine code that is warm from disk and never stale.
+
+``composer``: engines and laws compiled and kept.  ``fingerprint``: what a function does, as a hash.
+``numba_internals``: all that leans on numba's private parts.  Imports errors only.
+"""
