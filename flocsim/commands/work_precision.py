@@ -3,7 +3,14 @@
 import attrs
 
 from flocsim.commands.trajectory import select, with_one_count
+from flocsim.ensembles.collision.precision import end_distance, replicate_system
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
+from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.io.results.schema import OUTCOMES
 
 TIGHTEST = 1e-13
 """Tolerance [m] of the reference."""
@@ -38,8 +45,6 @@ def add_parser(subparsers):
 
 def methods(duration):
     """(name, setting as text, integrator) of all runs."""
-    from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-
     for method in (Implicit, DormandPrince54):
         for tolerance in TOLERANCES:
             yield method.__name__, f"{tolerance:.0e} m", method(tolerance)
@@ -56,8 +61,6 @@ def timed(system, duration):
 
 def reference(system, duration):
     """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
-    from flocsim.integrators import Implicit
-
     found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
         duration, max_steps=MOST_STEPS, record=False
     )
@@ -68,8 +71,6 @@ def reference(system, duration):
 
 def row(system, duration, exact, name, setting, integrator):
     """One line of the table; no error is shown for a run that failed."""
-    from flocsim.ensembles.collision.precision import end_distance
-
     found = timed(attrs.evolve(system, integrator=integrator), duration)
     error = "-"
     if found.status.name == "FINISHED":
@@ -80,10 +81,6 @@ def row(system, duration, exact, name, setting, integrator):
 
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    from flocsim.ensembles.collision.precision import replicate_system
-    from flocsim.ensembles.collision.sampling import draws, orientations
-    from flocsim.ensembles.study import Study
-
     study = Study(with_one_count(config, place[1]))
     numbers = draws(config.seed, number)
     found = study.run(*place, number)
@@ -94,10 +91,6 @@ def replicate(config, place, number):
 
 def run(args):
     """Run the methods, print the table; the exit code."""
-    from flocsim.ensembles.config.loader import load_config
-    from flocsim.ensembles.preflight import check_study
-    from flocsim.io.results.schema import OUTCOMES
-
     config = load_config(args.config)
     place = select(config, args)
     check_study(config)
