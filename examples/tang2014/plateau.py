@@ -181,7 +181,6 @@ def draw_approach(axes, bound, gap, reach):
 
 
 def main():
-    """Run both tests."""
     arguments = parse_arguments(__doc__)
 
     def make(*changes):

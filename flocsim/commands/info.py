@@ -19,7 +19,6 @@ MOST_FAILURES = 10
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "info",
         help="describe a results file",
@@ -35,7 +34,6 @@ def add_parser(subparsers):
 
 
 def run(args):
-    """Print the description, or the config; returns the exit code."""
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
@@ -69,7 +67,6 @@ def config_text(path, results):
 
 
 def results_text(path, results, totals):
-    """The whole description as text."""
     facts = conditions(results) + outcomes(results, totals) + origin(results)
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]

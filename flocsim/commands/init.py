@@ -73,7 +73,6 @@ file = "results.h5"
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "init",
         help="write an example config file",

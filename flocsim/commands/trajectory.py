@@ -23,20 +23,13 @@ ANIMATION_FRAMES = 60
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "trajectory", help="run one replicate of a config and draw it as a strip of frames"
     )
-    parser.add_argument("config", help="config file (TOML)")
-    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    add_replicate(parser)
     parser.add_argument(
         "--scene", metavar="TYPE,N,F", help="collision type, vertices and displacement in one word"
     )
-    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
-    parser.add_argument(
-        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
-    )
-    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
     parser.add_argument("--seed", type=int, help="seed, instead of the config's")
     parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
     parser.add_argument(
@@ -62,6 +55,17 @@ def add_parser(subparsers):
     parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
     return parser
+
+
+def add_replicate(parser):
+    """The arguments that name a replicate of a config; `select` finds it."""
+    parser.add_argument("config", help="config file (TOML)")
+    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
+    parser.add_argument(
+        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
+    )
+    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
 
 
 def chosen(value, known, option, default):

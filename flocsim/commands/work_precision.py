@@ -2,7 +2,7 @@
 
 import attrs
 
-from flocsim.commands.trajectory import select, with_one_count
+from flocsim.commands.trajectory import add_replicate, select, with_one_count
 from flocsim.ensembles.collision.precision import end_distance, replicate_system
 from flocsim.ensembles.collision.sampling import draws, orientations
 from flocsim.ensembles.config.loader import load_config
@@ -27,18 +27,13 @@ HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'step
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "work-precision",
         help="error against run time of the integrators on one replicate of a config",
         description="Run one replicate by every integrator over six decades of tolerance, to the "
         "time at which it is decided, and print how far its end is from the reference.",
     )
-    parser.add_argument("config", help="config file (TOML)")
-    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
-    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
-    parser.add_argument("--vertices", type=int, metavar="N", help="default: the last")
-    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
+    add_replicate(parser)
     parser.set_defaults(run=run, frames=2)
     return parser
 
