@@ -57,7 +57,6 @@ def draw(folder):
 
 
 def main():
-    """Fill the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, metavar="DIR")
     parser.add_argument("--draw", action="store_true", help="make summary and figures anew first")

@@ -6,12 +6,10 @@ FORMATS = ("png", "pdf")
 
 
 def paths_of(stem):
-    """The figure's path in every format."""
     return [Path(f"{stem}.{ending}") for ending in FORMATS]
 
 
 def save_all(figure, stem):
-    """Save a figure in every format; the paths."""
     from flocsim.io.plots.style import save
 
     paths = paths_of(stem)

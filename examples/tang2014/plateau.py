@@ -27,6 +27,7 @@ from flocsim.forces import VanDerWaals
 from flocsim.io.confidence import proportion
 from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
+from flocsim.io.trajectory import centre_distance
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)
@@ -109,7 +110,7 @@ def nearest_approach(study, kind, replicate):
     record = Record()
     row = study.run(kind, VERTICES, SHARE, replicate, record)
     times, position, _ = record.arrays()
-    distance = np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+    distance = centre_distance(position)
     after = distance[times >= row["t_collision"]] if row["inside"] <= 1 else distance
     _, radius_i, radius_j = study.config.scene.conditions[kind]
     return row["outcome"], after.min() - radius_i - radius_j
@@ -180,7 +181,6 @@ def draw_approach(axes, bound, gap, reach):
 
 
 def main():
-    """Run both tests."""
     arguments = parse_arguments(__doc__)
 
     def make(*changes):

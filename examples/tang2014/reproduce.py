@@ -31,7 +31,6 @@ ERROR_VERTICES = "4,8,16,28,40,52,64"
 
 
 def parse_arguments():
-    """The command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -51,7 +50,6 @@ def parse_arguments():
 
 
 def cores():
-    """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
@@ -129,7 +127,6 @@ def readings_of(arguments):
 
 
 def reading_file(folder, name):
-    """Where a reading's results go."""
     return folder / f"reading-{name.replace(' ', '-')}.h5"
 
 
@@ -167,7 +164,6 @@ def refuse_launchers():
 
 
 def main():
-    """All steps."""
     arguments = parse_arguments()
     refuse_launchers()
     folder = arguments.output

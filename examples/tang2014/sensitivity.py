@@ -75,7 +75,6 @@ def draw(axes, found: Sweep):
 
 
 def figure(sweeps):
-    """All panels."""
     with house_style():
         whole = new_figure(8.2, 4.3)
         panels = whole.subplots(2, 3, sharey=True).ravel()
@@ -109,7 +108,6 @@ def add_legend(axes):
 
 
 def write_points(path, sweeps):
-    """Every point as a row."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["quantity", "value", "type", "pr_a", "low", "high", "decided", "open"])
@@ -151,7 +149,6 @@ def solid(found):
 
 
 def main():
-    """Run all values, draw all panels."""
     arguments = parse_arguments(__doc__)
     began = time.process_time()
     sweeps = run_all(arguments.library, arguments.replicates)

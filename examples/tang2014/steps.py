@@ -24,7 +24,6 @@ def call(folder, name, *words):
 
 
 def note(path, name, seconds, command):
-    """Append a step to the table."""
     fresh = not path.exists()
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     with path.open("a", newline="", encoding="utf-8") as file:

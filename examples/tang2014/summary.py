@@ -79,7 +79,6 @@ def totals(study):
 
 
 def reached(flag):
-    """Whether a goal was."""
     return "reached" if flag else "**not reached**"
 
 

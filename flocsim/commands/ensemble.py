@@ -4,11 +4,9 @@ from flocsim.ensembles.cli import add_arguments, run_command
 
 
 def add_parser(subparsers):
-    """Add the subcommand."""
     parser = subparsers.add_parser("ensemble", help="run the ensemble of a config file")
     add_arguments(parser).set_defaults(run=run)
 
 
 def run(arguments):
-    """Run the ensemble; the exit code."""
     return run_command(arguments)

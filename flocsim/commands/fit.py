@@ -22,7 +22,6 @@ region, also those left out and why, goes to a table beside the library.
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "fit",
         help="fit spheropolygons to the flocs of pictures",
@@ -202,7 +201,6 @@ def write(args, summary, pictures, fits, entries, options):
 
 
 def write_summary(path, pictures, fits, options):
-    """Write the table of all regions."""
     replace_file(path, summary_text(pictures, fits, options.pixel_size).encode())
 
 
@@ -220,7 +218,6 @@ def draw(overlay, pictures, fits, options):
 
 
 def overlay_path(overlay, picture, several):
-    """Where a picture's overlay goes."""
     overlay = Path(overlay)
     stem = Path(picture.name.replace(":", "-").replace("/", "-"))
     stem = stem.stem if stem.suffix.lower() == picture.path.suffix.lower() else stem.name

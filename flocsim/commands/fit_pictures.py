@@ -155,7 +155,6 @@ def fit_region(task):
 
 
 def fit_one(mask, count, radius, options):
-    """The Fit of a mask by the Options."""
     from flocsim.geometry.fit.fit import fit_mask
 
     # A circle of a spheroradius above r_eq is larger than the floc already.

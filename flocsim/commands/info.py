@@ -5,7 +5,12 @@ import math
 import sys
 import tomllib
 
+from flocsim.ensembles.parallel.desk import describe_note
+from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError
+from flocsim.io.results.file import OUTCOMES, read_results, replicate_totals
+from flocsim.io.shapes.fit_report import format_errors
+from flocsim.io.shapes.library import is_library, read_library, read_settings
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history")
 """What the group ``run`` holds besides what is printed as it is."""
@@ -14,7 +19,6 @@ MOST_FAILURES = 10
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "info",
         help="describe a results file",
@@ -30,10 +34,6 @@ def add_parser(subparsers):
 
 
 def run(args):
-    """Print the description, or the config; returns the exit code."""
-    from flocsim.io.results.file import read_results, replicate_totals
-    from flocsim.io.shapes.library import is_library
-
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
@@ -47,9 +47,6 @@ def run(args):
 
 def library_text(path):
     """A shape library as text: its flocs, how they were fitted, their errors."""
-    from flocsim.io.shapes.fit_report import format_errors
-    from flocsim.io.shapes.library import read_library, read_settings
-
     entries = read_library(path)
     images = sorted({entry.image for entry in entries})
     sizes = [1e6 * entry.equivalent_radius * entry.pixel_size for entry in entries]
@@ -70,9 +67,6 @@ def config_text(path, results):
 
 
 def results_text(path, results, totals):
-    """The whole description as text."""
-    from flocsim.ensembles.report import format_table
-
     facts = conditions(results) + outcomes(results, totals) + origin(results)
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
@@ -113,8 +107,6 @@ def overrides(run):
 
 def outcomes(results, totals):
     """(name, value) of what came out, all conditions together."""
-    from flocsim.io.results.file import OUTCOMES
-
     found = zip(OUTCOMES, totals.outcomes, strict=True)
     rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
     named = list(zip(results.failures, totals.failures, strict=True))[1:]
@@ -149,8 +141,6 @@ def readable(name, value):
 
 def failed_lines(results):
     """The replicates that failed, each with the words that run it again."""
-    from flocsim.ensembles.parallel.desk import describe_note
-
     notes = json.loads(results.run.get("failed", "[]"))
     lines = [f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES]]
     if len(notes) > MOST_FAILURES:

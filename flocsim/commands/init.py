@@ -3,6 +3,7 @@
 import os
 
 from flocsim.errors import UsageError
+from flocsim.io.files import replace_file
 
 DEFAULT_FILE = "study.toml"
 
@@ -72,7 +73,6 @@ file = "results.h5"
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "init",
         help="write an example config file",
@@ -88,8 +88,6 @@ def add_parser(subparsers):
 
 def run(args):
     """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
-    from flocsim.io.files import replace_file
-
     if os.path.lexists(args.file) and not args.force:
         raise UsageError(f"{args.file} exists already: name another file, or add --force")
     replace_file(args.file, EXAMPLE.encode())

@@ -23,7 +23,6 @@ def listed(figures):
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     import argparse
 
     parser = subparsers.add_parser(
@@ -87,7 +86,6 @@ def figure_names(text):
 
 
 def made_folder(name):
-    """The output folder, made if missing."""
     folder = Path(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -4,26 +4,32 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.forces_between import loads_of
+from flocsim.ensembles.collision.sampling import draws
+from flocsim.ensembles.collision.snapshots import frames_of
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.settings import nested, parsed
+from flocsim.ensembles.preflight import check_output, check_study
+from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
+from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
+from flocsim.io.plots.style import checked_format, save
+from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.trajectory import centre_distance, write_trajectory
 
 ANIMATION_FRAMES = 60
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "trajectory", help="run one replicate of a config and draw it as a strip of frames"
     )
-    parser.add_argument("config", help="config file (TOML)")
-    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    add_replicate(parser)
     parser.add_argument(
         "--scene", metavar="TYPE,N,F", help="collision type, vertices and displacement in one word"
     )
-    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
-    parser.add_argument(
-        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
-    )
-    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
     parser.add_argument("--seed", type=int, help="seed, instead of the config's")
     parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
     parser.add_argument(
@@ -49,6 +55,17 @@ def add_parser(subparsers):
     parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
     return parser
+
+
+def add_replicate(parser):
+    """The arguments that name a replicate of a config; `select` finds it."""
+    parser.add_argument("config", help="config file (TOML)")
+    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
+    parser.add_argument(
+        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
+    )
+    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
 
 
 def chosen(value, known, option, default):
@@ -93,22 +110,18 @@ def with_one_count(config, vertex_count):
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
 
-def check_outputs(config_path, figures, others):
+def check_outputs(args, figures):
     """FlocsimError now, rather than after the run, for files that could not be written."""
-    from flocsim.ensembles.preflight import check_output
-    from flocsim.io.plots.style import checked_format
-
     for path in figures:
         checked_format(path)
-    for path in [*figures, *others]:
-        check_output(path, config_path)
+    if args.animation and Path(args.animation).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {args.animation} must end in .gif")
+    for path in [*figures, *filter(None, (args.animation, args.save))]:
+        check_output(path, args.config)
 
 
-def describe(config, place, replicate, row):
+def outcome_line(config, place, replicate, row):
     """One line on what happened."""
-    from flocsim.ensembles.collision.failures import FAILURES
-    from flocsim.io.results.schema import OUTCOMES
-
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
     reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
@@ -123,108 +136,64 @@ def describe(config, place, replicate, row):
     )
 
 
-def strip_paths(args):
-    """Where the strip of frames goes."""
-    return args.output or [f"trajectory-{args.replicate}.png"]
-
-
 def overrides(args):
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.settings import nested, parsed
-
     given = nested(map(parsed, args.settings))
     return given if args.seed is None else given | {"seed": args.seed}
 
 
-def check_animation(path):
-    """UsageError for an animation whose name does not end in .gif."""
-    if path and Path(path).suffix.lower() != ".gif":
-        raise UsageError(f"--animation {path} must end in .gif")
-
-
-def draw_more(args, encounter, arrays, row, title):
-    """Draw the forces and the animation where asked for; the paths written."""
-    from flocsim.ensembles.collision.forces_between import loads_of
-    from flocsim.ensembles.collision.snapshots import frames_of
-    from flocsim.io.plots.collision import draw_forces, write_animation
-
+def draw(args, encounter, arrays, row, title):
+    """Draw and save what was asked for; the paths written."""
     times, position, _ = arrays
-    written = []
+    touch, zone = row["t_collision"], encounter.zone_distance
+    motion = times, centre_distance(position)
+    frames = frames_of(encounter.shapes, times, position, touch, args.frames)
+    strip = draw_strip(
+        frames.outlines, frames.times, frames.paths, title,
+        centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
+    )  # fmt: skip
+    written = save_all(strip, args.output)
+    if args.distance:
+        written += save_all(draw_distance(*motion, zone, title), args.distance)
     if args.forces:
         instants, loads = loads_of(encounter, *arrays)
-        written += save_all(draw_forces(instants, loads, row["t_collision"], title), args.forces)
+        written += save_all(draw_forces(instants, loads, touch, title), args.forces)
     if args.animation:
-        frames = frames_of(encounter.shapes, times, position, row["t_collision"], ANIMATION_FRAMES)
-        distance = centre_distance(position)
-        write_animation(args.animation, frames, (times, distance), encounter.zone_distance, title)
+        frames = frames_of(encounter.shapes, times, position, touch, ANIMATION_FRAMES)
+        write_animation(args.animation, frames, motion, zone, title)
         written.append(Path(args.animation))
     return written
 
 
 def save_all(figure, names):
     """Save a figure under every name; the paths."""
-    from flocsim.io.plots.style import save
-
     paths = [Path(name) for name in names]
     for path in paths:
         save(figure, path)
     return paths
 
 
-def centre_distance(position):
-    """d_c (k,) [m]."""
-    import numpy as np
-
-    return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
-
-
-def draw(args, frames, motion, zone, title):
-    """Draw and save what was asked for; the paths written."""
-    from flocsim.io.plots.collision import draw_distance, draw_strip
-
-    strip = draw_strip(
-        frames.outlines, frames.times, frames.paths, title,
-        centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
-    )  # fmt: skip
-    written = save_all(strip, strip_paths(args))
-    if args.distance:
-        written += save_all(draw_distance(*motion, zone, title), args.distance)
-    return written
-
-
 def run(args):
     """Run the replicate, draw it, print what happened; the exit code."""
-    from flocsim.ensembles.collision.encounter import Record
-    from flocsim.ensembles.collision.sampling import draws
-    from flocsim.ensembles.collision.snapshots import frames_of
-    from flocsim.ensembles.config.loader import load_config
-    from flocsim.ensembles.preflight import check_study
-    from flocsim.ensembles.study import Study
-    from flocsim.io.trajectory import write_trajectory
-
     config = load_config(args.config, overrides(args))
     take_scene(args)
     place = select(config, args)
     check_study(config)
-    figures = [*strip_paths(args), *args.distance, *args.forces]
-    check_animation(args.animation)
-    check_outputs(args.config, figures, [path for path in (args.animation, args.save) if path])
+    args.output = args.output or [f"trajectory-{args.replicate}.png"]
+    figures = [*args.output, *args.distance, *args.forces]
+    check_outputs(args, figures)
     study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)
     encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))
-    times, position, velocity = record.arrays()
-    frames = frames_of(encounter.shapes, times, position, row["t_collision"], args.frames)
-    distance = centre_distance(position)
-    title = describe(config, place, args.replicate, row)
+    title = outcome_line(config, place, args.replicate, row)
     print(title)
-    zone = encounter.zone_distance
-    short = title.split(";")[0]
-    written = draw(args, frames, (times, distance), zone, short)
-    for path in written + draw_more(args, encounter, record.arrays(), row, short):
+    arrays = record.arrays()
+    for path in draw(args, encounter, arrays, row, title.split(";")[0]):
         print(path)
     if args.save:
-        facts = {"config": config.text, "replicate": args.replicate, "zone_distance": zone}
-        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts)
+        facts = {"config": config.text, "replicate": args.replicate}
+        facts["zone_distance"] = encounter.zone_distance
+        write_trajectory(args.save, *arrays, encounter.shapes, facts)
         print(args.save)
     return 0

@@ -2,8 +2,15 @@
 
 import attrs
 
-from flocsim.commands.trajectory import select, with_one_count
+from flocsim.commands.trajectory import add_replicate, select, with_one_count
+from flocsim.ensembles.collision.precision import end_distance, replicate_system
+from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
+from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.io.results.schema import OUTCOMES
 
 TIGHTEST = 1e-13
 """Tolerance [m] of the reference."""
@@ -20,26 +27,19 @@ HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'step
 
 
 def add_parser(subparsers):
-    """Add the subcommand to argparse's ``subparsers``."""
     parser = subparsers.add_parser(
         "work-precision",
         help="error against run time of the integrators on one replicate of a config",
         description="Run one replicate by every integrator over six decades of tolerance, to the "
         "time at which it is decided, and print how far its end is from the reference.",
     )
-    parser.add_argument("config", help="config file (TOML)")
-    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
-    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
-    parser.add_argument("--vertices", type=int, metavar="N", help="default: the last")
-    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
+    add_replicate(parser)
     parser.set_defaults(run=run, frames=2)
     return parser
 
 
 def methods(duration):
     """(name, setting as text, integrator) of all runs."""
-    from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-
     for method in (Implicit, DormandPrince54):
         for tolerance in TOLERANCES:
             yield method.__name__, f"{tolerance:.0e} m", method(tolerance)
@@ -56,8 +56,6 @@ def timed(system, duration):
 
 def reference(system, duration):
     """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
-    from flocsim.integrators import Implicit
-
     found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
         duration, max_steps=MOST_STEPS, record=False
     )
@@ -68,8 +66,6 @@ def reference(system, duration):
 
 def row(system, duration, exact, name, setting, integrator):
     """One line of the table; no error is shown for a run that failed."""
-    from flocsim.ensembles.collision.precision import end_distance
-
     found = timed(attrs.evolve(system, integrator=integrator), duration)
     error = "-"
     if found.status.name == "FINISHED":
@@ -80,10 +76,6 @@ def row(system, duration, exact, name, setting, integrator):
 
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    from flocsim.ensembles.collision.precision import replicate_system
-    from flocsim.ensembles.collision.sampling import draws, orientations
-    from flocsim.ensembles.study import Study
-
     study = Study(with_one_count(config, place[1]))
     numbers = draws(config.seed, number)
     found = study.run(*place, number)
@@ -94,10 +86,6 @@ def replicate(config, place, number):
 
 def run(args):
     """Run the methods, print the table; the exit code."""
-    from flocsim.ensembles.config.loader import load_config
-    from flocsim.ensembles.preflight import check_study
-    from flocsim.io.results.schema import OUTCOMES
-
     config = load_config(args.config)
     place = select(config, args)
     check_study(config)

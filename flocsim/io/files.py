@@ -79,7 +79,6 @@ def reserve(descriptor, size):
 
 
 def sealed(blocks):
-    """The blocks, then their seal."""
     digest = hashlib.blake2b(digest_size=32)
     for block in blocks:
         digest.update(block)

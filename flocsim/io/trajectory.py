@@ -17,6 +17,11 @@ DATASETS = {
 """Units and meaning of the arrays of a trajectory file."""
 
 
+def centre_distance(position):
+    """Distance of the centroids of two bodies (k,) [m] from their places (k, 2, 3)."""
+    return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
+
+
 def write_trajectory(path, times, position, velocity, shapes, facts):
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
@@ -29,7 +34,7 @@ def write_trajectory(path, times, position, velocity, shapes, facts):
         "time": times,
         "position": position,
         "velocity": velocity,
-        "centre_distance": np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T),
+        "centre_distance": centre_distance(position),
     }
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:

@@ -152,7 +152,6 @@ def picture_of(frames, place, motion, zone_distance, title):
 
 
 def draw_frame(frames, place, motion, zone_distance, title):
-    """The Figure of one frame."""
     unit, factor = time_unit(motion[0])
     figure = new_figure(6.4, 3.0)
     bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
@@ -253,7 +252,6 @@ def draw_bodies(axes, frame):
 
 
 def draw_paths(axes, paths):
-    """The centres' paths, one colour per body."""
     for number, path in enumerate(paths):
         colour = BODY_COLOURS[number % len(BODY_COLOURS)]
         path = np.asarray(path)

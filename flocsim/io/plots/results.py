@@ -128,7 +128,6 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
 
 
 def row_end(panels):
-    """The last panel of the first row."""
     return panels[:PANELS_PER_ROW][-1]
 
 
@@ -192,7 +191,6 @@ def draw_line(axes, vertices, bands, shift, style):
 
 
 def note_if_empty(axes, values, text):
-    """An empty panel says why it is empty."""
     if not np.any(np.isfinite(values)):
         place = {"ha": "center", "va": "center", "transform": axes.transAxes}
         axes.text(0.5, 0.5, text, color="0.4", **place)

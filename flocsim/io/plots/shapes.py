@@ -81,7 +81,6 @@ def figure_3(entries):
 
 
 def draw_errors(axes, entries):
-    """One panel of figure 3."""
     counts = [count for count in entries[0].fits if count > 1] or [1]
     places = np.asarray(vertex_positions(counts), float)
     for shift, (sign, colour, marker) in zip((-DODGE, DODGE), CLASS_STYLES, strict=True):

@@ -192,7 +192,6 @@ def write_coordinate(group, axis, values):
 
 
 def annotate_scale(scale, axis):
-    """Unit and meaning of a coordinate."""
     unit, text = COORDINATES[axis]
     scale.attrs.update({"units": unit, "long_name": text})
 

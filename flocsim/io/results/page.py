@@ -65,7 +65,6 @@ command of those before), `computed` (replicates that the last of them ran), `wa
 
 
 def results_page():
-    """The whole page as Markdown text."""
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
@@ -91,7 +90,6 @@ def codes(name):
 
 
 def coordinates():
-    """A Markdown table of the coordinates."""
     rows = [[f"`{name}`", text] for name, (_, text) in COORDINATES.items()]
     return markdown_table(["axis", "meaning"], rows) + "\n"
 

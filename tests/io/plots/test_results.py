@@ -1,0 +1,132 @@
+"""Figures show the numbers of the results, and say where there are none."""
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim.ensembles.estimates.statistics import tabulate, wilson
+from flocsim.io.plots.results import FIGURES, figure_4, figure_6, figure_8
+from flocsim.io.plots.style import save
+from tests.helpers.synthetic_results import make_results
+
+
+def texts(axes):
+    """All that is written inside a panel."""
+    return " ".join(text.get_text() for text in axes.texts)
+
+
+def bars(axes):
+    """(value, low, high) of every line with interval bars in a panel, as lists."""
+    found = []
+    for container in axes.containers:
+        segments = np.array(container.lines[2][0].get_segments())
+        found.append((container.lines[0].get_ydata(), segments[:, 0, 1], segments[:, 1, 1]))
+    return found
+
+
+def with_outcomes(results, outcome, inside):
+    """The same conditions with one outcome everywhere."""
+    shape = results.replicates["outcome"].shape
+    codes = {"outcome": np.full(shape, outcome, "u1"), "inside": np.full(shape, inside, "u1")}
+    table = tabulate(**codes)
+    return attrs.evolve(results, probabilities=table, replicates=results.replicates | codes)
+
+
+def test_figure_4_shows_every_probability_and_interval():
+    results = make_results()
+    panels = figure_4(results).axes
+    assert [axes.get_title("left") for axes in panels] == [
+        "(a) Type I",
+        "(b) Type II",
+        "(c) Type III",
+    ]
+    for number, axes in enumerate(panels):
+        lines = bars(axes)
+        assert len(lines) == 5
+        for index, line in enumerate(lines):
+            for end, drawn in zip(("", "_low", "_high"), line, strict=True):
+                expected = results.probabilities["pr_inside" + end][number, :, index]
+                np.testing.assert_allclose(drawn, expected, atol=1e-12)
+
+
+def test_figure_8_pools_the_counts_of_all_displacements():
+    results = make_results()
+    counts = results.probabilities["n_class"].sum(axis=2)
+    for number, axes in enumerate(figure_8(results).axes):
+        for index, (value, low, high) in enumerate(bars(axes)):
+            successes, trials = counts[number, :, index], counts[number].sum(axis=-1)
+            np.testing.assert_allclose(value, successes / trials)
+            assert (low <= value).all() and (value <= high).all()
+
+
+def test_replicates_that_agree_at_all_displacements_count_once():
+    results = make_results()
+    outcome = results.replicates["outcome"].copy()
+    outcome[:] = np.arange(outcome.shape[-1]) % 4
+    inside = np.where(outcome < 2, 1, 0)
+    same = attrs.evolve(
+        results, probabilities=tabulate(outcome, inside),
+        replicates=results.replicates | {"outcome": outcome, "inside": inside.astype("u1")},
+    )  # fmt: skip
+    count = outcome.shape[-1]
+    for index, (_, low, high) in enumerate(bars(figure_8(same).axes[0])):
+        once = wilson(np.sum(np.arange(count) % 4 == index), count)
+        np.testing.assert_allclose((low[0], high[0]), once, rtol=0.02)
+
+
+def test_order_of_vertex_counts_does_not_matter():
+    results = make_results(vertices=(1, 4, 16))
+    turned = {name: array[:, ::-1] for name, array in results.probabilities.items()}
+    rows = {name: array[:, ::-1] for name, array in results.replicates.items()}
+    backwards = attrs.evolve(
+        results, vertices=results.vertices[::-1], probabilities=turned, replicates=rows
+    )
+    for one, other in zip(figure_8(results).axes, figure_8(backwards).axes, strict=True):
+        for a, b in zip(one.containers, other.containers, strict=True):
+            np.testing.assert_array_equal(a.lines[0].get_xydata(), b.lines[0].get_xydata())
+
+
+def test_a_panel_without_events_says_so():
+    panels = figure_6(make_results()).axes
+    assert "outside the zone" in texts(panels[2])
+    assert texts(panels[0]) == ""
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", FIGURES)
+def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
+    figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
+    assert all("no " in texts(axes) for axes in figure.axes)
+    save(figure, tmp_path / "empty.png")
+
+
+def test_the_sphere_is_called_sphere():
+    labels = [text.get_text() for text in figure_4(make_results()).axes[0].get_xticklabels()]
+    assert labels == ["sphere", "4", "16", "64"]
+
+
+def test_many_vertex_counts_are_thinned_but_keep_both_ends():
+    results = make_results(vertices=(1, *range(4, 65, 4)), count=4)
+    labels = [text.get_text() for text in figure_4(results).axes[0].get_xticklabels()]
+    assert (labels[0], labels[-1]) == ("sphere", "64")
+    assert sum(map(bool, labels)) <= 9
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        {"types": ("I",), "vertices": (1,), "delta": (0.0,)},
+        {"types": ("16.4/23 µm", "a$\\b$", "II", "III"), "vertices": (4, 5, 7)},
+        {"delta": tuple(np.linspace(0.0, 1.0, 12)), "types": ("I", "II")},
+    ],
+)
+def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
+    results = make_results(**conditions, count=5)
+    figure = FIGURES[name](results)
+    save(figure, tmp_path / "figure.svg")
+    assert len([axes for axes in figure.axes if axes.get_visible()]) in (
+        len(results.types),
+        3 * len(results.types),
+    )
