@@ -179,7 +179,7 @@ def compiled(entry, fillings, name, allocates):
 
 
 def compiler_complaint(text):
-    """ "file:line: what is wrong" from numba's many lines: the innermost place of a kernel in it."""
+    """ "file:line: what is wrong" from numba's many lines: the innermost place of a kernel."""
     words, complaint = "", ""
     for line in text.splitlines():
         found = re.match(r'\s*File "(.+)", line (\d+)', line)

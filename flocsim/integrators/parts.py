@@ -63,9 +63,10 @@ def acceleration(scene, work, state, body, axis):
     return scene.bodies[body, FREE] * force / inertia(scene, body, axis)
 
 
-def move_slips(work, step):
-    """Tangential displacements of NEW from the mean of their rates at both ends of a fixed step;
-    the contact geometry of both is located."""
+def move_slips(scene, work, step):
+    """Contact geometry of NEW, and the tangential displacements there from the mean of their rates
+    at both ends of a fixed step whose start has been evaluated."""
+    locate_and_rate(scene, work, NEW)
     slip = work.slip
     for row in range(work.tally[CANDIDATES]):
         slip[NEW, row] = 0.0

@@ -9,7 +9,6 @@ from flocsim.integrators.parts import (
     evaluate,
     inertia,
     limit_slips,
-    locate_and_rate,
     move_slips,
     sum_forces,
 )
@@ -59,8 +58,7 @@ class VelocityVerlet(FixedStep):
         """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
         evaluate(scene, work, clock[TIME], NOW)
         kick_and_drift(scene, work, step)
-        locate_and_rate(scene, work, NEW)
-        move_slips(work, step)
+        move_slips(scene, work, step)
         sum_forces(scene, work, clock[TIME] + step, NEW)
         finish_kick(scene, work, step)
         limit_slips(scene, work)
