@@ -26,7 +26,8 @@ sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "ensembles")]
 from hypothesis import strategies as st  # noqa: E402
 from test_config_mutations import MUTATION, mutate, toml  # noqa: E402
 
-from flocsim.ensembles.config.loader import TABLES, TOP_KEYS, load_config  # noqa: E402
+from flocsim.ensembles.config.loader import load_config  # noqa: E402
+from flocsim.ensembles.config.schema import TABLES, TOP_KEYS  # noqa: E402
 from flocsim.ensembles.estimates.stop_rule import borders  # noqa: E402
 from flocsim.ensembles.parallel.worker import run_safely  # noqa: E402
 from flocsim.ensembles.preflight import check_study  # noqa: E402

@@ -15,7 +15,7 @@ from claims.table import markdown, number_text
 from output import marked, save_all
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.config.settings import nested
+from flocsim.ensembles.config.overrides import nested
 from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
 
 COLOURS, MARKERS = ("#0072B2", "#D55E00", "#009E73"), "osD"

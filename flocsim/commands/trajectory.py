@@ -132,9 +132,9 @@ def strip_paths(args):
 
 def overrides(args):
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.settings import nested, parsed
+    from flocsim.ensembles.config.overrides import nested, parse_setting
 
-    given = nested(map(parsed, args.settings))
+    given = nested(map(parse_setting, args.settings))
     return given if args.seed is None else given | {"seed": args.seed}
 
 

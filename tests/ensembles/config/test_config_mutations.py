@@ -7,8 +7,8 @@ import tomllib
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flocsim.ensembles.config.force_tables import FORCES
-from flocsim.ensembles.config.loader import TABLES, load_config
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import FORCES, TABLES
 from flocsim.errors import ConfigError
 from tests.helpers.config_files import VALID
 
