@@ -7,13 +7,14 @@ in words), ``unit``, ``choices``, ``flag``, ``help``.
 
 import math
 from numbers import Integral, Real
+from typing import Any
 
 import attrs
 
 from flocsim.errors import RangeError
 
 
-def is_number(value):
+def is_number(value: Any) -> bool:
     """A finite real number that a float can hold; True and False are not numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
@@ -23,7 +24,7 @@ def is_number(value):
         return False
 
 
-def is_whole(value):
+def is_whole(value: Any) -> bool:
     """An integer; True and False are none."""
     return isinstance(value, Integral) and not isinstance(value, bool)
 
@@ -67,22 +68,36 @@ def checked_field(check, allowed, default, **metadata):
 
 
 def quantity(
-    unit, *, above=None, at_least=None, at_most=None, default=attrs.NOTHING, help="", **metadata
-):
+    unit: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    default: Any = attrs.NOTHING,
+    help: str = "",
+    **metadata: Any,
+) -> Any:
     """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``."""
     check, allowed = number_range(above, at_least, at_most)
     return checked_field(check, allowed, default, unit=unit, help=help, **metadata)
 
 
-def choice(*options, default=attrs.NOTHING, help="", **metadata):
+def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **metadata: Any) -> Any:
     """A field that takes one of the given words."""
     metadata = {"choices": options, "help": help, **metadata}
     return checked_field(lambda value: value in options, list_words(options), default, **metadata)
 
 
 def word_or_quantity(
-    word, unit, *, above=None, at_least=None, at_most=None, default=attrs.NOTHING, help=""
-):
+    word: str,
+    unit: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    default: Any = attrs.NOTHING,
+    help: str = "",
+) -> Any:
     """A field that takes one special word or a quantity, e.g. ``"critical"`` or a number."""
     check, allowed = number_range(above, at_least, at_most)
     return checked_field(
@@ -95,7 +110,7 @@ def word_or_quantity(
     )
 
 
-def flag(*, default=attrs.NOTHING, help=""):
+def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes true or false."""
     return checked_field(
         lambda value: isinstance(value, bool), "true or false", default, flag=True, help=help

@@ -25,7 +25,7 @@ from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 
 
-def load_config(path, overrides=None):
+def load_config(path: str | os.PathLike, overrides: dict | None = None) -> Config:
     """The config file at ``path`` as a Config, checked and with its preset filled in.
 
     ``overrides``: nested dict laid over the file, e.g. ``{"output": {"file": "b.h5"}}``; None

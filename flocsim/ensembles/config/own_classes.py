@@ -10,6 +10,7 @@ import inspect
 import os
 import sys
 import traceback
+from numbers import Real
 from pathlib import Path
 
 import attrs
@@ -52,7 +53,7 @@ def named_class(kind, help):
     return {"key": "class", "own": kind, "allowed": '`"module:Class"`', "help": help}
 
 
-def class_name(own):
+def full_name(own):
     """ "module:Class" of an object."""
     return f"{type(own).__module__}:{type(own).__qualname__}"
 
@@ -99,6 +100,16 @@ def why_unfit(found, kind):
     if "__attrs_attrs__" not in vars(found):
         return "is not decorated: put @attrs.frozen above the class"
     return ""
+
+
+def check_integrator(integrator):
+    """ConfigError unless an integrator of the user's own has all that the driver reads of it."""
+    for name in ("tolerance", "first_step", "largest_step"):
+        value = getattr(integrator, name)
+        if not isinstance(value, Real) or isinstance(value, bool) or not value > 0.0:
+            raise ConfigError(f"{name} must be a number above 0, found {value!r}")
+    for name in Integrator.__abstractmethods__:
+        getattr(integrator, name)  # what it raises is told like a wrong value
 
 
 def check_shape(shape):

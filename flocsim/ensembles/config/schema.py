@@ -18,8 +18,9 @@ from flocsim.body import Fluid
 from flocsim.ensembles.config.own_classes import (
     INTEGRATOR,
     SHAPE,
+    check_integrator,
     check_shape,
-    class_name,
+    full_name,
     named_class,
 )
 from flocsim.ensembles.config.presets import PRESETS
@@ -265,13 +266,13 @@ class ShapesConfig:
             if count not in known:
                 raise ConfigError(
                     f"vertices may be 1, the equivalent sphere, and {known[1]}, the core points of "
-                    f"{class_name(self.own)}, found {count}"
+                    f"{full_name(self.own)}, found {count}"
                 )
 
     @property
     def label(self):
         """The source, or the name of the user's own class."""
-        return self.source or class_name(self.own)
+        return self.source or full_name(self.own)
 
 
 @attrs.frozen
@@ -363,6 +364,8 @@ class IntegratorConfig:
     )
 
     def __attrs_post_init__(self):
+        if self.own is not None:
+            check_integrator(self.own)
         if self.name == "velocity_verlet" and self.step is None:
             raise ConfigError(
                 'name = "velocity_verlet" needs integrator.step, the fixed step in seconds'
@@ -371,7 +374,7 @@ class IntegratorConfig:
     @property
     def label(self):
         """The name, or that of the user's own class."""
-        return self.name or class_name(self.own)
+        return self.name or full_name(self.own)
 
     @property
     def method(self):

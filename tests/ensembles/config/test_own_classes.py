@@ -74,6 +74,18 @@ class Stepless(Integrator):
 
 
 @attrs.frozen
+class Lost(VelocityVerlet):
+    @property
+    def fillings(self):
+        return hooks.no_such_hook
+
+
+@attrs.frozen
+class Backward(VelocityVerlet):
+    first_step = -1.0
+
+
+@attrs.frozen
 class Greedy(VelocityVerlet):
     max_steps: int = 3
 
@@ -301,9 +313,11 @@ def test_a_name_makes_flocsims_own_integrator(name, made):
         ),
         ("own:Mine", "step = 1\nname = 'implicit'", "3: integrator.class: excludes name, which is"),
         ("own:Mein", "", "3: integrator.class: module 'own' ("),
-        ("own:Mein", "", "has no 'Mein'; its integrators: Mine, Stepless, Greedy"),
+        ("own:Mein", "", "has no 'Mein'; its integrators: Mine, Stepless, Lost, Backward"),
         ("own:Rod", "", "is no integrator: subclass flocsim.integrators.Integrator"),
         ("own:Stepless", "", "does not define fillings"),
+        ("own:Lost", "", "2: integrator: module 'flocsim.hooks' has no attribute 'no_such_hook'"),
+        ("own:Backward", "", "2: integrator: first_step must be a number above 0, found -1.0"),
         ("own:Greedy", "", "its parameter max_steps has the name of a key of flocsim's own"),
         ("own", "", "must be 'module:Class' such as 'mine:SemiImplicitEuler', found 'own'"),
         ("nowhere:A", "", "there is no module 'nowhere', neither nowhere.py nor installed"),
