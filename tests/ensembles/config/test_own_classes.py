@@ -102,6 +102,10 @@ class Rod(Shape):
         return np.column_stack([x, 0.0 * x])
 
     @property
+    def core(self):
+        return self.vertices
+
+    @property
     def area(self):
         return 2.0 * self.length * self.radius + np.pi * self.radius**2
 
@@ -134,6 +138,7 @@ class Broken(Rod):
 @attrs.frozen(eq=False)
 class Outline(Shape):
     vertices: tuple = ()
+    core = ()
     radius = area = second_moment = 1.0
 
     def scaled(self, factor):
