@@ -1,19 +1,21 @@
 """Makers of attrs fields that carry their unit and their permitted range.
 
 The range is checked when an object is made, in Python as from a config file; the unit lets the
-config loader read "16.41 um" and refuse "3 kg". Metadata keys: ``unit``, ``help``, ``choices``.
+config loader read "16.41 um" and refuse "3 kg". Metadata keys: ``allowed`` (what the field takes,
+in words), ``unit``, ``choices``, ``flag``, ``help``.
 """
 
 import math
 from numbers import Integral, Real
+from typing import Any
 
 import attrs
 
 from flocsim.errors import RangeError
 
 
-def is_number(value):
-    """A finite real number; True and False are not numbers."""
+def is_number(value: Any) -> bool:
+    """A finite real number that a float can hold; True and False are not numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     try:
@@ -22,83 +24,94 @@ def is_number(value):
         return False
 
 
-def is_whole(value):
+def is_whole(value: Any) -> bool:
     """An integer; True and False are none."""
     return isinstance(value, Integral) and not isinstance(value, bool)
 
 
-def describe_range(above=None, at_least=None, at_most=None):
-    """The permitted range in words, for messages and for the schema page."""
-    limits = [("above", above), ("at least", at_least), ("at most", at_most)]
-    words = " and ".join(f"{word} {limit:g}" for word, limit in limits if limit is not None)
-    return f"a finite number {words}".strip()
+def list_words(words):
+    """'a', 'b' or 'c'."""
+    *most, last = [repr(word) for word in words]
+    return f"{', '.join(most)} or {last}" if most else last
 
 
-def range_validator(above=None, at_least=None, at_most=None):
-    """An attrs validator: a finite number within the limits."""
+def number_range(above=None, at_least=None, at_most=None):
+    """(check, words): whether a value is a finite number within the limits, and those in words."""
 
-    def check(instance, attribute, value):
-        within = (
+    def check(value):
+        return (
             is_number(value)
             and (above is None or value > above)
             and (at_least is None or value >= at_least)
             and (at_most is None or value <= at_most)
         )
-        if not within:
-            allowed = describe_range(above, at_least, at_most)
+
+    limits = [("above", above), ("at least", at_least), ("at most", at_most)]
+    words = " and ".join(f"{word} {limit:g}" for word, limit in limits if limit is not None)
+    return check, f"a finite number {words}".strip()
+
+
+def may_be_none(default):
+    """Whether a field with this default may hold None: it is the default, or may come of it."""
+    return default is None or isinstance(default, attrs.Factory)
+
+
+def checked_field(check, allowed, default, **metadata):
+    """A field whose values pass ``check``; RangeError says what is ``allowed`` of all others."""
+
+    def validate(instance, attribute, value):
+        if not (check(value) or (value is None and may_be_none(default))):
             raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
-    return check
+    metadata = {"allowed": allowed, **metadata}
+    return attrs.field(default=default, validator=validate, metadata=metadata)
 
 
-def quantity(unit, *, above=None, at_least=None, at_most=None, default=attrs.NOTHING, help=""):
+def quantity(
+    unit: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    default: Any = attrs.NOTHING,
+    help: str = "",
+    **metadata: Any,
+) -> Any:
     """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``."""
-    allowed = describe_range(above, at_least, at_most)
-    return attrs.field(
-        default=default,
-        validator=range_validator(above, at_least, at_most),
-        metadata={"unit": unit, "help": help, "allowed": allowed},
-    )
+    check, allowed = number_range(above, at_least, at_most)
+    return checked_field(check, allowed, default, unit=unit, help=help, **metadata)
 
 
-def choice(*options, default=attrs.NOTHING, help=""):
+def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **metadata: Any) -> Any:
     """A field that takes one of the given words."""
-
-    def check(instance, attribute, value):
-        if value not in options:
-            allowed = " or ".join(repr(option) for option in options)
-            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
-
-    return attrs.field(
-        default=default, validator=check, metadata={"choices": options, "help": help}
-    )
+    metadata = {"choices": options, "help": help, **metadata}
+    return checked_field(lambda value: value in options, list_words(options), default, **metadata)
 
 
-def word_or_quantity(word, unit, *, above=None, at_least=None, default=attrs.NOTHING, help=""):
+def word_or_quantity(
+    word: str,
+    unit: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    default: Any = attrs.NOTHING,
+    help: str = "",
+) -> Any:
     """A field that takes one special word or a quantity, e.g. ``"critical"`` or a number."""
-    number = range_validator(above=above, at_least=at_least)
-
-    def check(instance, attribute, value):
-        if value == word:
-            return
-        if isinstance(value, str):
-            allowed = describe_range(above=above, at_least=at_least)
-            raise RangeError(f"{attribute.name} must be {word!r} or {allowed}, found {value!r}")
-        number(instance, attribute, value)
-
-    allowed = f"{word!r} or {describe_range(above=above, at_least=at_least)}"
-    return attrs.field(
-        default=default,
-        validator=check,
-        metadata={"unit": unit, "choices": (word,), "help": help, "allowed": allowed},
+    check, allowed = number_range(above, at_least, at_most)
+    return checked_field(
+        lambda value: check(value) or (isinstance(value, str) and value == word),
+        f"{word!r} or {allowed}",
+        default,
+        unit=unit,
+        choices=(word,),
+        help=help,
     )
 
 
-def flag(*, default=attrs.NOTHING, help=""):
+def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes true or false."""
-
-    def check(instance, attribute, value):
-        if not isinstance(value, bool):
-            raise RangeError(f"{attribute.name} must be true or false, found {value!r}")
-
-    return attrs.field(default=default, validator=check, metadata={"help": help, "flag": True})
+    return checked_field(
+        lambda value: isinstance(value, bool), "true or false", default, flag=True, help=help
+    )

@@ -15,7 +15,7 @@ from claims.table import number_text
 from output import marked, save_all
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.config.settings import nested
+from flocsim.ensembles.config.overrides import nested
 from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
 

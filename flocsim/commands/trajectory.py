@@ -10,7 +10,6 @@ from flocsim.ensembles.collision.forces_between import loads_of
 from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.settings import nested, parsed
 from flocsim.ensembles.preflight import check_output, check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -138,7 +137,9 @@ def outcome_line(config, place, replicate, row):
 
 def overrides(args):
     """The command line's values as a nested dict over the config's."""
-    given = nested(map(parsed, args.settings))
+    from flocsim.ensembles.config.overrides import nested, parse_setting
+
+    given = nested(map(parse_setting, args.settings))
     return given if args.seed is None else given | {"seed": args.seed}
 
 

@@ -46,9 +46,9 @@ def add_arguments(parser):
 
 def overrides(arguments):
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.settings import nested, parsed
+    from flocsim.ensembles.config.overrides import nested, parse_setting
 
-    given = nested(map(parsed, arguments.settings))
+    given = nested(map(parse_setting, arguments.settings))
     if arguments.seed is not None:
         given["seed"] = arguments.seed
     if arguments.replicates is not None:

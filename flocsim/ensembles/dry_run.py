@@ -1,5 +1,7 @@
 """What a study would do, without doing it."""
 
+from math import inf
+
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 
@@ -43,16 +45,18 @@ def stiffness_lines(config):
 
 def dry_run(config, team):
     """The report of --dry-run as text."""
-    scene, shapes = config.scene, config.shapes
+    scene, shapes, method = config.scene, config.shapes, config.integrator.method
+    flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
+    flocs += f", spheroradius {1e6 * shapes.radius:.4g} um" if shapes.own is None else ""
+    accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"
     count = len(scene.conditions) * len(shapes.vertices) * len(scene.delta)
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
         f"seed {config.seed}, {team.size} rank(s), results in {config.output.file}",
         f"  vertices {list(shapes.vertices)}, delta {list(scene.delta)} of the {scene.delta_max} "
         f"delta_max, receiver {scene.receiver}",
-        f"  flocs: {shapes.source}{f' {shapes.file}' if shapes.file else ''}, spheroradius "
-        f"{1e6 * shapes.radius:.4g} um",
-        f"  integrator: {config.integrator.name}, tolerance {config.integrator.tolerance:g} m",
+        f"  flocs: {flocs}",
+        f"  integrator: {config.integrator.label}, {accuracy}",
         "collisions:",
         *condition_lines(config),
         "forces and code:",

@@ -44,7 +44,8 @@ def check_contact(config):
 def check_spheroradius(config):
     """ConfigError where the spheroradius leaves no room for a core in the smallest body."""
     least = min(min(radii) for _, *radii in config.scene.conditions)
-    if max(config.shapes.vertices) > 1 and config.shapes.radius >= least:
+    polygons = max(config.shapes.vertices) > 1 and config.shapes.own is None
+    if polygons and config.shapes.radius >= least:
         raise ConfigError(
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
@@ -70,8 +71,11 @@ def check_output(path, *inputs):
     check_writable(path)
 
 
-def stand_in(shape, radius):
+def stand_in(shape, options):
     """A polygon about as large as a sphere: what matters here is that it has edges."""
+    if options.own is not None:
+        return options.own.scaled(shape.radius / options.own.equivalent_radius)
+    radius = options.radius
     angles = np.arange(6) * np.pi / 3.0
     hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
     return SpheroPolygon((shape.radius - radius) * hexagon, radius)
@@ -91,6 +95,6 @@ def placed_system(config, system, shapes):
 def kinds(config, spheres):
     """Shapes of i and j for polygons, if the study has any, and for spheres, if it has any."""
     if max(config.shapes.vertices) > 1:
-        yield [stand_in(shape, config.shapes.radius) for shape in spheres]
+        yield [stand_in(shape, config.shapes) for shape in spheres]
     if min(config.shapes.vertices) == 1:
         yield spheres

@@ -6,8 +6,7 @@ import tomllib
 
 from hypothesis import strategies as st
 
-from flocsim.ensembles.config.force_tables import FORCES
-from flocsim.ensembles.config.loader import TABLES
+from flocsim.ensembles.config.schema import FORCES, TABLES
 from tests.helpers.small_study import VALID
 
 JUNK = st.recursive(

@@ -14,7 +14,6 @@ from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.failures import collided, outcome_of
 from flocsim.ensembles.collision.settling import terminal_motion, turn_time
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
-from flocsim.ensembles.config.methods import make_integrator
 from flocsim.errors import UsageError
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE
@@ -119,7 +118,7 @@ def make_encounter(config, shapes, zone):
         Body(shape, fixed=(config.scene.receiver == "fixed" and place == 0), **config.body_options)
         for place, shape in enumerate(shapes)
     ]
-    system = System(bodies, config.forces, make_integrator(config), fluid=config.fluid)
+    system = System(bodies, config.forces, config.integrator.method, fluid=config.fluid)
     return Encounter(system, config.scene, zone)
 
 

@@ -1,4 +1,5 @@
-"""The flocs of a study: grown by flocsim or read from a shape library, resized to the scene."""
+"""The flocs of a study: grown by flocsim, read from a shape library, or of a class of the user's
+own; resized to the scene."""
 
 import math
 
@@ -17,11 +18,22 @@ SYNTHETIC_RATIO = 16.0
 
 @attrs.frozen(eq=False)
 class Floc:
-    """One floc at several numbers of vertices: ``shapes`` {N: Shape}, in a unit of its own."""
+    """One floc at several numbers of vertices: ``shapes`` {N: Shape}, in a unit of its own.
+
+    ``own`` where the shape is the user's: it keeps its form at any size, its radius grows with it.
+    """
 
     name: str
     ratio: float
     shapes: dict
+    own: bool = False
+
+    def resized(self, vertices, equivalent_radius, radius):
+        """The shape of N vertices with r_eq [m], and with the spheroradius [m] if not ``own``."""
+        shape = self.shapes[vertices]
+        if self.own:
+            return shape.scaled(equivalent_radius / shape.equivalent_radius)
+        return resized(shape, equivalent_radius, radius)
 
 
 def grow_floc(shapes, seed, index):
@@ -53,6 +65,9 @@ def read_flocs(shapes):
 
 def load_flocs(shapes, seed):
     """All flocs that the config's [shapes] stands for, in a fixed order."""
+    if shapes.own is not None:
+        ratio = shapes.own.equivalent_radius / shapes.own.radius
+        return [Floc(shapes.label, ratio, {len(shapes.own.vertices): shapes.own}, own=True)]
     if shapes.source == "library":
         return read_flocs(shapes)
     return [grow_floc(shapes, seed, index) for index in range(shapes.pool)]
@@ -95,4 +110,4 @@ class Wardrobe:
         """Resize one shape."""
         if vertices == 1:
             return Sphere(equivalent_radius)
-        return resized(self.flocs[place].shapes[vertices], equivalent_radius, self.radius)
+        return self.flocs[place].resized(vertices, equivalent_radius, self.radius)

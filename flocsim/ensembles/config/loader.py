@@ -5,54 +5,27 @@ from pathlib import Path
 
 import attrs
 
-from flocsim.body import Fluid
-from flocsim.ensembles.config.force_tables import read_forces
-from flocsim.ensembles.config.layers import clashes, lay_over
+from flocsim.ensembles.config.overrides import lay_over
+from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.problems import Problems
+from flocsim.ensembles.config.problems import Misfit, Problems, dotted, misfit, show, suggestion
 from flocsim.ensembles.config.schema import (
-    BodiesConfig,
+    ALTERNATIVES,
+    FORCES,
+    STUDY_KEYS,
+    TABLES,
+    TOP_KEYS,
     Config,
-    IntegratorConfig,
-    OutputConfig,
-    SceneConfig,
-    ShapesConfig,
-    StopConfig,
-    ZoneConfig,
+    contradictions,
+    keys_of,
 )
-from flocsim.ensembles.config.tables import make, read_values
 from flocsim.ensembles.config.toml_text import parse, read_text_file
-from flocsim.ensembles.config.values import (
-    Misfit,
-    misfit,
-    read_choice,
-    show,
-    suggestion,
-)
-
-TABLES = {
-    "scene": SceneConfig,
-    "shapes": ShapesConfig,
-    "bodies": BodiesConfig,
-    "fluid": Fluid,
-    "zone": ZoneConfig,
-    "integrator": IntegratorConfig,
-    "stop": StopConfig,
-    "output": OutputConfig,
-}
-"""Name of a top-level table → class; [forces] is read by itself."""
-
-STUDY_KEYS = ("seed", "replicates")
-TOP_KEYS = ("preset", *STUDY_KEYS, *TABLES, "forces")
-ONLY_FOR = {
-    "file": "library",
-    "fractal_dimension": "synthetic",
-    "primary_particles": "synthetic",
-}
-"""Key of [shapes] → the only source that it goes with."""
+from flocsim.ensembles.config.values import reader_of
+from flocsim.errors import ConfigError
+from flocsim.fields import list_words
 
 
-def load_config(path, overrides=None):
+def load_config(path: str | os.PathLike, overrides: dict | None = None) -> Config:
     """The config file at ``path`` as a Config, checked and with its preset filled in.
 
     ``overrides``: nested dict laid over the file, e.g. ``{"output": {"file": "b.h5"}}``; None
@@ -60,96 +33,177 @@ def load_config(path, overrides=None):
     "FILE:LINE: key …: what was found, what is allowed".
     """
     text = read_text_file(path)
-    overrides = overrides or {}
+    overrides, folder = overrides or {}, Path(path).parent
     problems = Problems(file=str(path), text=text, overrides=overrides)
-    own = lay_over(parse(path, text), overrides)
-    preset = read_preset(own, problems)
-    table = lay_over(PRESETS.get(preset, {}), own)
-    parts = read_parts(table, Path(path).parent, problems)
+    table = lay_over(parse(path, text), overrides)
+    preset = table.get("preset")
+    if isinstance(preset, str):
+        table = lay_over(PRESETS.get(preset, {}), table)
+    reader = Reader(folder, problems)
+    parts = reader.config_parts(table)
     problems.raise_if_any()
-    folder = Path(path).parent
-    return Config(preset=preset, text=text, folder=folder, overrides=overrides, **parts)
+    return Config(text=text, folder=folder, overrides=overrides, **parts)
 
 
-def read_preset(table, problems):
-    """The preset's name, None without one or with one that does not exist."""
-    try:
-        return read_choice(table["preset"], tuple(PRESETS)) if "preset" in table else None
-    except Misfit as error:
-        problems.misfit(("preset",), error)
+@attrs.frozen
+class Reader:
+    """Reads the tables of one config file; what is wrong is noted in ``problems`` and left out.
+
+    ``folder`` is where the file lies, and the modules and libraries that it names.
+    """
+
+    folder: Path
+    problems: Problems
+
+    def config_parts(self, table):
+        """Everything of the Config that comes from the tables, by attribute name."""
+        for key in table:
+            if key not in TOP_KEYS:
+                self.problems.unknown((key,), TOP_KEYS)
+        given = {key: table[key] for key in STUDY_KEYS if key in table}
+        parts = self.values(STUDY_KEYS, given, ())
+        for name, table_class in TABLES.items():
+            parts[name] = self.table(name, table_class, table.get(name, {}))
+        forces = self.forces(table.get("forces", {}))
+        parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
+        if not self.problems.at("preset", "bodies", "fluid"):
+            for place, text in contradictions(parts["bodies"], parts["fluid"]):
+                self.problems.note(place, text)
+        return parts
+
+    def table(self, name, table_class, table):
+        """One top-level table as its class; None where something in it is wrong."""
+        if not isinstance(table, dict):
+            self.problems.misfit((name,), misfit(f"a table [{name}]", table))
+            return None
+        keys, own = keys_of(table_class), {}
+        self.check_alternatives(name, table, keys)
+        if "class" in keys and "class" in table:
+            beside = [key for key, field in keys.items() if field.metadata.get("beside_class")]
+            others = {*beside, *set().union(*ALTERNATIVES[name])} - {"class"}
+            parameters = {key: table[key] for key in table if key not in others}
+            table = {key: table[key] for key in beside if key in table}
+            kind = keys["class"].metadata["own"]
+            own = {"own": self.own_object(kind, (name,), parameters, beside)}
+        values = self.values(keys, table, (name,)) | own
+        if "file" in values and values.get("source") == "library":
+            values["file"] = self.library(values["file"])
+        # Without the preset that was meant, what it would have given is not missing.
+        if self.problems.at(name) or (name == "bodies" and self.problems.at("preset")):
+            return None
+        return self.made(table_class, values, (name,))
+
+    def check_alternatives(self, name, table, keys):
+        """Note keys of one table that do not go together."""
+        present = [sorted(each & table.keys()) for each in ALTERNATIVES.get(name, ())]
+        first, *others = [each for each in present if each] or [[]]
+        for key in [key for each in others for key in each]:
+            text = f"excludes {first[0]}, which is given too: remove one of them"
+            self.problems.note((name, key), text)
+        source = table.get("source", "synthetic")
+        for key in [key for key in table if key in keys and "class" not in table]:
+            needed = keys[key].metadata.get("only_for")
+            if needed not in (None, source):
+                text = f'goes with source = "{needed}", but source is {show(source)}: remove it'
+                self.problems.note((name, key), text)
+
+    def library(self, name):
+        """The path of a shape library, noted where no file is there."""
+        path = self.folder / name
+        if not os.path.isfile(path):
+            what = "is no ordinary file" if os.path.exists(path) else "does not exist"
+            text = f"{path} {what}; name a library that `flocsim fit` wrote"
+            self.problems.note(("shapes", "file"), text)
+        return path
+
+    def forces(self, table):
+        """{name: force} in the fixed order, then the user's own as in the file."""
+        if not isinstance(table, dict):
+            self.problems.misfit(("forces",), misfit("tables [forces.NAME]", table))
+            return {}
+        names = [*(n for n in FORCES if n in table), *(n for n in table if n not in FORCES)]
+        made = {name: self.force(name, table[name]) for name in names}
+        made = {name: force for name, force in made.items() if force is not None}
+        if not made and not self.problems.at("preset", "forces"):
+            self.problems.note(
+                ("forces",), "there are none: add [forces.gravity], [forces.drag], …, or a preset"
+            )
+        return made
+
+    def force(self, name, table):
+        """The force of the table [forces.NAME], None where it is left out or wrong."""
+        place = ("forces", name)
+        if table is False and name in FORCES:
+            return None
+        if not isinstance(table, dict):
+            hint = suggestion(name, FORCES) if name not in FORCES else ""
+            wrong = misfit(f"a table [{dotted(place)}] or false", table, hint)
+            self.problems.misfit(place, wrong)
+            return None
+        if name in FORCES:
+            return self.object_of(FORCES[name], table, place)
+        if "class" in table:
+            return self.own_object(FORCE, place, table)
+        self.problems.note(
+            place,
+            f"unknown force{suggestion(name, FORCES)}; known: {list_words(FORCES)}; a force of "
+            "your own needs class = 'module:Class'",
+        )
         return None
 
+    def own_object(self, kind, place, table, beside=()):
+        """An object of the user's own class that a table names; ``beside`` are keys of flocsim's.
 
-def read_parts(table, folder, problems):
-    """Everything of the Config that comes from the tables, by attribute name."""
-    for key in [key for key in table if key not in TOP_KEYS]:
-        problems.note(
-            (key,), f"unknown key{suggestion(key, TOP_KEYS)}; known: {', '.join(TOP_KEYS)}"
-        )
-    study = {key: attrs.fields_dict(Config)[key] for key in STUDY_KEYS}
-    parts = read_values(
-        study, {key: table[key] for key in STUDY_KEYS if key in table}, (), problems
-    )
-    for name, table_class in TABLES.items():
-        parts[name] = read_table(name, table_class, table.get(name, {}), folder, problems)
-    parts["forces"], parts["force_names"] = read_forces(table.get("forces", {}), folder, problems)
-    if not problems.at("preset", "bodies", "fluid"):
-        check_buoyancy(parts["bodies"], parts["fluid"], problems)
-    return parts
+        None, and a note, where something is wrong with it.
+        """
+        try:
+            own_class = load_class(table["class"], self.folder, kind)
+        except Misfit as error:
+            self.problems.misfit((*place, "class"), error)
+            return None
+        except ConfigError as error:
+            self.problems.note((*place, "class"), str(error))
+            return None
+        taken = [key for key in keys_of(own_class) if key in beside]
+        if taken:
+            self.problems.note(
+                (*place, "class"),
+                f"its parameter {taken[0]} has the name of a key of flocsim's own: give it another",
+            )
+            return None
+        parameters = {key: value for key, value in table.items() if key != "class"}
+        return self.object_of(own_class, parameters, place, beside)
 
+    def object_of(self, some_class, table, place, beside=()):
+        """An object of the class with the values of a table; None where something is wrong."""
+        before = len(self.problems.found)
+        values = self.values(keys_of(some_class), table, place, beside)
+        fine = len(self.problems.found) == before
+        return self.made(some_class, values, place) if fine else None
 
-def read_table(name, table_class, table, folder, problems):
-    """One top-level table as its class; None where something in it is wrong."""
-    if not isinstance(table, dict):
-        problems.misfit((name,), misfit(f"a table [{name}]", table))
-        return None
-    check_keys_agree(name, table, problems)
-    values = read_values(attrs.fields_dict(table_class), table, (name,), problems)
-    if "file" in values and values.get("source") == "library":
-        values["file"] = find_library(folder / values["file"], problems)
-    # Without the preset that was meant, what it would have given is not missing.
-    if problems.at(name) or (name == "bodies" and problems.at("preset")):
-        return None
-    return make(table_class, values, (name,), problems)
+    def values(self, keys, table, place, beside=()):
+        """Key → value of every key of a table that is known and fits."""
+        values = {}
+        for key, value in table.items():
+            if key not in keys:
+                self.problems.unknown((*place, key), [*keys, *beside])
+                continue
+            try:
+                values[key] = reader_of(keys[key])(value)
+            except Misfit as error:
+                self.problems.misfit((*place, key), error)
+        needed = [key for key, field in keys.items() if field.default is attrs.NOTHING]
+        missing = [key for key in needed if key not in table]
+        if missing:
+            self.problems.note(place, f"needs {', '.join(missing)}")
+        return values
 
-
-def check_keys_agree(name, table, problems):
-    """Note keys of one table that exclude each other."""
-    for key, other in clashes(table, (name,)):
-        problems.note((name, key), f"excludes {other}, which is given too: remove one of them")
-    if name == "shapes":
-        check_source(table, problems)
-
-
-def check_source(table, problems):
-    """Note keys of [shapes] that belong to the other source."""
-    source = table.get("source", "synthetic")
-    for key in [key for key in ONLY_FOR if key in table and source != ONLY_FOR[key]]:
-        text = f'goes with source = "{ONLY_FOR[key]}", but source is {show(source)}: remove it'
-        problems.note(("shapes", key), text)
-
-
-def find_library(path, problems):
-    """The path of the shape library, noted where no file is there."""
-    if not os.path.isfile(path):
-        what = "is no ordinary file" if os.path.exists(path) else "does not exist"
-        problems.note(("shapes", "file"), f"{path} {what}; name a library that `flocsim fit` wrote")
-    return path
-
-
-def check_buoyancy(bodies, fluid, problems):
-    """Buoyancy needs the density of the solid, and bodies that sink."""
-    if not fluid.buoyancy:
-        return
-    if bodies.density is None:
-        problems.note(
-            ("fluid", "buoyancy"),
-            "true needs bodies.density, but bodies.surface_density is given: give density and "
-            "depth instead, or buoyancy = false",
-        )
-    elif bodies.density <= fluid.density:
-        problems.note(
-            ("bodies", "density"),
-            f"{bodies.density:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
-            "give a larger density, or fluid.buoyancy = false",
-        )
+    def made(self, some_class, values, place):
+        """An object of the class; None, and a note, where it refuses the values together."""
+        try:
+            return some_class(**values)
+        except Exception as error:
+            # A user's class may raise anything; attrs puts the text first, then objects.
+            text = error.args[0] if error.args and isinstance(error.args[0], str) else error
+            self.problems.note(place, " ".join(str(text).split()) or type(error).__name__)
+            return None

@@ -1,4 +1,7 @@
-"""A user's own force classes, named in the config as "module:Class"."""
+"""Classes of a user's own, named in the config as "module:Class": forces, integrators, shapes.
+
+The module lies beside the config file or is installed; the attrs fields of the class are its keys.
+"""
 
 import contextlib
 import importlib
@@ -7,40 +10,127 @@ import inspect
 import os
 import sys
 import traceback
+from numbers import Real
 from pathlib import Path
 
 import attrs
+import numpy as np
 
-from flocsim.ensembles.config.values import misfit
+from flocsim.ensembles.config.problems import misfit
 from flocsim.errors import ConfigError
+from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, Force, PairForce
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators import Integrator
 
-KINDS = (BodyForce, PairForce, ContactForce)
 SOURCE = "__flocsim_source__"
 
 
-def load_force_class(name, folder):
-    """The force class ``name`` = "module:Class"; the module lies in ``folder`` or is installed.
+@attrs.frozen
+class Kind:
+    """What a class named in the config has to be, and how messages call it."""
+
+    name: str
+    bases: tuple
+    advice: str
+    example: str
+
+
+FORCE = Kind(
+    "force",
+    (BodyForce, PairForce, ContactForce),
+    "flocsim.forces.BodyForce, CentreForce, SurfaceForce or ContactForce",
+    "mine:Yukawa",
+)
+INTEGRATOR = Kind(
+    "integrator", (Integrator,), "flocsim.integrators.Integrator", "mine:SemiImplicitEuler"
+)
+SHAPE = Kind("shape", (Shape,), "flocsim.geometry.shapes.shape.Shape", "mine:Rod")
+
+
+def named_class(kind, help):
+    """Metadata of a field for an object of the class that the key ``class`` names."""
+    return {"key": "class", "own": kind, "allowed": '`"module:Class"`', "help": help}
+
+
+def full_name(own):
+    """ "module:Class" of an object."""
+    return f"{type(own).__module__}:{type(own).__qualname__}"
+
+
+def load_class(name, folder, kind):
+    """The class ``name`` = "module:Class" of a Kind; the module lies in ``folder`` or is installed.
 
     Misfit for a name of another form. ConfigError, of one line without the key, for a module that
-    is missing or raises, and for a class that is missing or is no force.
+    is missing or raises, and for a class that is missing, of another kind, or not whole.
     """
-    module_name, class_name = split_name(name)
-    module = load_module(module_name, folder)
-    if not hasattr(module, class_name):
-        known = [key for key, value in vars(module).items() if is_own_force(value, module)]
-        raise ConfigError(
-            f"{described(module)} has no {class_name!r}; its forces: {', '.join(known) or 'none'}"
-        )
-    return checked(getattr(module, class_name), f"{class_name} of {described(module)}")
-
-
-def split_name(name):
-    """("module", "Class") of "module:Class"."""
+    if not isinstance(name, str):
+        raise misfit("a string 'module:Class'", name)
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
-        raise misfit("'module:Class' such as 'mine:Yukawa'", name)
-    return module_name, class_name
+        raise misfit(f"'module:Class' such as {kind.example!r}", name)
+    module = load_module(module_name, folder)
+    where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
+    if not hasattr(module, class_name):
+        known = [key for key, value in vars(module).items() if is_own(value, module, kind)]
+        raise ConfigError(
+            f"{where} has no {class_name!r}; its {kind.name}s: {', '.join(known) or 'none'}"
+        )
+    found = getattr(module, class_name)
+    wrong = why_unfit(found, kind)
+    if wrong:
+        raise ConfigError(f"{class_name} of {where} {wrong}")
+    return found
+
+
+def is_own(value, module, kind):
+    """Whether the value is a class of the kind that the module itself defines."""
+    right = inspect.isclass(value) and issubclass(value, kind.bases)
+    return right and value.__module__ == module.__name__
+
+
+def why_unfit(found, kind):
+    """What is wrong with a class of this kind, in words; "" where nothing is."""
+    if not (inspect.isclass(found) and issubclass(found, kind.bases)):
+        return f"is no {kind.name}: subclass {kind.advice}"
+    if getattr(found, "kernel", None) is Force.kernel:
+        return "has no static method `kernel`, which computes the force"
+    if inspect.isabstract(found):
+        return f"does not define {', '.join(sorted(found.__abstractmethods__))}"
+    if "__attrs_attrs__" not in vars(found):
+        return "is not decorated: put @attrs.frozen above the class"
+    return ""
+
+
+def check_integrator(integrator):
+    """ConfigError unless an integrator of the user's own has all that the driver reads of it."""
+    for name in ("tolerance", "first_step", "largest_step"):
+        value = getattr(integrator, name)
+        if not isinstance(value, Real) or isinstance(value, bool) or not value > 0.0:
+            raise ConfigError(f"{name} must be a number above 0, found {value!r}")
+    for name in Integrator.__abstractmethods__:
+        getattr(integrator, name)  # what it raises is told like a wrong value
+
+
+def check_shape(shape):
+    """ConfigError unless a shape of the user's own is one that can be a body of any size."""
+    points = np.asarray(shape.vertices, float)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ConfigError(
+            f"vertices must be finite core points of shape (N, 2), found {points.shape}"
+        )
+    if len(points) < 2:
+        raise ConfigError(
+            "one core point is a sphere: leave class out and give vertices = [1], or have two "
+            "core points and more"
+        )
+    for name in ("radius", "area", "second_moment"):
+        value = getattr(shape, name)
+        if not is_number(value) or value <= 0.0:
+            raise ConfigError(f"{name} must be a finite number above 0, found {value!r}")
+    larger = shape.scaled(2.0)
+    if not np.isclose(larger.equivalent_radius, 2.0 * shape.equivalent_radius, rtol=1e-9, atol=0):
+        raise ConfigError("scaled(2.0) must be a shape of four times the area")
 
 
 def load_module(name, folder):
@@ -119,34 +209,3 @@ def frame_to_blame(error, folder):
     ]
     own = [frame for frame in frames if Path(frame.filename).parent == folder.resolve()]
     return next(reversed(own or frames), None)
-
-
-def described(module):
-    """A module for messages."""
-    return f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
-
-
-def is_own_force(value, module):
-    """Whether the value is a force class that the module itself defines."""
-    return (
-        inspect.isclass(value) and issubclass(value, Force) and value.__module__ == module.__name__
-    )
-
-
-def checked(force_class, where):
-    """The class, once it is found to be a force that can be made; else ConfigError."""
-    if not (inspect.isclass(force_class) and issubclass(force_class, KINDS)):
-        raise ConfigError(
-            f"{where} is no force: subclass flocsim.forces.BodyForce, CentreForce, SurfaceForce "
-            "or ContactForce"
-        )
-    if force_class.kernel is Force.kernel:
-        raise ConfigError(f"{where} has no static method `kernel`, which computes the force")
-    if "__attrs_attrs__" not in vars(force_class):
-        raise ConfigError(f"{where} is not decorated: put @attrs.frozen above the class")
-    return force_class
-
-
-def force_fields(force_class):
-    """Key in the config → attrs field, for all fields that the class is made with."""
-    return {field.alias: field for field in attrs.fields(force_class) if field.init}

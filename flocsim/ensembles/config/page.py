@@ -6,14 +6,9 @@ Write it anew with `python -m flocsim.ensembles.config.page > docs/config.md`.
 import inspect
 import re
 
-import attrs
-
 from flocsim.ensembles.config import presets
-from flocsim.ensembles.config.force_tables import FORCES
-from flocsim.ensembles.config.loader import STUDY_KEYS, TABLES
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.config.values import list_words
+from flocsim.ensembles.config.schema import FORCES, STUDY_KEYS, TABLES, keys_of
 from flocsim.io.markdown import markdown_table
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
@@ -32,45 +27,52 @@ takes, its default and its meaning. (This page is made from the schema by
   number, and there is no `nan` and no `inf`. All errors are told at once, with file and line.
 - **Presets** lie under the file: every value that the file gives replaces the preset's. Keys that
   exclude each other (`types` and `pairs`; `surface_density` and `density` with `depth`; `root`,
-  `distance` and `centre`) replace each other too. `forces.contact = false` leaves out a force
-  that the preset has.
+  `distance` and `centre`; `source` and `class`; `name` and `class`) replace each other too.
+  `forces.contact = false` leaves out a force that the preset has.
 - Without a preset, `[bodies]` needs a mass, and only the forces that have a table act, be the
   table empty.
 """
 
-OWN_FORCES = """\
-## Forces of your own
+OWN_CLASSES = """\
+## Forces, integrators and shapes of your own
 
 ```toml
 [forces.steric]
 class = "brush:StericBrush"    # brush.py beside the config file, or an installed module
 strength = 1e-3
 length = "10 nm"
+
+[integrator]
+class = "mine:SemiImplicitEuler"
+step = "10 ns"                 # a parameter of the class
+max_steps = 1_000_000          # flocsim's own key, as without a class
+
+[shapes]
+class = "mine:Rod"
+slenderness = 4.0              # a parameter of the class
+vertices = [1, 2]              # the equivalent sphere, and the rod of two core points
 ```
 
-The other keys are the attrs fields of the class, a subclass of `flocsim.forces.BodyForce`,
-`CentreForce`, `SurfaceForce` or `ContactForce`. A field made with `flocsim.fields.quantity("m")`
+The other keys are the attrs fields of the class. A field made with `flocsim.fields.quantity("m")`
 takes strings with a unit and checks the dimension; a plain `attrs.field()` takes numbers in SI.
-The name of the table is free, except for the five above.
+
+- A **force** is a subclass of `flocsim.forces.BodyForce`, `CentreForce`, `SurfaceForce` or
+  `ContactForce`. The name of its table is free, except for the five above.
+- An **integrator** is a subclass of `flocsim.integrators.Integrator`.
+- A **shape** is a subclass of `flocsim.geometry.shapes.shape.Shape` with two core points or more.
+  It is made once and scaled as a whole, so that its r_eq is that of the body: its parameters count
+  by their ratios. `vertices` may be its number of core points (the default), 1, or both.
 """
 
 
 def schema_page():
     """The whole page as Markdown text."""
-    study = {key: attrs.fields_dict(Config)[key] for key in ("preset", *STUDY_KEYS)}
-    parts = [INTRODUCTION, "## At the top\n", key_table(study)]
-    for name, table_class in TABLES.items():
-        parts += [f"## [{name}]\n", about(table_class, name), key_table(fields(table_class))]
-    for name, force_class in FORCES.items():
-        parts += [f"## [forces.{name}]\n", about(force_class, name)]
-        parts += [key_table(fields(force_class))]
-    parts += [OWN_FORCES, "## Presets\n", about(presets, ""), preset_table()]
+    parts = [INTRODUCTION, "## At the top\n", key_table(STUDY_KEYS)]
+    tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
+    for name, table_class in tables.items():
+        parts += [f"## [{name}]\n", about(table_class, name), key_table(keys_of(table_class))]
+    parts += [OWN_CLASSES, "## Presets\n", about(presets, ""), preset_table()]
     return "\n".join(parts)
-
-
-def fields(some_class):
-    """Key → attrs field."""
-    return attrs.fields_dict(some_class)
 
 
 def about(documented, name):
@@ -93,12 +95,7 @@ def takes(field):
     metadata = field.metadata
     if metadata.get("flag"):
         return "`true` or `false`"
-    if "vector" in metadata:
-        words = f"a list of {metadata['vector']} numbers"
-    elif "allowed" in metadata:
-        words = metadata["allowed"]
-    else:
-        words = list_words(metadata["choices"])
+    words = metadata.get("allowed") or f"a list of {metadata['vector']} numbers"
     words = QUOTED_WORD.sub(r'`"\1"`', words)
     return f"{words} [{metadata['unit']}]" if metadata.get("unit") else words
 

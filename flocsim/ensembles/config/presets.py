@@ -28,12 +28,7 @@ TANG2014 = {
             "permittivity": 78.5,
             "gap": "equivalent_spheres",
         },
-        "contact": {
-            "k_n": 20.0,
-            "k_t": 2.0,
-            "damping_n": "critical",
-            "damping_t": "proportional",
-        },
+        "contact": {"k_n": 20.0, "k_t": 2.0, "damping_n": "critical", "damping_t": "proportional"},
     },
     "zone": {"root": "outer"},
 }

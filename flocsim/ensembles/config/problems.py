@@ -1,5 +1,6 @@
-"""What is wrong with a config file: collected, then told at once, each with its line."""
+"""What is wrong with a config file: worded, collected, and told at once, each with its line."""
 
+import difflib
 import re
 
 import attrs
@@ -7,7 +8,46 @@ import attrs
 from flocsim.ensembles.config.toml_text import key_lines
 from flocsim.errors import ConfigError
 
+LONGEST_SHOWN = 60
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+class Misfit(ValueError):
+    """A value that does not fit; ``findings`` are pairs (place such as "[2]", what is wrong)."""
+
+    def __init__(self, *findings):
+        self.findings = findings
+        super().__init__("; ".join(f"{place} {text}".strip() for place, text in findings))
+
+
+def misfit(allowed, value, hint=""):
+    """The Misfit "must be ALLOWED, found VALUE"."""
+    return Misfit(("", f"must be {allowed}, found {show(value)}{hint}"))
+
+
+def show(value):
+    """A value as a config file writes it, on one short line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}" if value else "an empty list"
+    if isinstance(value, int) and abs(value) >= 10**30:
+        return "a number of more than 30 digits"
+    text = repr(value) if isinstance(value, str | int | float) else str(value)
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "…"
+
+
+def suggestion(word, words):
+    """ " (did you mean …?)", or "" where nothing is close."""
+    close = difflib.get_close_matches(word, words, n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def dotted(place):
+    """The keys as TOML writes them, "forces.contact.k_n"."""
+    return ".".join(key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
 
 
 @attrs.define
@@ -28,6 +68,11 @@ class Problems:
         """Note anything else that is wrong at ``place``, () being the whole file."""
         self.found.append((place, f"{dotted(place)}: {text}" if place else text))
 
+    def unknown(self, place, known):
+        """Note the last key of ``place``, which is none of those known."""
+        words = f"known: {', '.join(known)}" if known else "there are none here"
+        self.note(place, f"unknown key{suggestion(place[-1], known)}; {words}")
+
     def at(self, *tables):
         """Whether anything within one of the top-level tables was found wrong."""
         return any(place[:1] == (table,) for place, _ in self.found for table in tables)
@@ -41,8 +86,11 @@ class Problems:
             raise ConfigError("\n".join(f"{self.label(line)}: {text}" for line, text in located))
 
     def line_of(self, place, lines):
-        """The line of the key or of the nearest table around it; 0 where there is none."""
-        if is_in(place, self.overrides):
+        """The line of the key or of the nearest table around it; else 0, and −1 if overridden."""
+        table = self.overrides
+        for key in place:
+            table = table.get(key) if isinstance(table, dict) else None
+        if place and table is not None:
             return -1
         around = (lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in lines)
         return next(around, 0)
@@ -52,17 +100,3 @@ class Problems:
         if line < 0:
             return f"given over {self.file}"
         return f"{self.file}:{line}" if line else self.file
-
-
-def dotted(place):
-    """The keys as TOML writes them, "forces.contact.k_n"."""
-    return ".".join(key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
-
-
-def is_in(place, table):
-    """Whether the nested table has a value at the place."""
-    for key in place:
-        if not isinstance(table, dict) or table.get(key) is None:
-            return False
-        table = table[key]
-    return bool(place)

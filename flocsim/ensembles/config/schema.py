@@ -1,12 +1,12 @@
 """The schema of a config file: one attrs class per table, and Config, which holds them all.
 
-An attribute is a key of the table; its metadata say what it takes (flocsim.fields). The loader
-(flocsim.ensembles.config.loader) makes these objects from TOML; docs/config.md is generated from
-them.
-
-The table [scene] of a config file.
-
-The table [stop] of a config file: when a study ends before all replicates are run.
+To add a key, add an attribute here, and nothing else: its name is the key, its metadata say what
+it takes (flocsim.fields, and ``read_by`` of values.py for what those cannot say). The loader reads
+it, its messages name it, `--set` sets it, and `python -m flocsim.ensembles.config.page` writes it
+into docs/config.md. A new table is a class here and an attribute of Config. Keys that exclude each
+other stand in ALTERNATIVES, what is checked between tables in ``contradictions``. Metadata of this
+schema alone: ``shown`` is the default where it depends on other keys, ``only_for`` the one source
+of flocs that a key goes with; ``beside_class`` marks keys that stay where a class is named.
 """
 
 from decimal import Decimal
@@ -15,56 +15,69 @@ from pathlib import Path
 import attrs
 
 from flocsim.body import Fluid
-from flocsim.ensembles.config.fields import (
-    LARGEST_LENGTH,
-    items_reader,
-    optional_quantity,
-    read_by,
-    read_text,
-    whole,
-    whole_reader,
-    word,
+from flocsim.ensembles.config.own_classes import (
+    INTEGRATOR,
+    SHAPE,
+    check_integrator,
+    check_shape,
+    full_name,
+    named_class,
 )
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.values import number_reader, read_choice, vector_reader
+from flocsim.ensembles.config.values import (
+    list_of,
+    number,
+    one_of,
+    read_by,
+    read_text,
+    vector,
+    whole,
+    whole_field,
+)
 from flocsim.errors import ConfigError
-from flocsim.fields import choice, quantity, word_or_quantity
+from flocsim.fields import choice, number_range, quantity, word_or_quantity
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
+
+LARGEST_LENGTH = 0.01
+"""[m] Upper limit of sizes: a larger one is a length in µm whose unit was forgotten."""
 
 TYPES = {"I": (16.41e-6, 23.02e-6), "II": (4.95e-6, 23.02e-6), "III": (4.62e-6, 4.95e-6)}
 """Equivalent radii (receiving, approaching) [m] of the paper's three types of collision."""
+
+
+def unless_own(value, of_own=lambda own: None):
+    """A default: the value, or what follows from the user's own object where there is one."""
+    return attrs.Factory(
+        lambda self: value if self.own is None else of_own(self.own), takes_self=True
+    )
 
 
 @attrs.frozen
 class SceneConfig:
     """[scene]: who meets whom, and how the meeting begins and ends."""
 
-    pairs: tuple = attrs.field(
-        default=(),
-        metadata={
-            "read": items_reader(
-                vector_reader(2, "m", above=0.0, at_most=LARGEST_LENGTH),
-                "a list of pairs such as [['16.41 um', '23.02 um']]",
-            ),
-            "allowed": "a list of pairs [r_i, r_j], each above 0 and at most 0.01",
-            "unit": "m",
-            "shown": "none",
-            "help": "equivalent radii (receiving, approaching), instead of `types`",
-        },
+    pairs: tuple = read_by(
+        list_of(
+            vector(2, "m", above=0.0, at_most=LARGEST_LENGTH),
+            "a list of pairs such as [['16.41 um', '23.02 um']]",
+        ),
+        "a list of pairs [r_i, r_j], each above 0 and at most 0.01",
+        default=None,
+        unit="m",
+        help="equivalent radii (receiving, approaching), instead of `types`",
     )
-    types: tuple = attrs.field(
-        default=attrs.Factory(lambda self: () if self.pairs else tuple(TYPES), takes_self=True),
-        metadata={
-            "read": items_reader(
-                lambda value: read_choice(value, tuple(TYPES)), "a list of 'I', 'II', 'III'"
-            ),
-            "allowed": 'a list of "I", "II", "III"',
-            "shown": '["I", "II", "III"]',
-            "help": "the paper's collision types: (r_i, r_j) = I (16.41, 23.02), "
-            "II (4.95, 23.02), III (4.62, 4.95) µm",
-        },
+    types: tuple = read_by(
+        list_of(one_of(tuple(TYPES)), "a list of 'I', 'II', 'III'"),
+        'a list of "I", "II", "III"',
+        default=attrs.Factory(lambda self: None if self.pairs else tuple(TYPES), takes_self=True),
+        shown='["I", "II", "III"]',
+        help="the paper's collision types: (r_i, r_j) = I (16.41, 23.02), "
+        "II (4.95, 23.02), III (4.62, 4.95) µm",
     )
     delta: tuple = read_by(
-        items_reader(number_reader("", at_least=0.0), "a list of fractions such as [0.0, 0.5]"),
+        list_of(number("", *number_range(at_least=0.0)), "a list of fractions such as [0.0, 0.5]"),
         "a list of distinct numbers, each at least 0",
         default=(0.0, 0.25, 0.5, 0.75, 1.0),
         help="horizontal displacements of the centres, as fractions of δ_max",
@@ -140,16 +153,22 @@ class StopConfig:
     they say.
     """
 
-    half_width: float | None = optional_quantity(
-        "", above=0.0, at_most=0.5, help="largest half-width of the 95 % intervals; none: run all"
+    half_width: float | None = quantity(
+        "",
+        above=0.0,
+        at_most=0.5,
+        default=None,
+        help="largest half-width of the 95 % intervals; none: run all",
     )
     of: tuple = read_by(
-        items_reader(lambda value: read_choice(value, ESTIMATES), "a list of estimates"),
+        list_of(one_of(ESTIMATES), "a list of estimates"),
         f"a list of {', '.join(ESTIMATES)}",
         default=("pr_inside", "pr_a"),
         help="the estimates whose intervals count",
     )
-    least: int = whole(1, 10**9, default=100, help="replicates after which the rule first looks")
+    least: int = whole_field(
+        1, 10**9, default=100, help="replicates after which the rule first looks"
+    )
     failed: float = quantity(
         "",
         at_least=0.0,
@@ -169,8 +188,22 @@ MOST_VERTICES = 512
 class ShapesConfig:
     """[shapes]: the flocs that collide."""
 
-    source: str = choice(
-        "synthetic", "library", default="synthetic", help="grown by flocsim, or fitted to images"
+    own: Shape | None = attrs.field(
+        default=None,
+        kw_only=True,
+        metadata=named_class(
+            SHAPE,
+            "a shape of your own instead of a `source`, the same for both bodies, scaled to "
+            "their sizes; its parameters are further keys, and of those here only `vertices` goes "
+            "with it",
+        ),
+    )
+    source: str | None = choice(
+        "synthetic",
+        "library",
+        default=unless_own("synthetic"),
+        shown='"synthetic"',
+        help="grown by flocsim, or fitted to images",
     )
     file: Path | None = attrs.field(
         default=None,
@@ -178,20 +211,22 @@ class ShapesConfig:
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",
-            "shown": "none",
             "help": 'shape library that `flocsim fit` wrote; with source = "library" only',
+            "only_for": "library",
         },
     )
     vertices: tuple = read_by(
-        items_reader(whole_reader(1, MOST_VERTICES), "a list of integers such as [1, 4, 16]"),
+        list_of(whole(1, MOST_VERTICES), "a list of integers such as [1, 4, 16]"),
         f"a list of distinct integers from 1 to {MOST_VERTICES}",
-        default=(1, 4, 16, 64),
+        default=unless_own((1, 4, 16, 64), lambda own: (len(own.vertices),)),
+        shown="[1, 4, 16, 64]",
+        beside_class=True,
         help="N, numbers of vertices of the spheropolygons; 1 is the equivalent sphere",
     )
     radius: float = quantity(
         "m", above=0.0, at_most=LARGEST_LENGTH, default=1e-6, help="spheroradius r"
     )
-    pool: int = whole(
+    pool: int = whole_field(
         1,
         10**6,
         default=10,
@@ -199,11 +234,20 @@ class ShapesConfig:
         "draws its two",
     )
     fractal_dimension: float = quantity(
-        "", at_least=1.2, at_most=1.95, default=1.8, help="of the synthetic flocs, in the plane"
+        "",
+        at_least=1.2,
+        at_most=1.95,
+        default=1.8,
+        only_for="synthetic",
+        help="of the synthetic flocs, in the plane",
     )
-    primary_particles: int = whole(2, 2000, default=60, help="number in each synthetic floc")
+    primary_particles: int = whole_field(
+        2, 2000, default=60, only_for="synthetic", help="number in each synthetic floc"
+    )
 
     def __attrs_post_init__(self):
+        if self.own is not None:
+            self.check_own()
         if self.source == "library" and self.file is None:
             raise ConfigError(
                 'source = "library" needs file, the shape library that `flocsim fit` wrote'
@@ -214,16 +258,32 @@ class ShapesConfig:
                 "change source"
             )
 
+    def check_own(self):
+        """ConfigError unless the user's own shape is whole and ``vertices`` fit it."""
+        check_shape(self.own)
+        known = (1, len(self.own.vertices))
+        for count in self.vertices:
+            if count not in known:
+                raise ConfigError(
+                    f"vertices may be 1, the equivalent sphere, and {known[1]}, the core points of "
+                    f"{full_name(self.own)}, found {count}"
+                )
+
+    @property
+    def label(self):
+        """The source, or the name of the user's own class."""
+        return self.source or full_name(self.own)
+
 
 @attrs.frozen
 class BodiesConfig:
     """[bodies]: what the flocs weigh; either ``surface_density``, or ``density`` and ``depth``."""
 
-    surface_density: float | None = optional_quantity(
-        "kg/m^2", above=0.0, help="ρ_s: mass m = ρ_s A, A the floc's area"
+    surface_density: float | None = quantity(
+        "kg/m^2", above=0.0, default=None, help="ρ_s: mass m = ρ_s A, A the floc's area"
     )
-    density: float | None = optional_quantity(
-        "kg/m^3", above=0.0, help="ρ of the solid: ρ_s = ρ · depth"
+    density: float | None = quantity(
+        "kg/m^3", above=0.0, default=None, help="ρ of the solid: ρ_s = ρ · depth"
     )
     depth: float | str = word_or_quantity(
         "sphere",
@@ -245,43 +305,97 @@ class BodiesConfig:
 class ZoneConfig:
     """[zone]: the attraction zone d_c < D_0; one of ``root``, ``distance`` and ``centre``."""
 
-    distance: float | None = optional_quantity("m", at_least=0.0, help="d_0: D_0 = r_i + r_j + d_0")
-    centre: float | None = optional_quantity("m", above=0.0, help="D_0 itself")
-    root: str | None = attrs.field(
+    distance: float | None = quantity(
+        "m", at_least=0.0, default=None, help="d_0: D_0 = r_i + r_j + d_0"
+    )
+    centre: float | None = quantity("m", above=0.0, default=None, help="D_0 itself")
+    root: str | None = choice(
+        "inner",
+        "outer",
         default=attrs.Factory(
             lambda self: "outer" if self.distance is None and self.centre is None else None,
             takes_self=True,
         ),
-        validator=attrs.validators.optional(attrs.validators.in_(("inner", "outer"))),
-        metadata={
-            "choices": ("inner", "outer"),
-            "shown": '"outer"',
-            "help": "d_0 is this root of attraction = repulsion; it must exist",
-        },
+        shown='"outer"',
+        help="d_0 is this root of attraction = repulsion; it must exist",
     )
+
+
+METHODS = {
+    "implicit": Implicit,
+    "dormand_prince54": DormandPrince54,
+    "overdamped": Overdamped,
+    "velocity_verlet": VelocityVerlet,
+}
+"""Name of an integrator in a config → class; each takes those keys of [integrator] that it has."""
 
 
 @attrs.frozen
 class IntegratorConfig:
     """[integrator]: how time goes on."""
 
-    name: str = word(
-        default="implicit", help="implicit, overdamped, dormand_prince54 or velocity_verlet"
+    own: Integrator | None = attrs.field(
+        default=None,
+        kw_only=True,
+        metadata=named_class(
+            INTEGRATOR,
+            "an integrator of your own instead of a `name`; its parameters are further keys, and "
+            "of those here only `max_steps` goes with it",
+        ),
+    )
+    name: str | None = choice(
+        *METHODS,
+        default=unless_own("implicit"),
+        shown='"implicit"',
+        help="the method: see `flocsim.integrators`",
     )
     tolerance: float = quantity(
         "m", above=0.0, default=1e-9, help="largest error of a step, what it leads to included"
     )
-    max_steps: int = whole(
-        1, MOST_STEPS, default=200_000, help="steps after which a replicate ends undecided"
+    max_steps: int = whole_field(
+        1,
+        MOST_STEPS,
+        default=200_000,
+        beside_class=True,
+        help="steps after which a replicate ends undecided",
     )
-    step: float | None = optional_quantity("s", above=0.0, help="for methods with a fixed step")
+    step: float | None = quantity(
+        "s", above=0.0, default=None, help="for methods with a fixed step"
+    )
+
+    def __attrs_post_init__(self):
+        if self.own is not None:
+            check_integrator(self.own)
+        if self.name == "velocity_verlet" and self.step is None:
+            raise ConfigError(
+                'name = "velocity_verlet" needs integrator.step, the fixed step in seconds'
+            )
+
+    @property
+    def label(self):
+        """The name, or that of the user's own class."""
+        return self.name or full_name(self.own)
+
+    @property
+    def method(self):
+        """The Integrator itself."""
+        if self.own is not None:
+            return self.own
+        made = METHODS[self.name]
+        keys = attrs.fields_dict(type(self)).keys() & attrs.fields_dict(made).keys()
+        return made(**{key: getattr(self, key) for key in keys})
 
 
 @attrs.frozen
 class OutputConfig:
     """[output]: where the results go."""
 
-    file: str = word(default="results.h5", help="results file, relative to the current folder")
+    file: str = read_by(
+        read_text,
+        "a string",
+        default="results.h5",
+        help="results file, relative to the current folder",
+    )
 
 
 @attrs.frozen(eq=False)
@@ -293,16 +407,9 @@ class Config:
     ``folder`` where it lies; ``overrides`` what was laid over it.
     """
 
-    preset: str | None = attrs.field(
-        default=None,
-        metadata={
-            "choices": tuple(PRESETS),
-            "shown": "none",
-            "help": "values that lie under the file's own",
-        },
-    )
-    seed: int = whole(0, LARGEST_SEED, default=1, help="of all random numbers")
-    replicates: int = whole(
+    preset: str | None = choice(*PRESETS, default=None, help="values that lie under the file's own")
+    seed: int = whole_field(0, LARGEST_SEED, default=1, help="of all random numbers")
+    replicates: int = whole_field(
         1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
     )
     scene: SceneConfig = attrs.Factory(SceneConfig)
@@ -325,3 +432,49 @@ class Config:
         if self.bodies.density is None:
             return {"surface_density": self.bodies.surface_density}
         return {"density": self.bodies.density, "depth": self.bodies.depth}
+
+
+def keys_of(some_class):
+    """Key in the config → attrs field, for all fields that the class is made with."""
+    return {
+        field.metadata.get("key", field.alias): field
+        for field in attrs.fields(some_class)
+        if field.init
+    }
+
+
+TABLES = {field.name: field.type for field in attrs.fields(Config) if attrs.has(field.type)}
+"""Name of a top-level table → class; [forces] is read by itself."""
+
+STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" in field.metadata}
+"""The keys above all tables."""
+
+TOP_KEYS = (*STUDY_KEYS, *TABLES, "forces")
+
+FORCES = {
+    "gravity": Gravity,
+    "drag": StokesDrag,
+    "van_der_waals": VanDerWaals,
+    "double_layer": DoubleLayer,
+    "contact": Contact,
+}
+"""Name of the table [forces.NAME] → class, in the order of Config.forces."""
+
+ALTERNATIVES = {
+    "scene": ({"types"}, {"pairs"}),
+    "shapes": ({"source"}, {"class"}),
+    "bodies": ({"surface_density"}, {"density", "depth"}),
+    "zone": ({"root"}, {"distance"}, {"centre"}),
+    "integrator": ({"name"}, {"class"}),
+}
+"""Table → sets of keys that exclude each other: one of them replaces the others from below."""
+
+
+def contradictions(bodies, fluid):
+    """(place, what is wrong) of values that do not go together though each is right by itself."""
+    if fluid.buoyancy and bodies.density is None:
+        text = "true needs bodies.density, but bodies.surface_density is given: give density and "
+        yield ("fluid", "buoyancy"), text + "depth instead, or buoyancy = false"
+    elif fluid.buoyancy and bodies.density <= fluid.density:
+        text = f"{bodies.density:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
+        yield ("bodies", "density"), text + "give a larger density, or fluid.buoyancy = false"

@@ -5,8 +5,10 @@ import re
 import tomllib
 from pathlib import Path
 
-from flocsim.ensembles.config.layers import DEEPEST_TABLE
 from flocsim.errors import ConfigError
+
+DEEPEST_TABLE = 2
+"""[forces.NAME] lies two keys deep; what is nested further is no table of the schema."""
 
 LARGEST_FILE = 10**6
 TOML_PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)

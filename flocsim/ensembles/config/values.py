@@ -1,170 +1,181 @@
 """Values of a config file, read strictly: nothing is rounded, truncated or taken for another type.
 
 A reader takes a value as TOML or Python gives it and returns the value that flocsim computes with,
-or raises Misfit. Which reader a field has follows from its metadata (flocsim.fields).
+or raises Misfit. Which reader a field has follows from its metadata (flocsim.fields); ``read_by``
+makes a field that has a reader of its own.
 """
 
-import difflib
 import math
-from numbers import Real
 from types import SimpleNamespace
 
+import attrs
+
+from flocsim.ensembles.config.problems import Misfit, misfit, suggestion
 from flocsim.ensembles.config.quantities import kind_of, read_quantity
-from flocsim.fields import describe_range, range_validator
-
-LONGEST_SHOWN = 60
-
-
-class Misfit(ValueError):
-    """A value that does not fit; ``findings`` are pairs (place such as "[2]", what is wrong)."""
-
-    def __init__(self, *findings):
-        self.findings = findings
-        super().__init__("; ".join(f"{place} {text}".strip() for place, text in findings))
-
-
-def misfit(allowed, value, hint=""):
-    """The Misfit "must be ALLOWED, found VALUE"."""
-    return Misfit(("", f"must be {allowed}, found {show(value)}{hint}"))
-
-
-def show(value):
-    """A value as a config file writes it, on one short line."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}" if value else "an empty list"
-    if isinstance(value, int) and abs(value) >= 10**30:
-        return "a number of more than 30 digits"
-    text = repr(value) if isinstance(value, str | int | float) else str(value)
-    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "…"
-
-
-def suggestion(word, words):
-    """ " (did you mean …?)", or "" where nothing is close."""
-    close = difflib.get_close_matches(word, words, n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
-
-
-def is_finite(value):
-    """A number, not true or false, that a float can hold."""
-    try:
-        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    except OverflowError:
-        return False
+from flocsim.errors import ConfigError
+from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
 
 
 def reader_of(attribute):
-    """The reader of an attrs field."""
+    """The reader of an attrs field, of flocsim's or of a user's class."""
     metadata = attribute.metadata
     if "read" in metadata:
         return metadata["read"]
     if metadata.get("flag"):
         return read_flag
     if "vector" in metadata:
-        return vector_reader(metadata["vector"], metadata.get("unit", ""))
+        return vector(metadata["vector"], metadata.get("unit", ""))
     if "unit" in metadata:
-        return lambda value: read_within(value, metadata, attribute.validator)
+        allowed = metadata.get("allowed", "a finite number")
+        return number(metadata["unit"], passes(attribute), allowed, metadata.get("choices", ()))
     if "choices" in metadata:
-        return lambda value: read_choice(value, metadata["choices"])
+        return one_of(metadata["choices"])
     return lambda value: read_plain(value, attribute.type in (float, "float"))
 
 
+def passes(attribute):
+    """Whether a value passes the validator of an attrs field, as a function."""
+
+    def check(value):
+        try:
+            if attribute.validator is not None:
+                attribute.validator(None, SimpleNamespace(name=attribute.name), value)
+        except (TypeError, ValueError):
+            return False
+        return True
+
+    return check
+
+
+def read_by(read, allowed, *, default=attrs.NOTHING, **metadata):
+    """A field with a reader of its own, which holds in Python too."""
+
+    def check(instance, attribute, value):
+        try:
+            if not (value is None and may_be_none(default)):
+                read(value)
+        except Misfit as error:
+            place, text = error.findings[0]
+            raise ConfigError(f"{attribute.name}{place} {text}") from None
+
+    metadata = {"read": read, "allowed": allowed, **metadata}
+    return attrs.field(default=default, validator=check, metadata=metadata)
+
+
+def whole_field(at_least, at_most, **more):
+    """A field that takes an integer within the limits."""
+    allowed = f"an integer from {at_least} to {at_most}"
+    return read_by(whole(at_least, at_most), allowed, **more)
+
+
 def read_flag(value):
-    """True or False."""
     if not isinstance(value, bool):
         raise misfit("true or false", value)
     return value
 
 
-def read_choice(value, choices):
-    """One of the words."""
-    if not isinstance(value, str) or value not in choices:
-        hint = suggestion(value, choices) if isinstance(value, str) else ""
-        raise misfit(list_words(choices), value, hint)
+def read_text(value):
+    """A string of printable characters that is not blank."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise misfit("a string that is not blank", value)
     return value
 
 
-def list_words(words):
-    """'a', 'b' or 'c'."""
-    *most, last = [repr(word) for word in words]
-    return f"{', '.join(most)} or {last}" if most else last
-
-
-def read_within(value, metadata, check):
-    """A word, or a number with a unit that the attrs validator ``check`` lets pass."""
-    words = metadata.get("choices", ())
-    if isinstance(value, str) and value in words:
-        return value
-    unit = metadata["unit"]
-    number = read_number(value, unit, words, metadata["allowed"])
-    try:
-        if check is not None:
-            check(None, SimpleNamespace(name=""), number)
-    except ValueError:
-        allowed = f"{metadata['allowed']} [{unit}]" if unit else metadata["allowed"]
-        raise misfit(allowed, value) from None
-    return number
-
-
-def read_number(value, unit, words=(), allowed="a finite number"):
-    """A finite float, of a number or of a string with a unit."""
-    hint = ""
-    if isinstance(value, str) and unit:
-        try:
-            value_in_unit = read_quantity(value, unit)
-            if math.isfinite(value_in_unit):
-                return value_in_unit
-        except ValueError as reason:
-            hint = suggestion(value, words) or (f" ({reason})" if str(reason) else "")
-    elif is_finite(value):
-        return float(value)
-    needed = kind_of(unit) if unit else allowed
-    raise misfit(f"{list_words(words)} or {needed}" if words and unit else needed, value, hint)
-
-
-def number_reader(unit, **limits):
-    """A reader of numbers with a unit, within the limits of flocsim.fields.range_validator."""
-    metadata = {"unit": unit, "allowed": describe_range(**limits)}
-    return lambda value: read_within(value, metadata, range_validator(**limits))
-
-
-def read_each(value, read_item, allowed):
-    """Every item of a list through ``read_item``; one Misfit with the findings of all."""
-    if not isinstance(value, list | tuple) or not value:
-        raise misfit(allowed, value)
-    items, findings = [], []
-    for place, item in enumerate(value):
-        try:
-            items.append(read_item(item))
-        except Misfit as error:
-            findings += [(f"[{place}]{inner}", text) for inner, text in error.findings]
-    if findings:
-        raise Misfit(*findings)
-    return tuple(items)
-
-
-def vector_reader(length, unit, **limits):
-    """A reader of exactly ``length`` numbers; returns a tuple of floats."""
-    allowed = f"a list of {length} numbers" + (f" [{unit}]" if unit else "")
+def one_of(choices):
+    """A reader of one of the words."""
 
     def read(value):
-        if not isinstance(value, list | tuple) or len(value) != length:
-            raise misfit(allowed, value)
-        return read_each(value, number_reader(unit, **limits), allowed)
+        if not isinstance(value, str) or value not in choices:
+            hint = suggestion(value, choices) if isinstance(value, str) else ""
+            raise misfit(list_words(choices), value, hint)
+        return value
 
     return read
+
+
+def whole(at_least, at_most):
+    """A reader of integers within the limits; 3.0 is none."""
+
+    def read(value):
+        if not is_whole(value) or not at_least <= value <= at_most:
+            raise misfit(f"an integer from {at_least} to {at_most}", value)
+        return value
+
+    return read
+
+
+def number(unit, check, allowed, choices=()):
+    """A reader of a number in a unit, as such or as a string such as "16.41 um", or of a choice.
+
+    ``check`` and ``allowed`` say what numbers are right, as flocsim.fields.number_range does.
+    """
+    kind = kind_of(unit) if unit else allowed
+    needed = f"{list_words(choices)} or {kind}" if choices and unit else kind
+
+    def read(value):
+        found, hint = math.nan, ""
+        if isinstance(value, str) and value in choices:
+            return value
+        if isinstance(value, str) and unit:
+            try:
+                found = read_quantity(value, unit)
+            except ValueError as reason:
+                hint = suggestion(value, choices) or (f" ({reason})" if str(reason) else "")
+        elif is_number(value):
+            found = float(value)
+        if not math.isfinite(found):
+            raise misfit(needed, value, hint)
+        if not check(found):
+            raise misfit(f"{allowed} [{unit}]" if unit else allowed, value)
+        return found
+
+    return read
+
+
+def list_of(read_item, allowed, length=None, distinct=True):
+    """A reader of lists with at least one item, or of a ``length``; returns a tuple.
+
+    Its Misfit tells the findings of all items. ``distinct`` items are no two the same.
+    """
+
+    def read(value):
+        fits = isinstance(value, list | tuple) and len(value) > 0
+        if not fits or length not in (None, len(value)):
+            raise misfit(allowed, value)
+        items, findings = {}, []
+        for place, item in enumerate(value):
+            try:
+                items[place] = read_item(item)
+            except Misfit as error:
+                findings += [(f"[{place}]{inner}", text) for inner, text in error.findings]
+        first = {}
+        for place, item in items.items() if distinct else ():
+            if first.setdefault(item, place) != place:
+                text = f"must differ from the others, found the same as in [{first[item]}]"
+                findings.append((f"[{place}]", text))
+        if findings:
+            raise Misfit(*findings)
+        return tuple(items.values())
+
+    return read
+
+
+def vector(length, unit="", **limits):
+    """A reader of exactly ``length`` numbers; returns a tuple of floats."""
+    allowed = f"a list of {length} numbers" + (f" [{unit}]" if unit else "")
+    return list_of(number(unit, *number_range(**limits)), allowed, length, distinct=False)
+
+
+read_numbers = list_of(number("", *number_range()), "a list of numbers", distinct=False)
 
 
 def read_plain(value, is_float):
     """A value of a field that says nothing about itself: a number, a string, a flag, numbers."""
     if isinstance(value, list | tuple):
-        return read_each(value, number_reader(""), "a list of numbers")
+        return read_numbers(value)
     if isinstance(value, str | bool) and not is_float:
         return value
-    if not is_finite(value):
+    if not is_number(value):
         undeclared = " (the field declares no unit: see flocsim.fields.quantity)"
         hint = undeclared if isinstance(value, str) else ""
         raise misfit("a finite number in SI units" if is_float else "a plain value", value, hint)

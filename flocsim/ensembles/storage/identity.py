@@ -17,20 +17,19 @@ import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
-from flocsim.ensembles.config.methods import make_integrator
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.integrators.loop.driver import advance
 
-VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file"}}
+VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file", "own"}}
 """Keys that choose rows, but change none."""
 
 PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py",
+    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py", "run.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact",
-    "ensembles/collision", "ensembles/study.py", "ensembles/config/methods.py",
+    "ensembles/collision", "ensembles/study.py",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
 makes shapes: what it made is compared itself."""
@@ -42,8 +41,15 @@ def identity_of(study):
     facts = {"seed": config.seed, "code": physics_digest(), "arithmetic": arithmetic_digest()}
     for table in ("scene", "shapes", "bodies", "fluid", "zone"):
         facts |= settings(table, getattr(config, table))
-    facts |= settings("integrator", make_integrator(config))
-    facts["integrator.name"] = config.integrator.name
+    if config.shapes.own is not None:
+        facts |= settings("shapes", config.shapes.own)
+        facts["shapes.class"] = config.shapes.label
+    method = config.integrator.method
+    facts |= settings("integrator", method)
+    # A class of the user's own may have these as properties, whose code no kernel reaches.
+    for name in ("tolerance", "first_step", "largest_step"):
+        facts[f"integrator.{name}"] = plain(getattr(method, name))
+    facts["integrator.name"] = config.integrator.label
     facts["integrator.max_steps"] = config.integrator.max_steps
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
@@ -87,8 +93,16 @@ def floc_facts(study):
             parts = [np.array([floc.ratio]) for floc in study.flocs]
             shapes = [floc.shapes[n] for floc in study.flocs]
             parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
+            if study.config.shapes.own is not None:
+                # Its class computes what is known of others, and how it grows.
+                parts += [numbers_of(each) for each in (*shapes, *(s.scaled(2.0) for s in shapes))]
             facts[f"flocs.{n}"] = digest(np.concatenate(parts))
     return facts
+
+
+def numbers_of(shape):
+    """All numbers that a shape hands to the kernels."""
+    return np.append(np.ravel(shape.vertices), [shape.radius, shape.area, shape.second_moment])
 
 
 def kernel_facts(config):
@@ -195,8 +209,8 @@ EXPLAINED = {
     "code": "flocsim's own code has changed",
     "flocs": "the flocs with N = {} have changed",
     "numbers": "the numbers that the forces work with have changed for type {}",
-    "kernels": "the compiled code for {} has changed (flocsim, a force of your own, Python, numba "
-    "or numpy)",
+    "kernels": "the compiled code for {} has changed (flocsim, a force or an integrator of your "
+    "own, Python, numba or numpy)",
 }
 """First part of a name → words in place of two hashes."""
 

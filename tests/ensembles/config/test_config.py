@@ -11,17 +11,19 @@ import pytest
 from flocsim.body import Body
 from flocsim.commands import init
 from flocsim.constants import VACUUM_PERMITTIVITY
-from flocsim.ensembles.config.force_tables import FORCES
-from flocsim.ensembles.config.loader import TABLES, load_config
+from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.page import schema_page
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
+    FORCES,
+    TABLES,
     TYPES,
     BodiesConfig,
     IntegratorConfig,
     SceneConfig,
     ShapesConfig,
     ZoneConfig,
+    keys_of,
 )
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.shapes.sphere import Sphere
@@ -205,7 +207,7 @@ def test_the_page_of_all_keys_is_current():
 def test_the_page_names_every_key():
     page = schema_page()
     for table_class in [*TABLES.values(), *FORCES.values()]:
-        assert all(f"| `{key}` |" in page for key in attrs.fields_dict(table_class))
+        assert all(f"| `{key}` |" in page for key in keys_of(table_class))
 
 
 def test_the_pages_defaults_are_valid_toml():

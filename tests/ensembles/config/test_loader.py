@@ -3,7 +3,7 @@
 import attrs
 import pytest
 
-from flocsim.ensembles.config.force_tables import FORCES
+from flocsim.ensembles.config.schema import FORCES
 from tests.helpers.small_study import VALID, load_text, problem_lines
 
 

@@ -1,18 +1,29 @@
-"""Forces of a user's own, from a module beside the config file."""
+"""Forces, integrators and shapes of a user's own, from a module beside the config file."""
 
 import inspect
 import pickle
 import sys
 
+import attrs
 import pytest
 
+from flocsim import Sphere
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import IntegratorConfig
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.ensembles.study import Study
+from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from tests.helpers.small_study import load_text, problem_lines
 
-OWN_FORCE = """\
+OWN_MODULE = """\
 import attrs
+import numpy as np
+from flocsim import hooks
 from flocsim.fields import quantity
 from flocsim.forces import CentreForce
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators import Integrator, VelocityVerlet
 from neighbour import SCALE
 
 
@@ -40,25 +51,117 @@ class Undecorated(CentreForce):
 
 class Apple:
     pass
+
+
+@attrs.frozen
+class Mine(VelocityVerlet):
+    largest_step = 1e-7
+    step: float = quantity("s", above=0.0)
+    factor: float = quantity("", above=0.0, default=0.5)
+
+    @staticmethod
+    def next_step(clock, step, ratio):
+        return 1.0 * step
+
+
+@attrs.frozen
+class Stepless(Integrator):
+    pass
+
+
+@attrs.frozen
+class Lost(VelocityVerlet):
+    @property
+    def replaces(self):
+        return hooks.no_such_hook
+
+
+@attrs.frozen
+class Backward(VelocityVerlet):
+    first_step = -1.0
+
+
+@attrs.frozen
+class Greedy(VelocityVerlet):
+    max_steps: int = 3
+
+
+@attrs.frozen(eq=False)
+class Rod(Shape):
+    length: float = quantity("m", above=0.0)
+    radius: float = quantity("m", above=0.0, default=1e-6)
+    points: int = 2
+
+    @property
+    def vertices(self):
+        x = np.linspace(-0.5, 0.5, self.points) * self.length
+        return np.column_stack([x, 0.0 * x])
+
+    @property
+    def core(self):
+        return self.vertices
+
+    @property
+    def area(self):
+        return 2.0 * self.length * self.radius + np.pi * self.radius**2
+
+    @property
+    def second_moment(self):
+        return self.area * self.length**2 / 12.0
+
+    def scaled(self, factor):
+        return Rod(self.length * factor, self.radius * factor, self.points)
+
+
+@attrs.frozen(eq=False)
+class Stiff(Rod):
+    def scaled(self, factor):
+        return self
+
+
+@attrs.frozen(eq=False)
+class Hollow(Rod):
+    area = 0.0
+
+
+@attrs.frozen(eq=False)
+class Broken(Rod):
+    @property
+    def vertices(self):
+        raise IndexError("no such\\npoint")
+
+
+@attrs.frozen(eq=False)
+class Outline(Shape):
+    vertices: tuple = ()
+    core = ()
+    radius = area = second_moment = 1.0
+
+    def scaled(self, factor):
+        return self
 """
 
 
+def forget(*names):
+    for name in names:
+        sys.modules.pop(name, None)
+
+
 @pytest.fixture
-def own_force(tmp_path):
-    """A folder with a module of forces and its neighbour, forgotten afterwards."""
-    before = set(sys.modules), list(sys.path)
-    (tmp_path / "own.py").write_text(OWN_FORCE)
+def own_module(tmp_path):
+    """A folder with a module of classes and its neighbour, forgotten afterwards."""
+    path = list(sys.path)
+    (tmp_path / "own.py").write_text(OWN_MODULE)
     (tmp_path / "neighbour.py").write_text("SCALE = 2.0\n")
     yield tmp_path / "own.py"
-    assert sys.path == before[1]
-    for name in set(sys.modules) - before[0]:
-        del sys.modules[name]
+    assert sys.path == path
+    forget("own", "neighbour")
 
 
 OWN = '[bodies]\nsurface_density = 2\n[forces.own]\nclass = "{}"\n{}\n[forces.gravity]\n'
 
 
-def test_a_force_of_ones_own(tmp_path, own_force):
+def test_a_force_of_ones_own(tmp_path, own_module):
     config = load_text(tmp_path, OWN.format("own:Yukawa", 'strength = "2 pN"\npower = 2'))
     assert config.force_names == ("gravity", "own")
     force = config.forces[1]
@@ -68,13 +171,13 @@ def test_a_force_of_ones_own(tmp_path, own_force):
     assert "class Yukawa" in inspect.getsource(type(force))
 
 
-def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_force, monkeypatch):
+def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_module, monkeypatch):
     # Python's own cache would take an edit within a second, of the same length, for the old file.
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     text = OWN.format("own:Yukawa", "strength = 1")
     first, second = load_text(tmp_path, text), load_text(tmp_path, text)
     assert type(first.forces[1]) is type(second.forces[1])
-    own_force.write_text(OWN_FORCE.replace("SCALE * strength", "9.000 * strength"))
+    own_module.write_text(OWN_MODULE.replace("SCALE * strength", "9.000 * strength"))
     assert load_text(tmp_path, text).forces[1].kernel(None, 1.0) == 9.0
 
 
@@ -104,12 +207,12 @@ def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_force, monkeypatc
         ("own.sub:A", "", "there is no module 'own.sub'"),
     ],
 )
-def test_a_force_of_ones_own_that_is_wrong(tmp_path, own_force, name, more, said):
+def test_a_force_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
     [line] = problem_lines(tmp_path, OWN.format(name, more))
     assert said in line
 
 
-def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own_force):
+def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own_module):
     assert problem_lines(tmp_path, OWN.format("own:Yukawa", "strenght = 1")) == [
         "study.toml:3: forces.own: needs strength",
         "study.toml:5: forces.own.strenght: unknown key (did you mean 'strength'?); "
@@ -133,26 +236,26 @@ def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own
         ("def f():\n    f()\nf()\n", "RecursionError"),
     ],
 )
-def test_a_module_that_raises_names_its_line(tmp_path, own_force, source, said):
-    own_force.write_text(source)
+def test_a_module_that_raises_names_its_line(tmp_path, own_module, source, said):
+    own_module.write_text(source)
     [line] = problem_lines(tmp_path, OWN.format("own:Yukawa", ""))
     assert "forces.own.class: importing module 'own' failed: " in line
     assert said in line
     assert "own" not in sys.modules
 
 
-def test_a_module_may_not_replace_one_of_pythons(tmp_path, own_force):
-    own_force.with_name("json.py").write_text(OWN_FORCE)
+def test_a_module_may_not_replace_one_of_pythons(tmp_path, own_module):
+    own_module.with_name("json.py").write_text(OWN_MODULE)
     before = sys.modules["json"]
     [line] = problem_lines(tmp_path, OWN.format("json:Yukawa", ""))
     assert "already loaded: rename it" in line
     assert sys.modules["json"] is before
 
 
-def test_two_configs_may_have_modules_of_the_same_name(tmp_path, own_force):
+def test_two_configs_may_have_modules_of_the_same_name(tmp_path, own_module):
     folder = tmp_path / "other"
     folder.mkdir()
-    (folder / "own.py").write_text(OWN_FORCE.replace("SCALE * strength", "0.5 * strength"))
+    (folder / "own.py").write_text(OWN_MODULE.replace("SCALE * strength", "0.5 * strength"))
     text = OWN.format("own:Yukawa", "strength = 1")
     (folder / "study.toml").write_text(text)
     kernels = [
@@ -160,3 +263,198 @@ def test_two_configs_may_have_modules_of_the_same_name(tmp_path, own_force):
         load_config(folder / "study.toml").forces[1].kernel,
     ]
     assert [kernel(None, 1.0) for kernel in kernels] == [2.0, 0.5]
+
+
+METHOD = 'preset = "tang2014"\n[integrator]\nclass = "{}"\n{}\n'
+SHAPES = 'preset = "tang2014"\n[shapes]\nclass = "{}"\n{}\n'
+
+
+def test_an_integrator_of_ones_own(tmp_path, own_module):
+    text = METHOD.format("own:Mine", 'step = "10 ns"\nfactor = 2\nmax_steps = 7')
+    options = load_text(tmp_path, text).integrator
+    assert (options.name, options.label, options.max_steps) == (None, "own:Mine", 7)
+    assert (options.method.step, options.method.factor) == (1e-8, 2.0)
+    assert attrs.evolve(options, max_steps=8).method is options.method
+    assert pickle.loads(pickle.dumps(options)) == options
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("implicit", Implicit(1e-8)),
+        ("dormand_prince54", DormandPrince54(1e-8)),
+        ("overdamped", Overdamped(1e-8)),
+        ("velocity_verlet", VelocityVerlet(1e-7)),
+    ],
+)
+def test_a_name_makes_flocsims_own_integrator(name, made):
+    assert IntegratorConfig(name=name, tolerance=1e-8, step=1e-7).method == made
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "said"),
+    [
+        ("own:Mine", "", "2: integrator: needs step"),
+        ("own:Mine", "step = 0", "4: integrator.step must be a finite number above 0 [s], found 0"),
+        (
+            "own:Mine",
+            "step = 1\nmax_steps = 0.5",
+            "5: integrator.max_steps must be an integer",
+        ),
+        (
+            "own:Mine",
+            "step = 1\nfaktor = 1",
+            "5: integrator.faktor: unknown key (did you mean 'factor'?); "
+            "known: step, factor, max_steps",
+        ),
+        (
+            "own:Mine",
+            "step = 1\ntolerance = 1",
+            "tolerance: unknown key; known: step, factor, ",
+        ),
+        ("own:Mine", "step = 1\nname = 'implicit'", "3: integrator.class: excludes name, which is"),
+        ("own:Mein", "", "3: integrator.class: module 'own' ("),
+        ("own:Mein", "", "has no 'Mein'; its integrators: Mine, Stepless, Lost, Backward"),
+        ("own:Rod", "", "is no integrator: subclass flocsim.integrators.Integrator"),
+        ("own:Stepless", "", "does not define attempt, next_step"),
+        ("own:Lost", "", "2: integrator: module 'flocsim.hooks' has no attribute 'no_such_hook'"),
+        ("own:Backward", "", "2: integrator: first_step must be a number above 0, found -1.0"),
+        ("own:Greedy", "", "its parameter max_steps has the name of a key of flocsim's own"),
+        ("own", "", "must be 'module:Class' such as 'mine:SemiImplicitEuler', found 'own'"),
+        ("nowhere:A", "", "there is no module 'nowhere', neither nowhere.py nor installed"),
+    ],
+)
+def test_an_integrator_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
+    [line] = problem_lines(tmp_path, METHOD.format(name, more))
+    assert said in line.replace(f"{tmp_path}/", "")
+
+
+def test_a_shape_of_ones_own(tmp_path, own_module):
+    shapes = load_text(tmp_path, SHAPES.format("own:Rod", 'length = "6 um"')).shapes
+    assert (shapes.source, shapes.label, shapes.vertices) == (None, "own:Rod", (2,))
+    assert (shapes.own.length, shapes.own.radius) == (6e-6, 1e-6)
+    text = SHAPES.format("own:Rod", "length = 1e-6\npoints = 3\nvertices = [1, 3]")
+    shapes = load_text(tmp_path, text).shapes
+    assert shapes.vertices == (1, 3)
+    assert attrs.evolve(shapes, vertices=(1,)).own is shapes.own
+
+
+def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
+    config = load_text(tmp_path, SHAPES.format("own:Rod", "length = 6\nvertices = [1, 2]"))
+    check_study(config)
+    study = Study(config)
+    [floc] = study.flocs
+    assert (floc.name, list(floc.shapes)) == ("own:Rod", [2])
+    for condition, (_, *radii) in enumerate(config.scene.conditions):
+        pair = study.encounter(condition, 2, [0.1, 0.2, 0.3, 0.4])
+        assert [shape.equivalent_radius for shape in pair.shapes] == pytest.approx(radii)
+        assert [s.length / s.radius for s in pair.shapes] == pytest.approx([6e6, 6e6])
+        spheres = study.encounter(condition, 1, [0.1, 0.2, 0.3, 0.4])
+        assert all(isinstance(shape, Sphere) for shape in spheres.shapes)
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "said"),
+    [
+        ("own:Rod", "", "2: shapes: needs length"),
+        (
+            "own:Rod",
+            "length = '1 s'",
+            "4: shapes.length must be a length such as '16.41 um'",
+        ),
+        ("own:Rod", "length = 1\nraduis = 1", "known: length, radius, points, vertices"),
+        ("own:Rod", "length = 1\nsource = 'library'", "3: shapes.class: excludes source, which is"),
+        (
+            "own:Rod",
+            "length = 1\npool = 3",
+            "5: shapes.pool: unknown key; known: length, radius, ",
+        ),
+        (
+            "own:Rod",
+            "length = 1\nvertices = [1, 4]",
+            "2: shapes: vertices may be 1, the equivalent sphere, and 2, the core points of "
+            "own:Rod, found 4",
+        ),
+        ("own:Rod", "length = 1\npoints = 1", "2: shapes: one core point is a sphere: leave class"),
+        ("own:Rod", "length = 1\npoints = -1", "2: shapes: Number of samples, -1, must be non-neg"),
+        ("own:Stiff", "length = 1", "scaled(2.0) must be a shape of four times the area"),
+        ("own:Hollow", "length = 1", "2: shapes: area must be a finite number above 0, found 0.0"),
+        ("own:Broken", "length = 1", "2: shapes: no such point"),
+        ("own:Outline", "", "its parameter vertices has the name of a key of flocsim's own"),
+        ("own:Mine", "", "is no shape: subclass flocsim.geometry.shapes.shape.Shape"),
+        ("own:Rood", "", "has no 'Rood'; its shapes: Rod, Stiff, Hollow, Broken, Outline"),
+    ],
+)
+def test_a_shape_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
+    [line] = problem_lines(tmp_path, SHAPES.format(name, more))
+    assert said in line
+
+
+def test_a_class_replaces_a_name_from_below_and_the_other_way_round(tmp_path, own_module):
+    over = {"integrator": {"class": "own:Mine", "step": 1e-9}}
+    text = 'preset = "si"\n[integrator]\nname = "implicit"\n'
+    assert load_text(tmp_path, text, over).integrator.label == "own:Mine"
+    back = {"integrator": {"name": "velocity_verlet"}}
+    text = METHOD.format("own:Mine", "step = 1e-9")
+    assert load_text(tmp_path, text, back).integrator.method == VelocityVerlet(1e-9)
+
+
+OWN_STUDY = """\
+preset = "tang2014"
+[scene]
+types = ["III"]
+[shapes]
+class = "own:Rod"
+length = 3
+radius = 1
+[integrator]
+class = "own:Mine"
+step = "10 ns"
+"""
+
+
+@pytest.fixture(scope="module")
+def first_identity(tmp_path_factory):
+    """The identity of OWN_STUDY before anything is edited."""
+    folder = tmp_path_factory.mktemp("first")
+    (folder / "own.py").write_text(OWN_MODULE)
+    (folder / "neighbour.py").write_text("SCALE = 2.0\n")
+    try:
+        return identity_of(Study(load_text(folder, OWN_STUDY)))
+    finally:
+        forget("own", "neighbour")
+
+
+@pytest.mark.parametrize(
+    ("edited", "said"),
+    [
+        ({"/ 12.0": "/ 12.5"}, "the flocs with N = 2 have changed"),
+        ({"2.0 * self.length * self.radius +": "2.1 * self.length * self.radius +"}, "the flocs"),
+        ({"return Rod(self.length * factor": "return Rod(1.0001 * self.length * factor"}, None),
+        ({"1.0 * step": "0.9 * step"}, "the compiled code for polygons has changed"),
+        ({"largest_step = 1e-7": "largest_step = 2e-7"}, "integrator.largest_step is 1e-07 in the"),
+        ({"default=0.5)": "default=0.6)"}, "integrator.factor is 0.5 in the file, 0.6 now"),
+        ({"points: int = 2": "points: int = 3"}, "shapes.points is 2 in the file, 3 now"),
+        ({"class Apple": "# nothing that counts\nclass Pear"}, ""),
+    ],
+)
+def test_an_edit_makes_it_another_study(tmp_path, own_module, first_identity, edited, said):
+    [(old, new)] = edited.items()
+    assert OWN_MODULE.count(old) == 1
+    own_module.write_text(OWN_MODULE.replace(old, new))
+    if said is None:
+        [line] = problem_lines(tmp_path, OWN_STUDY)
+        assert "scaled(2.0) must be a shape of four times the area" in line
+        return
+    found = differences(first_identity, identity_of(Study(load_text(tmp_path, OWN_STUDY))))
+    assert bool(found) == bool(said)
+    assert all(said in line for line in found[:1])
+
+
+def test_other_parameters_make_it_another_study(tmp_path, own_module, first_identity):
+    over = {"shapes": {"length": 4}, "integrator": {"factor": 1}}
+    found = identity_of(Study(load_text(tmp_path, OWN_STUDY, over)))
+    assert differences(first_identity, found) == [
+        "integrator.factor is 0.5 in the file, 1.0 now",
+        "shapes.length is 3.0 in the file, 4.0 now",
+    ]

@@ -9,8 +9,8 @@ import tomllib
 
 import pytest
 
-from flocsim.ensembles.config.layers import lay_over
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.overrides import lay_over
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import ROOT
 

@@ -3,7 +3,7 @@
 import pytest
 
 from flocsim.ensembles.cli import main
-from flocsim.ensembles.config.settings import nested, parsed
+from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.errors import ConfigError
 from tests.helpers.small_study import small_config, write_small
 
@@ -22,13 +22,13 @@ from tests.helpers.small_study import small_config, write_small
     ],
 )
 def test_a_setting_is_read_as_toml_or_text(text, keys, value):
-    assert parsed(text) == (keys, value)
+    assert parse_setting(text) == (keys, value)
 
 
 @pytest.mark.parametrize("text", ["seed", "=3", "scene.=3", ".seed=3"])
 def test_a_setting_without_key_or_value_is_refused(text):
     with pytest.raises(ConfigError, match="write KEY=VALUE"):
-        parsed(text)
+        parse_setting(text)
 
 
 def test_later_settings_win_and_contradictions_are_refused():
@@ -38,7 +38,9 @@ def test_later_settings_win_and_contradictions_are_refused():
 
 
 def test_settings_lie_over_the_file_and_are_kept(tmp_path):
-    settings = nested(map(parsed, ["seed=7", "shapes.vertices=[1]", "forces.contact.k_n=10 N/m"]))
+    settings = nested(
+        map(parse_setting, ["seed=7", "shapes.vertices=[1]", "forces.contact.k_n=10 N/m"])
+    )
     config = small_config(tmp_path, settings)
     assert (config.seed, config.shapes.vertices) == (7, (1,))
     assert config.overrides == settings

@@ -1,0 +1,56 @@
+"""Tables laid over one another: preset, config file, `--set key=value` of the command line."""
+
+import tomllib
+
+from flocsim.ensembles.config.schema import ALTERNATIVES
+from flocsim.ensembles.config.toml_text import DEEPEST_TABLE
+from flocsim.errors import ConfigError
+
+
+def lay_over(below, above, path=()):
+    """``below`` with everything that ``above`` gives put over it; tables are merged.
+
+    A key of ALTERNATIVES replaces those below that it excludes. A value None in ``above`` counts
+    as not given. A table over ``false`` starts afresh.
+    """
+    given = {key: value for key, value in above.items() if value is not None}
+    alternatives = ALTERNATIVES.get(".".join(path), ())
+    chosen = [keys for keys in alternatives if keys & given.keys()]
+    gone = set().union(*(keys for keys in alternatives if chosen and keys not in chosen))
+    merged = {key: value for key, value in below.items() if key not in gone}
+    for key, value in given.items():
+        if isinstance(value, dict) and len(path) < DEEPEST_TABLE:
+            under = merged.get(key)
+            value = lay_over(under if isinstance(under, dict) else {}, value, (*path, key))
+        merged[key] = value
+    return merged
+
+
+def parse_setting(text):
+    """(keys, value) of "scene.delta=[0.0, 0.5]"; a value that is no TOML is a string.
+
+    So `--set forces.contact.k_n='10 N/m'` needs no quotes within quotes.
+    """
+    key, equals, value = text.partition("=")
+    keys = [part.strip() for part in key.split(".")]
+    if not equals or not all(keys):
+        raise ConfigError(f"--set {text!r}: write KEY=VALUE, e.g. --set scene.delta='[0.0, 0.5]'")
+    value = value.strip()
+    try:
+        table = tomllib.loads(f"value = {value}\n")
+    except tomllib.TOMLDecodeError:
+        return keys, value
+    return keys, table["value"] if len(table) == 1 else value
+
+
+def nested(settings):
+    """{"scene": {"delta": …}} of (keys, value) pairs; ConfigError where two cannot both hold."""
+    table = {}
+    for keys, value in settings:
+        inner = table
+        for key in keys[:-1]:
+            inner = inner.setdefault(key, {})
+            if not isinstance(inner, dict):
+                raise ConfigError(f"--set {'.'.join(keys)}: {key} has been set to a value already")
+        inner[keys[-1]] = value
+    return table
