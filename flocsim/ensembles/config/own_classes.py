@@ -108,8 +108,7 @@ def check_integrator(integrator):
         value = getattr(integrator, name)
         if not isinstance(value, Real) or isinstance(value, bool) or not value > 0.0:
             raise ConfigError(f"{name} must be a number above 0, found {value!r}")
-    for name in Integrator.__abstractmethods__:
-        getattr(integrator, name)  # what it raises is told like a wrong value
+    dict(integrator.fillings)  # what it raises is told like a wrong value
 
 
 def check_shape(shape):

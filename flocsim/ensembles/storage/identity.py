@@ -27,7 +27,8 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py", "run.py", "compiler",
+    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
+    "run.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact",
     "ensembles/collision", "ensembles/study.py",
 )  # fmt: skip
