@@ -28,11 +28,15 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py",
-    "forces", "integrators", "geometry/shapes", "geometry/contact",
+    "composer.py", "numba_internals.py",
+    "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
     "ensembles/collision", "ensembles/study.py", "ensembles/config/methods.py",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
-makes shapes: what it made is compared itself."""
+makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py holds this
+list against all that a replicate imports."""
+
+PACKAGE = Path(__file__).parents[2]
 
 
 def identity_of(study):
@@ -101,15 +105,15 @@ def kernel_facts(config):
     return facts
 
 
-def physics_digest():
+def physics_digest(root=PACKAGE):
     """A hash of the modules that decide what is in a row: of what they do, not how they look."""
     found = hashlib.blake2b(digest_size=16)
-    for path in physics_files():
+    for path in physics_files(root):
         found.update(essence(path.read_text("utf-8")).encode())
     return found.hexdigest()
 
 
-def physics_files(root=Path(__file__).parents[2]):
+def physics_files(root=PACKAGE):
     """The files of PHYSICS in the package's folder, in an order that is always the same."""
     for name in PHYSICS:
         place = root / name
