@@ -26,9 +26,9 @@ sys.path += [str(ROOT / "tests"), str(ROOT / "tests" / "ensembles")]
 from hypothesis import strategies as st  # noqa: E402
 from test_config_mutations import MUTATION, mutate, toml  # noqa: E402
 
+from flocsim.ensembles.collision.failures import run_safely  # noqa: E402
 from flocsim.ensembles.config.loader import TABLES, TOP_KEYS, load_config  # noqa: E402
 from flocsim.ensembles.estimates.stop_rule import borders  # noqa: E402
-from flocsim.ensembles.parallel.worker import run_safely  # noqa: E402
 from flocsim.ensembles.preflight import check_study  # noqa: E402
 from flocsim.ensembles.storage.identity import identity_of, short  # noqa: E402
 from flocsim.ensembles.study import Study  # noqa: E402

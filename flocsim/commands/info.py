@@ -150,7 +150,7 @@ def readable(name, value):
 
 def failed_lines(results):
     """The replicates that failed, each with the words that run it again."""
-    from flocsim.ensembles.parallel.desk import describe_note
+    from flocsim.ensembles.collision.failures import describe_note
 
     notes = json.loads(results.run.get("failed", "[]"))
     lines = [f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES]]

@@ -7,12 +7,10 @@ import numpy as np
 
 from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.encounter import OBSERVER, make_encounter, run_encounter
+from flocsim.ensembles.collision.failures import NO_FLOC
 from flocsim.ensembles.collision.flocs import Wardrobe, load_flocs
 from flocsim.ensembles.collision.sampling import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
-
-NO_FLOC = -1
-"""In ``floc_i`` and ``floc_j``: a sphere."""
 
 
 def flocs_of(config):
