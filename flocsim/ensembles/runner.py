@@ -22,6 +22,7 @@ from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.progress import Progress
+from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.storage.resume import Beginning, begin
 from flocsim.ensembles.storage.row_store import RowStore
@@ -60,10 +61,11 @@ def run(config, comm=None, quiet=True):
     the same whatever the number of ranks.
     """
     comm = comm or SerialCommunicator()
-    study = make_study(config, comm)
+    study, cpus = make_study(config, comm)
     if comm.rank > 0:
         return follow(study, comm).results
-    start = Beginning(RowStore(MemoryJournal(), study.conditions), identity_of(study))
+    store = RowStore(MemoryJournal(), study.conditions)
+    start = Beginning(store, identity_of(study), cpus_now=cpus)
     try:
         return lead(study, start, comm, Progress(study.size, quiet)).results
     except SharedError as error:
@@ -76,12 +78,12 @@ def run_to_file(config, comm, output, mode, quiet=True):
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
     finished goes into a journal beside the file, and from there into the file when all is.
     """
-    study = make_study(config, comm)
+    study, cpus = make_study(config, comm)
     if comm.rank > 0:
         return follow(study, comm)
     progress = Progress(study.size, quiet)
     with sharing_errors(comm):
-        start = begin(study, identity_of(study), output, mode)
+        start = begin(study, identity_of(study), output, mode, cpus)
     with start.resources:
         for remark in start.remarks:
             progress.warn(remark)
@@ -92,9 +94,13 @@ def run_to_file(config, comm, output, mode, quiet=True):
 
 
 def make_study(config, comm):
-    """The Study on every rank; rank 0 grows or reads the flocs for all."""
+    """(Study, kinds of CPU) of a job: the Study on every rank, the kinds of all ranks on rank 0.
+
+    Rank 0 grows or reads the flocs for all.
+    """
     flocs = flocs_of(config) if comm.rank == 0 else None
-    return Study(config, flocs=comm.broadcast(flocs))
+    study = Study(config, flocs=comm.broadcast(flocs))
+    return study, distinct(comm.gather(cpu_kind()) or [])
 
 
 def follow(study, comm):
@@ -124,6 +130,8 @@ def lead(study, start, comm, progress, output=None):
     progress.say(describe(study, comm.size, study.size - remaining))
     comm.broadcast(Plan(remaining, key))
     if remaining:
+        for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
+            progress.warn(line)
         compile_in_turn(study, comm)
         progress.say(f"compiled or loaded in {time.monotonic() - began:.1f} s")
     progress.start(remaining)
@@ -218,6 +226,7 @@ def make_results(study, start, state, ended, ranks, output):
 def facts(study, start, notes, ended, ranks):
     """The scalars of the group ``run``."""
     config, identity = study.config, start.identity
+    added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
     return found | {
@@ -225,6 +234,7 @@ def facts(study, start, notes, ended, ranks):
         "identity": storable(json.dumps(identity, sort_keys=True)),
         "failed": storable(json.dumps(notes)),
         "ranks": ranks,
+        "cpus": storable(json.dumps(distinct([*start.cpus_found, *added]))),
         "sessions": 1 + len(start.history),
         "history": storable(json.dumps(start.history)),
         "computed": ended.computed,
