@@ -41,7 +41,7 @@ def run(args):
         check_output(output)
     check_overlay(args.overlay)
     try:
-        pictures, fits = work(args.images, options)
+        pictures, fits = fit_pictures(args.images, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
@@ -78,9 +78,9 @@ def report(error):
     print(f"flocsim: {error}", file=sys.stderr, flush=True)
 
 
-def work(names, options):
+def fit_pictures(names, options):
     """Pictures, and for each of their regions {radius: {N: Fit}}."""
-    from flocsim.io.shapes.fit_report import Bar
+    from flocsim.io.terminal import Progress
 
     paths = fit_work.list_pictures(names, options.masks, report)
     background = fit_work.find_background(paths, options)
@@ -92,8 +92,12 @@ def work(names, options):
         pictures = list(found_pictures(mapped(fit_work.find_flocs, tasks), options))
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
-        bar = Bar(len(masks))
-        fits = [bar.count(fit) for fit in mapped(fit_work.fit_region, masks)]
+        progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
+        fits = []
+        for fit in mapped(fit_work.fit_region, masks):
+            fits.append(fit)
+            progress.report(len(masks) - len(fits))
+        progress.finish()
     return pictures, fits
 
 

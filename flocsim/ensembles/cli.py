@@ -12,9 +12,9 @@ from flocsim.ensembles.parallel.communicator import (
     find_communicator,
     launched_rank,
 )
-from flocsim.ensembles.progress import plain_warnings, tell
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
+from flocsim.io.terminal import plain_warnings, tell
 
 INTERNAL = 70
 

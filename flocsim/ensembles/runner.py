@@ -21,7 +21,6 @@ from flocsim.ensembles.parallel.messages import ExitCode, Plan
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
-from flocsim.ensembles.progress import Progress
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.storage.resume import Beginning, begin
@@ -33,6 +32,7 @@ from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
 from flocsim.io.results.file import read_results, write_results
 from flocsim.io.results.schema import Results
+from flocsim.io.terminal import Progress
 
 
 @attrs.define

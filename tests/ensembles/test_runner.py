@@ -7,13 +7,13 @@ from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.parallel import worker
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.parallel.study_state import Phase
-from flocsim.ensembles.progress import Progress
 from flocsim.ensembles.runner import describe, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.results.file import read_results, same_data, write_results
+from flocsim.io.terminal import Progress
 from tests.helpers.small_study import small_study
 
 
