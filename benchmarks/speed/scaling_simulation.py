@@ -1,4 +1,4 @@
-"""Replays measured costs of replicates on simulated ranks, with the Schedule that real ones have."""
+"""Replays measured costs of replicates on simulated ranks, which share the real Schedule."""
 
 import heapq
 import time

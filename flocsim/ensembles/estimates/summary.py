@@ -4,8 +4,13 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
-from flocsim.ensembles.estimates.pooled import pooled_probabilities, pooled_sums
-from flocsim.ensembles.estimates.statistics import checked_codes, count, probabilities
+from flocsim.ensembles.estimates.statistics import (
+    checked_codes,
+    count,
+    pooled_probabilities,
+    pooled_sums,
+    probabilities,
+)
 from flocsim.ensembles.storage.row_store import RowStore
 
 BLOCK = 16_384
