@@ -146,15 +146,15 @@ def check_animation(path):
 
 def draw_more(args, encounter, arrays, row, title):
     """Draw the forces and the animation where asked for; the paths written."""
-    from flocsim.ensembles.collision.forces_between import loads_of
+    from flocsim.ensembles.collision.forces_between import forces_between
     from flocsim.ensembles.collision.snapshots import frames_of
     from flocsim.io.plots.figures import draw_forces, write_animation
 
     times, position, _ = arrays
     written = []
     if args.forces:
-        instants, loads = loads_of(encounter, *arrays)
-        written += save_all(draw_forces(instants, loads, row["t_collision"], title), args.forces)
+        instants, forces = forces_between(encounter, *arrays)
+        written += save_all(draw_forces(instants, forces, row["t_collision"], title), args.forces)
     if args.animation:
         frames = frames_of(encounter.shapes, times, position, row["t_collision"], ANIMATION_FRAMES)
         distance = centre_distance(position)

@@ -127,7 +127,7 @@ def lead(study, start, comm, progress, output=None):
     state = make_state(study, start, comm.size)
     remaining = state.schedule.remaining
     key = short(start.identity)
-    progress.say(describe(study, comm.size, study.size - remaining))
+    progress.say(announcement(study, comm.size, study.size - remaining))
     comm.broadcast(Plan(remaining, key))
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
@@ -243,7 +243,7 @@ def facts(study, start, notes, ended, ranks):
     }
 
 
-def describe(study, ranks, existing=0):
+def announcement(study, ranks, existing=0):
     """One line: what is about to be run."""
     types, vertices, delta, replicates = study.shape
     line = (

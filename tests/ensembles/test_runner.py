@@ -7,7 +7,7 @@ from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.parallel import worker
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.parallel.study_state import Phase
-from flocsim.ensembles.runner import describe, lead, make_state, run
+from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
@@ -136,5 +136,5 @@ def test_run_is_the_whole_way(tmp_path, capsys):
 
 def test_the_run_is_announced_in_one_line(study):
     line = "36 replicates: 2 types x 3 numbers of vertices x 2 displacements x 3, on "
-    assert describe(study, 1) == line + "1 rank"
-    assert describe(study, 4, 7) == line + "4 ranks; 7 of them exist already"
+    assert announcement(study, 1) == line + "1 rank"
+    assert announcement(study, 4, 7) == line + "4 ranks; 7 of them exist already"
