@@ -111,5 +111,4 @@ def missing(intervals, first, stop):
 
 
 def total(intervals):
-    """How many numbers there are."""
     return sum(stop - first for first, stop in intervals)

@@ -20,7 +20,6 @@ INTERNAL = 70
 
 
 def add_arguments(parser):
-    """The arguments of the command."""
     parser.add_argument("config", help="config file (TOML); `flocsim init` writes an example")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -113,7 +112,6 @@ def study(config, comm, arguments):
 
 
 def stopped_text(ended, output):
-    """What was saved when a signal came."""
     who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
     return (
         f"stopped by {who}: {ended.kept} finished replicates are in {output}.journal; go on with "
@@ -122,7 +120,6 @@ def stopped_text(ended, output):
 
 
 def report(ended, output):
-    """Print the table of a finished study, and where it is."""
     from flocsim.ensembles.report import format_table
 
     results = ended.results

@@ -49,7 +49,6 @@ class Study:
 
     @property
     def size(self):
-        """Number of all replicates."""
         return int(np.prod(self.shape))
 
     def choose_flocs(self, condition, vertices, numbers):

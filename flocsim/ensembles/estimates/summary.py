@@ -29,13 +29,11 @@ class Reader:
         self.known = [self.store.known(place) for place in range(len(self.store.conditions))]
 
     def blocks(self):
-        """(first, stop) of blocks of replicates."""
         count = self.shape[-1]
         for first in range(0, count, BLOCK):
             yield first, min(first + BLOCK, count)
 
     def part(self, name, place, first, stop):
-        """Some values of one condition."""
         return self.store.read(place, name, first, stop, self.known[place])
 
     def block(self, name, first, stop):

@@ -63,7 +63,6 @@ class ProcessCommunicator(Communicator):
         self.end_others()
 
     def end_others(self):
-        """End what is left of the other processes."""
         for process in self.others:
             with contextlib.suppress(Exception):
                 process.kill()

@@ -88,7 +88,6 @@ class StudyState:
                 self.schedule.end_at(stop)
 
     def interrupt(self):
-        """A signal asks to stop."""
         if self.is_running:
             self.phase = Phase.INTERRUPTED
 

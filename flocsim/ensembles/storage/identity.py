@@ -131,12 +131,10 @@ def essence(source):
 
 
 def is_text(node):
-    """Whether a statement is nothing but a string."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def digest(array):
-    """A hash of an array's bytes."""
     return hashlib.blake2b(np.ascontiguousarray(array).tobytes(), digest_size=16).hexdigest()
 
 
@@ -161,7 +159,6 @@ def differences(stored, current):
 
 
 def difference(name, stored, current):
-    """One line on what differs."""
     kind, _, rest = name.partition(".")
     if kind in EXPLAINED:
         return EXPLAINED[kind].format(rest)
@@ -179,5 +176,4 @@ EXPLAINED = {
 
 
 def show(value):
-    """A value for messages."""
     return "nothing" if value is None else json.dumps(value)

@@ -88,7 +88,6 @@ def begin(study, identity, output, mode, cpus=()):
 
 
 def session(start):
-    """The description of this run, for the journal."""
     identity = start.identity
     return {
         "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
@@ -187,7 +186,6 @@ def take_results(start, output):
 
 
 def stored_identity(output, file):
-    """The identity in a results file."""
     if "identity" not in file["run"]:
         raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
     return json.loads(file["run/identity"].asstr()[()])

@@ -66,7 +66,6 @@ class RowStore:
         return values
 
     def part(self, place, name, entry, low, high):
-        """Values of one entry."""
         start, end, offset = entry
         if offset < 0:
             return self.old.read(self.conditions[place], name, low, high)
