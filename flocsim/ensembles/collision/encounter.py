@@ -20,7 +20,6 @@ from flocsim.arrays import (
     work_of,
 )
 from flocsim.body import Body
-from flocsim.ensembles.collision import memo as memo_at
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.failures import collided, outcome_of
 from flocsim.ensembles.collision.settling import terminal_motion, turn_time
@@ -86,15 +85,15 @@ class Encounter:
     def memo(self):
         """A fresh memo for the observer."""
         options = self.options
-        memo = np.zeros(memo_at.MEMO_SIZE)
+        memo = np.zeros(outcomes.MEMO_SIZE)
         escape = options.start_gap if options.escape_gap == "start_gap" else options.escape_gap
         rest = REST_TURNS * self.turn_time if options.rest_time == "auto" else options.rest_time
-        memo[memo_at.ZONE] = self.zone_distance
-        memo[memo_at.ESCAPE] = escape
-        memo[memo_at.REST_TIME] = rest
-        memo[memo_at.DRIFT_X : memo_at.DRIFT_Y + 1] = self.drift
-        memo[memo_at.MOBILITY_I] = self.settling[0][1]
-        memo[memo_at.MOBILITY_J] = self.settling[1][1]
+        memo[outcomes.ZONE] = self.zone_distance
+        memo[outcomes.ESCAPE] = escape
+        memo[outcomes.REST_TIME] = rest
+        memo[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
+        memo[outcomes.MOBILITY_I] = self.settling[0][1]
+        memo[outcomes.MOBILITY_J] = self.settling[1][1]
         return memo
 
     def time_limit(self):
@@ -162,12 +161,12 @@ def replicate_row(status, angles, memo, clock, counts):
         "angle_i": angles[0],
         "angle_j": angles[1],
         "outcome": outcome,
-        "inside": int(memo[memo_at.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(memo[memo_at.CROSSED]) if touched else NOT_APPLICABLE,
-        "d_c_collision": memo[memo_at.D_COLLISION] if touched else np.nan,
-        "d_c_max": memo[memo_at.D_MAX] if touched else np.nan,
-        "d_c_last": memo[memo_at.D_LAST],
-        "t_collision": memo[memo_at.T_COLLISION] if touched else np.nan,
+        "inside": int(memo[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(memo[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
+        "d_c_collision": memo[outcomes.D_COLLISION] if touched else np.nan,
+        "d_c_max": memo[outcomes.D_MAX] if touched else np.nan,
+        "d_c_last": memo[outcomes.D_LAST],
+        "t_collision": memo[outcomes.T_COLLISION] if touched else np.nan,
         "t_end": clock[TIME],
         "steps": counts[STEPS],
         "rejected": counts[REJECTED],

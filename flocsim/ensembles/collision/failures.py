@@ -6,8 +6,7 @@ what is needed to run it again.
 
 import math
 
-from flocsim.ensembles.collision.memo import COLLIDED, INSIDE
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, MISSED
+from flocsim.ensembles.collision.outcomes import BOUND, COLLIDED, DEPARTED, INSIDE, MISSED
 from flocsim.ensembles.collision.sampling import draws, orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES

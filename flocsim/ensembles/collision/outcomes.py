@@ -1,35 +1,60 @@
 """What becomes of two bodies: missed, or a collision that ends bound or departed.
 
-``observe`` looks at the pair after every accepted step. Bound needs proof (see bonds.py).
+`watch_pair`, the observer, looks at the pair after every accepted step.
 
 Departed is a pair that touched, whose outlines are further apart than the escape gap, and which is
 parting now and would part at the steady drift that weight and centre forces give it there.
+
+Bound needs one of two proofs.
+
+Certificate: the bodies touch, do not move against each other, and the attraction outweighs the
+largest load that settling can put on the bond, in any orientation, by a safety factor: in pulling
+straight, and in prying the doublet open about each of the two outermost contact points, which lie
+on either side of the line of centres. Two spheres, and a surface force, which follows the contact,
+need the straight pull only.
+
+Rest: the bodies touch and have rested as one rigid doublet, which does not swing any more, for a
+stated time, with the load at its worst: the faster settling one straight below (a fixed receiver
+cannot turn, so it need not).
 """
 
-from flocsim.arrays import BOUNDING_RADIUS, NOW
-from flocsim.ensembles.collision.bonds import has_rested, is_certain, start_rest
-from flocsim.ensembles.collision.memo import (
-    COLLIDED,
-    CROSSED,
-    D_COLLISION,
-    D_LAST,
-    D_MAX,
-    DRIFT_X,
-    DRIFT_Y,
-    ESCAPE,
-    INSIDE,
-    MOBILITY_I,
-    MOBILITY_J,
-    T_COLLISION,
-    ZONE,
-)
+import math
+
+from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, FREE, NOW
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.hooks import centre_force, has_centre_force
-from flocsim.integrators.rhs.views import centre_line, centre_view
+from flocsim.hooks import centre_force, has_centre_force, surface_force, surface_reach
+from flocsim.integrators.rhs.views import (
+    centre_line,
+    centre_view,
+    closest_rows,
+    effective_mass,
+    surface_view,
+)
 
 BOUND, DEPARTED, MISSED = 1, 2, 3
 """Codes of the observer."""
+
+(
+    ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J,
+    COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION,
+    REST_SINCE, REST_X, REST_Y, REST_ANGLE, MEMO_SIZE,
+) = range(19)  # fmt: skip
+"""The observer's memo. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
+relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m], times [s]."""
+
+SAFETY = 3.0
+"""Factor by which attraction must outweigh the load in a certificate."""
+
+CALM = 0.02
+"""A pair whose parts move at less than this share of the relative drift is calm enough for a
+certificate …"""
+
+REST = 1e-3
+"""… and one that has moved by less than this share of the drift's way over the rest time rests."""
+
+HANGING = 0.99
+"""Cosine between line of centres and drift above which the load is at its worst."""
 
 
 def has_not_touched(memo):
@@ -96,3 +121,104 @@ def watch_pair(scene, work, memo, time):
     if is_certain(scene, work, memo, time, nx, ny, distance):
         return BOUND
     return BOUND if has_rested(scene, work, memo, time, nx, ny) else 0
+
+
+def relative_speeds(scene, work, nx, ny):
+    """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
+    v = work.motion
+    ux, uy = v[NOW, 1, 3] - v[NOW, 0, 3], v[NOW, 1, 4] - v[NOW, 0, 4]
+    rx, ry = v[NOW, 1, 0] - v[NOW, 0, 0], v[NOW, 1, 1] - v[NOW, 0, 1]
+    spin = v[NOW, 0, 5]
+    shear = math.hypot(ux + spin * ry, uy - spin * rx)
+    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
+    return abs(ux * nx + uy * ny), shear + abs(v[NOW, 1, 5] - spin) * size
+
+
+def largest_load(memo):
+    """The pull on the bond of a settling doublet in its worst orientation [N]."""
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    return drift / (memo[MOBILITY_I] + memo[MOBILITY_J])
+
+
+def surface_attraction(scene, work, time):
+    """Attraction at the closest points [N], 0 without surface forces."""
+    if surface_reach(scene.parameters) <= 0.0 or work.tally[CANDIDATES] == 0:
+        return 0.0
+    _, closest = closest_rows(work, NOW, 0)
+    return -surface_force(surface_view(scene, work, time, NOW, closest), scene.parameters)
+
+
+def arms_hold(work, attraction, load, nx, ny, distance):
+    """Whether the attraction along the centres holds against prying about both outer contacts."""
+    left_holds, right_holds = False, False
+    for row in range(work.tally[CANDIDATES]):
+        if work.geometry[NOW, row, 2] >= 0.0:
+            continue
+        # The contact point relative to body 0, from its components along n and t of the pair.
+        g = work.geometry[NOW]
+        shift = 3 if work.candidates[row, 0] == 0 else 5
+        x = g[row, shift + 1] * g[row, 0] + g[row, shift] * g[row, 1]
+        y = g[row, shift + 1] * g[row, 1] - g[row, shift] * g[row, 0]
+        side = nx * y - ny * x
+        lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny))
+        holds = attraction * abs(side) > load * lever
+        left_holds = left_holds or (holds and side > 0.0)
+        right_holds = right_holds or (holds and side < 0.0)
+    return left_holds and right_holds
+
+
+def is_certain(scene, work, memo, time, nx, ny, distance):
+    """Whether no later load can open the bond."""
+    along, shear = relative_speeds(scene, work, nx, ny)
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    spin = work.motion[NOW, 0, 5]
+    centrifugal = effective_mass(scene, 0, 1) * spin * spin * distance
+    load = SAFETY * (largest_load(memo) + centrifugal)
+    centres = 0.0
+    if has_centre_force():
+        view = centre_view(scene, work, time, NOW, 1, 0)
+        centres = -centre_force(view, scene.parameters)
+    surfaces = surface_attraction(scene, work, time)
+    points = scene.first[2]
+    if points == 2 or surfaces > load - min(centres, 0.0):
+        return along < CALM * drift and centres + surfaces > load
+    if shear > CALM * drift or centres <= load:
+        return False
+    return arms_hold(work, centres, load, nx, ny, distance)
+
+
+def outer_size(scene):
+    """R_i + R_j [m]."""
+    return scene.bodies[0, BOUNDING_RADIUS] + scene.bodies[1, BOUNDING_RADIUS]
+
+
+def doublet_pose(work):
+    """Place and angle of body 1 in the frame of body 0, which turns with it."""
+    now = work.motion
+    x, y = now[NOW, 1, 0] - now[NOW, 0, 0], now[NOW, 1, 1] - now[NOW, 0, 1]
+    c, s = math.cos(now[NOW, 0, 2]), math.sin(now[NOW, 0, 2])
+    return c * x + s * y, c * y - s * x, now[NOW, 1, 2] - now[NOW, 0, 2]
+
+
+def start_rest(work, memo, time):
+    """From now on the doublet may be resting as it is."""
+    memo[REST_SINCE] = time
+    memo[REST_X], memo[REST_Y], memo[REST_ANGLE] = doublet_pose(work)
+
+
+def has_rested(scene, work, memo, time, nx, ny):
+    """Whether the doublet has kept its pose for long enough, its load at the worst."""
+    x, y, angle = doublet_pose(work)
+    size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
+    moved = math.hypot(x - memo[REST_X], y - memo[REST_Y]) + abs(angle - memo[REST_ANGLE]) * size
+    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    if moved > REST * drift * memo[REST_TIME]:
+        start_rest(work, memo, time)
+        return False
+    # A doublet that still swings passes the worst direction, but may yet be thrown open.
+    swing = abs(work.motion[NOW, 0, 5]) * outer_size(scene)
+    if swing > CALM * drift:
+        return False
+    hanging = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y] >= HANGING * drift
+    hanging = hanging or scene.bodies[0, FREE] == 0.0
+    return hanging and time - memo[REST_SINCE] >= memo[REST_TIME]
