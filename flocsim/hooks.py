@@ -108,11 +108,11 @@ def next_step(clock, step, ratio):
     return step
 
 
-def awaits_touch(memo):
+def awaits_touch(observed):
     """Whether a method of fixed steps, too, is to end a step where the first pair touches."""
     return False
 
 
-def observe(scene, work, memo, time):
+def observe(scene, work, observed, time):
     """Watches every accepted step; a code other than 0 stops the run."""
     return 0

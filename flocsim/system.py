@@ -208,10 +208,12 @@ class Run:
 
     def to_end(self):
         """Advance until the run has ended for good."""
-        memo = np.zeros(1)
+        observed = np.zeros(1)
         while True:
             self.counts[PAUSE_AT] = self.counts[STEPS] + RECORD_ROWS
-            code = self.driver(self.scene, self.work, memo, self.clock, self.counts, self.record)
+            code = self.driver(
+                self.scene, self.work, observed, self.clock, self.counts, self.record
+            )
             self.save()
             if code == Status.NO_ROOM:
                 self.work = with_capacity(self.work, 2 * len(self.work.candidates))

@@ -65,21 +65,21 @@ def run_case(case, encounter, driver, limits):
 
     ``limits``: most simulated time [s] and most CPU time [s]; beyond them it is undecided.
     """
-    work, memo = encounter.start(case.angles, case.share), encounter.memo()
+    work, observed = encounter.start(case.angles, case.share), encounter.observed()
     integrator = encounter.system.integrator
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**12)
     clock[UNTIL] = min(encounter.time_limit(), limits[0])
     rows, began = np.zeros((0, 13)), time.process_time()
     while True:
         counts[PAUSE_AT] = counts[STEPS] + CHUNK
-        status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
+        status = Status(driver(encounter.scene, work, observed, clock, counts, rows))
         if status == Status.NO_ROOM:
             work = with_capacity(work, 2 * len(work.candidates))
         elif status != Status.PAUSED or time.process_time() - began > limits[1]:
             break
     if status == Status.PAUSED:
         status = Status.STEP_BUDGET
-    return outcome_of(status, counts[CODE], memo)[0], clock[TIME]
+    return outcome_of(status, counts[CODE], observed)[0], clock[TIME]
 
 
 def run_cases(cases, integrator, limits=None, allowed=None, exact=None):

@@ -49,11 +49,11 @@ def run_once(system, driver, until, budget):
     work = work_of(scene, *system.motion())
     clock, counts = system.integrator.fresh_clock(), system.integrator.fresh_counts(10**12)
     clock[UNTIL] = until
-    rows, memo = np.zeros((0, 1 + 6 * len(system.bodies))), np.zeros(1)
+    rows, observed = np.zeros((0, 1 + 6 * len(system.bodies))), np.zeros(1)
     began = time.process_time()
     while True:
         counts[PAUSE_AT] = counts[STEPS] + CHUNK
-        code = driver(scene, work, memo, clock, counts, rows)
+        code = driver(scene, work, observed, clock, counts, rows)
         cpu = time.process_time() - began
         if code == Status.NO_ROOM:
             work = with_capacity(work, 2 * len(work.candidates))

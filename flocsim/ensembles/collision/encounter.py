@@ -82,19 +82,19 @@ class Encounter:
         radii = [shape.equivalent_radius for shape in self.shapes]
         return turn_time(*radii, self.drift)
 
-    def memo(self):
-        """A fresh memo for the observer."""
+    def observed(self):
+        """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
-        memo = np.zeros(outcomes.MEMO_SIZE)
+        observed = np.zeros(outcomes.OBSERVED_SIZE)
         escape = options.start_gap if options.escape_gap == "start_gap" else options.escape_gap
         rest = REST_TURNS * self.turn_time if options.rest_time == "auto" else options.rest_time
-        memo[outcomes.ZONE] = self.zone_distance
-        memo[outcomes.ESCAPE] = escape
-        memo[outcomes.REST_TIME] = rest
-        memo[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
-        memo[outcomes.MOBILITY_I] = self.settling[0][1]
-        memo[outcomes.MOBILITY_J] = self.settling[1][1]
-        return memo
+        observed[outcomes.ZONE] = self.zone_distance
+        observed[outcomes.ESCAPE] = escape
+        observed[outcomes.REST_TIME] = rest
+        observed[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
+        observed[outcomes.MOBILITY_I] = self.settling[0][1]
+        observed[outcomes.MOBILITY_J] = self.settling[1][1]
+        return observed
 
     def time_limit(self):
         """Simulated time [s] after which a replicate is undecided."""
@@ -133,7 +133,7 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None, halt
     some thousand steps whether to give up; the row is None then.
     """
     work = encounter.start(angles, share)
-    memo = encounter.memo()
+    observed = encounter.observed()
     integrator = encounter.system.integrator
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
     clock[UNTIL] = encounter.time_limit()
@@ -141,7 +141,7 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None, halt
     while True:
         # A pause comes between two steps, so that it changes nothing.
         counts[PAUSE_AT] = counts[STEPS] + STEPS_AT_A_TIME
-        status = Status(driver(encounter.scene, work, memo, clock, counts, rows))
+        status = Status(driver(encounter.scene, work, observed, clock, counts, rows))
         if record is not None:
             record.take(counts)
         if status == Status.NO_ROOM:
@@ -150,23 +150,23 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None, halt
             if halted is not None and halted():
                 return None
         elif status != Status.RECORD_FULL:
-            return replicate_row(status, angles, memo, clock, counts)
+            return replicate_row(status, angles, observed, clock, counts)
 
 
-def replicate_row(status, angles, memo, clock, counts):
+def replicate_row(status, angles, observed, clock, counts):
     """What the table of replicates holds of a run that has ended."""
-    outcome, failure = outcome_of(status, counts[CODE], memo)
-    touched = collided(memo)
+    outcome, failure = outcome_of(status, counts[CODE], observed)
+    touched = collided(observed)
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
         "outcome": outcome,
-        "inside": int(memo[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(memo[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
-        "d_c_collision": memo[outcomes.D_COLLISION] if touched else np.nan,
-        "d_c_max": memo[outcomes.D_MAX] if touched else np.nan,
-        "d_c_last": memo[outcomes.D_LAST],
-        "t_collision": memo[outcomes.T_COLLISION] if touched else np.nan,
+        "inside": int(observed[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(observed[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
+        "d_c_collision": observed[outcomes.D_COLLISION] if touched else np.nan,
+        "d_c_max": observed[outcomes.D_MAX] if touched else np.nan,
+        "d_c_last": observed[outcomes.D_LAST],
+        "t_collision": observed[outcomes.T_COLLISION] if touched else np.nan,
         "t_end": clock[TIME],
         "steps": counts[STEPS],
         "rejected": counts[REJECTED],

@@ -40,20 +40,20 @@ LONGEST_REASON = 300
 """Letters of an exception's words in a note."""
 
 
-def outcome_of(status, code, memo):
+def outcome_of(status, code, observed):
     """(outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
         if code == MISSED:
             return OUTCOMES.index("missed"), 0
-        return OUTCOMES.index(CLASSES[int(memo[INSIDE]), int(code)]), 0
+        return OUTCOMES.index(CLASSES[int(observed[INSIDE]), int(code)]), 0
     if status in UNDECIDED_ENDS:
         return OUTCOMES.index("undecided"), FAILURES.index(UNDECIDED_ENDS[status])
     return FAILED, FAILURES.index(FAILED_ENDS[status])
 
 
-def collided(memo):
+def collided(observed):
     """Whether the outlines touched."""
-    return memo[COLLIDED] == 1.0
+    return observed[COLLIDED] == 1.0
 
 
 def run_safely(study, place, replicate, halted=None):

@@ -38,10 +38,11 @@ BOUND, DEPARTED, MISSED = 1, 2, 3
 (
     ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J,
     COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION,
-    REST_SINCE, REST_X, REST_Y, REST_ANGLE, MEMO_SIZE,
+    REST_SINCE, REST_X, REST_Y, REST_ANGLE, OBSERVED_SIZE,
 ) = range(19)  # fmt: skip
-"""The observer's memo. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
-relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m], times [s]."""
+"""Columns of `observed`, the observer's numbers. Given: D_0 [m], escape gap [m], rest time [s],
+settling velocity of j relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m],
+times [s]."""
 
 SAFETY = 3.0
 """Factor by which attraction must outweigh the load in a certificate."""
@@ -57,9 +58,9 @@ HANGING = 0.99
 """Cosine between line of centres and drift above which the load is at its worst."""
 
 
-def has_not_touched(memo):
+def has_not_touched(observed):
     """Whether the pair has yet to touch."""
-    return memo[COLLIDED] == 0.0
+    return observed[COLLIDED] == 0.0
 
 
 def outline_gap(scene, work):
@@ -67,60 +68,64 @@ def outline_gap(scene, work):
     return gap_between(scene, work, 1, 0)
 
 
-def note_collision(work, memo, time, distance):
+def note_collision(work, observed, time, distance):
     """Write down the instant of the first touch."""
-    memo[COLLIDED] = 1.0
-    memo[INSIDE] = 1.0 if distance < memo[ZONE] else 0.0
-    memo[D_COLLISION] = distance
-    memo[D_MAX] = distance
-    memo[T_COLLISION] = time
+    observed[COLLIDED] = 1.0
+    observed[INSIDE] = 1.0 if distance < observed[ZONE] else 0.0
+    observed[D_COLLISION] = distance
+    observed[D_MAX] = distance
+    observed[T_COLLISION] = time
 
 
-def is_parting(scene, work, memo, time, nx, ny):
+def is_parting(scene, work, observed, time, nx, ny):
     """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
     motion = work.motion
     rate = nx * (motion[NOW, 1, 3] - motion[NOW, 0, 3])
     rate += ny * (motion[NOW, 1, 4] - motion[NOW, 0, 4])
-    drift = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y]
+    drift = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y]
     if has_centre_force():
         repulsion = centre_force(centre_view(scene, work, time, NOW, 1, 0), scene.parameters)
-        drift += repulsion * (memo[MOBILITY_I] + memo[MOBILITY_J])
+        drift += repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
     return rate > 0.0 and drift > 0.0
 
 
-def is_away(scene, work, memo, distance, gap):
+def is_away(scene, work, observed, distance, gap):
     """Whether the outlines are further apart than the escape gap."""
     far = distance - scene.bodies[0, BOUNDING_RADIUS] - scene.bodies[1, BOUNDING_RADIUS]
-    if far > memo[ESCAPE]:
+    if far > observed[ESCAPE]:
         return True
-    return gap > 0.0 and gap > memo[ESCAPE] * 0.25 and outline_gap(scene, work) > memo[ESCAPE]
+    return (
+        gap > 0.0 and gap > observed[ESCAPE] * 0.25 and outline_gap(scene, work) > observed[ESCAPE]
+    )
 
 
-def follow(scene, work, memo, distance):
+def follow(scene, work, observed, distance):
     """Keep the largest and last centre distance, and whether it crossed D_0."""
-    memo[D_LAST] = distance
-    if memo[COLLIDED] == 1.0:
-        memo[D_MAX] = max(memo[D_MAX], distance)
-        inside = 1.0 if distance < memo[ZONE] else 0.0
-        if inside != memo[INSIDE]:
-            memo[CROSSED] = 1.0
+    observed[D_LAST] = distance
+    if observed[COLLIDED] == 1.0:
+        observed[D_MAX] = max(observed[D_MAX], distance)
+        inside = 1.0 if distance < observed[ZONE] else 0.0
+        if inside != observed[INSIDE]:
+            observed[CROSSED] = 1.0
 
 
-def watch_pair(scene, work, memo, time):
+def watch_pair(scene, work, observed, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
     nx, ny, distance = centre_line(work, NOW, 1, 0)
     gap = least_listed_gap(work)
-    if memo[COLLIDED] == 0.0 and gap < 0.0:
-        note_collision(work, memo, time, distance)
-    follow(scene, work, memo, distance)
-    if is_parting(scene, work, memo, time, nx, ny) and is_away(scene, work, memo, distance, gap):
-        return MISSED if memo[COLLIDED] == 0.0 else DEPARTED
-    if memo[COLLIDED] == 0.0 or gap >= 0.0:
-        start_rest(work, memo, time)
+    if observed[COLLIDED] == 0.0 and gap < 0.0:
+        note_collision(work, observed, time, distance)
+    follow(scene, work, observed, distance)
+    if is_parting(scene, work, observed, time, nx, ny) and is_away(
+        scene, work, observed, distance, gap
+    ):
+        return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
+    if observed[COLLIDED] == 0.0 or gap >= 0.0:
+        start_rest(work, observed, time)
         return 0
-    if is_certain(scene, work, memo, time, nx, ny, distance):
+    if is_certain(scene, work, observed, time, nx, ny, distance):
         return BOUND
-    return BOUND if has_rested(scene, work, memo, time, nx, ny) else 0
+    return BOUND if has_rested(scene, work, observed, time, nx, ny) else 0
 
 
 def relative_speeds(scene, work, nx, ny):
@@ -134,10 +139,10 @@ def relative_speeds(scene, work, nx, ny):
     return abs(ux * nx + uy * ny), shear + abs(v[NOW, 1, 5] - spin) * size
 
 
-def largest_load(memo):
+def largest_load(observed):
     """The pull on the bond of a settling doublet in its worst orientation [N]."""
-    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
-    return drift / (memo[MOBILITY_I] + memo[MOBILITY_J])
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
+    return drift / (observed[MOBILITY_I] + observed[MOBILITY_J])
 
 
 def surface_attraction(scene, work, time):
@@ -167,13 +172,13 @@ def arms_hold(work, attraction, load, nx, ny, distance):
     return left_holds and right_holds
 
 
-def is_certain(scene, work, memo, time, nx, ny, distance):
+def is_certain(scene, work, observed, time, nx, ny, distance):
     """Whether no later load can open the bond."""
     along, shear = relative_speeds(scene, work, nx, ny)
-    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     spin = work.motion[NOW, 0, 5]
     centrifugal = effective_mass(scene, 0, 1) * spin * spin * distance
-    load = SAFETY * (largest_load(memo) + centrifugal)
+    load = SAFETY * (largest_load(observed) + centrifugal)
     centres = 0.0
     if has_centre_force():
         view = centre_view(scene, work, time, NOW, 1, 0)
@@ -200,25 +205,28 @@ def doublet_pose(work):
     return c * x + s * y, c * y - s * x, now[NOW, 1, 2] - now[NOW, 0, 2]
 
 
-def start_rest(work, memo, time):
+def start_rest(work, observed, time):
     """From now on the doublet may be resting as it is."""
-    memo[REST_SINCE] = time
-    memo[REST_X], memo[REST_Y], memo[REST_ANGLE] = doublet_pose(work)
+    observed[REST_SINCE] = time
+    observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = doublet_pose(work)
 
 
-def has_rested(scene, work, memo, time, nx, ny):
+def has_rested(scene, work, observed, time, nx, ny):
     """Whether the doublet has kept its pose for long enough, its load at the worst."""
     x, y, angle = doublet_pose(work)
     size = min(scene.bodies[0, BOUNDING_RADIUS], scene.bodies[1, BOUNDING_RADIUS])
-    moved = math.hypot(x - memo[REST_X], y - memo[REST_Y]) + abs(angle - memo[REST_ANGLE]) * size
-    drift = math.hypot(memo[DRIFT_X], memo[DRIFT_Y])
-    if moved > REST * drift * memo[REST_TIME]:
-        start_rest(work, memo, time)
+    moved = (
+        math.hypot(x - observed[REST_X], y - observed[REST_Y])
+        + abs(angle - observed[REST_ANGLE]) * size
+    )
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
+    if moved > REST * drift * observed[REST_TIME]:
+        start_rest(work, observed, time)
         return False
     # A doublet that still swings passes the worst direction, but may yet be thrown open.
     swing = abs(work.motion[NOW, 0, 5]) * outer_size(scene)
     if swing > CALM * drift:
         return False
-    hanging = nx * memo[DRIFT_X] + ny * memo[DRIFT_Y] >= HANGING * drift
+    hanging = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y] >= HANGING * drift
     hanging = hanging or scene.bodies[0, FREE] == 0.0
-    return hanging and time - memo[REST_SINCE] >= memo[REST_TIME]
+    return hanging and time - observed[REST_SINCE] >= observed[REST_TIME]
