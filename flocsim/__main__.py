@@ -12,8 +12,8 @@ if "ensemble" in sys.argv[1:2]:
 
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
 from flocsim.ensembles.cli import silent_unless_first
-from flocsim.ensembles.progress import plain_warnings
 from flocsim.errors import FlocsimError
+from flocsim.io.terminal import plain_warnings
 
 COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
 

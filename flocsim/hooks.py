@@ -38,12 +38,12 @@ def skin_factor():
 
 
 @hook
-def awaits_touch(memo):
+def awaits_touch(observed):
     """Whether a method of fixed steps, too, is to end a step where the first pair touches."""
     return False
 
 
 @hook
-def observe(scene, work, memo, time):
+def observe(scene, work, observed, time):
     """Watches every accepted step; a code other than 0 stops the run."""
     return 0

@@ -28,17 +28,17 @@ class Run:
     """The arrays of a run, what was recorded of it, and how it goes on.
 
     Parameters: ``driver``, of System.compose; ``scene`` and ``work``, its arrays (System.scene,
-    arrays.work_of); ``integrator``; ``until`` [s]; ``max_steps``, of all steps tried; ``memo``, the
-    observer's array; ``record``, whether to keep every accepted step.
+    arrays.work_of); ``integrator``; ``until`` [s]; ``max_steps``, of all steps tried; ``observed``,
+    the observer's array; ``record``, whether to keep every accepted step.
     """
 
     def __init__(
-        self, driver, scene, work, integrator, until, *, max_steps, memo=None, record=False
+        self, driver, scene, work, integrator, until, *, max_steps, observed=None, record=False
     ):
         self.driver, self.scene, self.work = driver, scene, work
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
         self.clock[UNTIL] = until
-        self.memo = np.zeros(1) if memo is None else memo
+        self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
         self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
@@ -55,7 +55,7 @@ class Run:
         self.counts[PAUSE_AT] = self.counts[STEPS] + steps
         while True:
             code = self.driver(
-                self.scene, self.work, self.memo, self.clock, self.counts, self.record
+                self.scene, self.work, self.observed, self.clock, self.counts, self.record
             )
             if self.counts[RECORDED] > 0:
                 self.saved.append(self.record[: self.counts[RECORDED]].copy())

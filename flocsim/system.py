@@ -183,17 +183,17 @@ class System:
         return Trajectory.of(run, status, time.perf_counter() - began)
 
     def begin(
-        self, until, *, max_steps=1_000_000, record=False, observer=None, memo=None, jit=True
+        self, until, *, max_steps=1_000_000, record=False, observer=None, observed=None, jit=True
     ):
         """A Run to a time [s] that has yet to take its first step.
 
         ``observer`` {hook: function} may stand in for hooks.observe and hooks.awaits_touch, and
-        ``memo`` is the array that they see.
+        ``observed`` is the array that they see.
         """
         scene = self.scene(jit=jit)
         return Run(
             self.compose(observer=observer, jit=jit), scene, work_of(scene, *self.motion()),
-            self.integrator, until, max_steps=max_steps, memo=memo, record=record,
+            self.integrator, until, max_steps=max_steps, observed=observed, record=record,
         )  # fmt: skip
 
     def explain(self):

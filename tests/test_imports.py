@@ -48,7 +48,6 @@ INNER_ROWS = {
         ["cli"],
         ["dry_run", "runner", "report"],
         ["parallel"],
-        ["progress"],
         ["estimates"],
         ["storage"],
         ["study"],
@@ -60,7 +59,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal"],
-        ["files", "provenance", "confidence", "markdown"],
+        ["files", "provenance", "confidence", "markdown", "terminal"],
     ],
 }
 

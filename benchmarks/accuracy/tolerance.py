@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.flips import flips_between, share
+from flocsim.ensembles.estimates.outcome_changes import outcome_changes, percent_changed
 from flocsim.ensembles.runner import run
 
 
@@ -32,15 +32,15 @@ def study(arguments, tolerance):
 
 def compare(found, exact):
     """(aggregation flips, zone flips, any flips below the largest δ) in percent."""
-    flips = flips_between(found, exact)
+    changes = outcome_changes(found, exact)
     polygons = (found.vertices > 1)[None, :, None, None]
     inner = (found.delta < found.delta.max())[None, None, :, None]
-    among = np.broadcast_to(polygons & inner, flips.outcome.shape)
+    among = np.broadcast_to(polygons & inner, changes.outcome.shape)
     changed = found.replicates["inside"] != exact.replicates["inside"]
     return (
-        share(flips.aggregation, flips.both),
-        share(changed, flips.both),
-        share(flips.outcome, among),
+        percent_changed(changes.aggregation, changes.both),
+        percent_changed(changed, changes.both),
+        percent_changed(changes.outcome, among),
     )
 
 

@@ -87,7 +87,7 @@ def list_anew(scene, work):
     return longest_step(scene, work)
 
 
-def inspect(scene, work, memo, time, vector, watch):
+def inspect(scene, work, observed, time, vector, watch):
     """(share of the list's budget spent, a pair with slip has opened, least gap, too deep, code).
 
     The code is the observer's if it is to ``watch``, else 0.
@@ -97,5 +97,5 @@ def inspect(scene, work, memo, time, vector, watch):
     opened = False
     for row in range(work.tally[CANDIDATES]):
         opened = opened or (work.candidates[row, CLOSED] == 0 and work.slip[NOW, row] != 0.0)
-    code = observe(scene, work, memo, time) if watch else 0
+    code = observe(scene, work, observed, time) if watch else 0
     return spent(scene, work, NOW), opened, least, too_deep(scene, work), code

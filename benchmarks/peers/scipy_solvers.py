@@ -90,52 +90,52 @@ class SciPyRun:
             first_step=min(step, largest),
         )  # fmt: skip
 
-    def touch(self, solver, memo):
+    def touch(self, solver, observed):
         """Show the observer the instant inside the last step at which the outlines touched."""
         path = solver.dense_output()
 
         def gap(at):
-            return self.inspect(at, path(at), memo, False)[2]
+            return self.inspect(at, path(at), observed, False)[2]
 
         low, high = solver.t_old, solver.t
         if gap(low) > 0.0 > gap(high):
             high = brentq(gap, low, high, xtol=1e-15 * high, rtol=1e-14)
             high += 1e-13 * high if gap(high) >= 0.0 else 0.0
-        return self.inspect(high, path(high), memo, True)[4]
+        return self.inspect(high, path(high), observed, True)[4]
 
-    def prepare(self, work, memo):
+    def prepare(self, work, observed):
         """Arrays for a run; everything compiled beforehand."""
         self.scene = self.system.scene()
         self.work = work or work_of(self.scene, *self.system.motion())
         self.evaluations = 0
         vector, _ = self.make_list()
         self.rate(0.0, vector)
-        self.inspect(0.0, vector, memo.copy(), True)
+        self.inspect(0.0, vector, observed.copy(), True)
 
-    def inspect(self, at, vector, memo, watch):
+    def inspect(self, at, vector, observed, watch):
         """See peers.compiled.inspect."""
-        return self.pieces[2](self.scene, self.work, memo, at, vector, watch)
+        return self.pieces[2](self.scene, self.work, observed, at, vector, watch)
 
-    def advance(self, solver, memo, apart):
+    def advance(self, solver, observed, apart):
         """One step: (status or "", observer's code, whether the list must be made anew, apart)."""
         solver.step()
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             return "SOLVER_FAILED", 0, False, apart
-        spent, opened, least, deep, code = self.inspect(solver.t, solver.y, memo, False)
+        spent, opened, least, deep, code = self.inspect(solver.t, solver.y, observed, False)
         if apart and least < 0.0:
-            apart, code = False, self.touch(solver, memo)
-        code = code or self.inspect(solver.t, solver.y, memo, True)[4]
+            apart, code = False, self.touch(solver, observed)
+        code = code or self.inspect(solver.t, solver.y, observed, True)[4]
         status = "STOPPED" if code else "TOO_DEEP" if deep else ""
         return status, code, opened or spent > 0.5, apart
 
-    def run(self, method, tolerance, until, budget, *, work=None, memo=None):
+    def run(self, method, tolerance, until, budget, *, work=None, observed=None):
         """(Measured, observer's code) of a run to a time [s] with a CPU budget [s]."""
-        memo = np.zeros(1) if memo is None else memo
-        self.prepare(work, memo)
+        observed = np.zeros(1) if observed is None else observed
+        self.prepare(work, observed)
         began, steps, code, apart, status = time.process_time(), 0, 0, True, ""
         solver = self.start_solver(method, 0.0, until, tolerance, FIRST_STEP)
         while not status and solver.t < until:
-            status, code, anew, apart = self.advance(solver, memo, apart)
+            status, code, anew, apart = self.advance(solver, observed, apart)
             steps += 1
             if anew and not status and solver.t < until:
                 step = max(solver.t - solver.t_old, 1e-12)

@@ -70,7 +70,7 @@ def run_case(case, encounter, driver, limits):
         if time.process_time() - began > limits[1]:
             status = Status.STEP_BUDGET
             break
-    return outcome_of(status, run.code, run.memo)[0], run.time
+    return outcome_of(status, run.code, run.observed)[0], run.time
 
 
 def run_cases(cases, integrator, limits=None, allowed=None, exact=None):

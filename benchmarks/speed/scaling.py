@@ -3,7 +3,7 @@
     python -m benchmarks.speed.scaling [--quick] [--markdown] [--only ranks memory simulation]
 
 *ranks*: `mpirun -n 2` and `--jobs 2` against two independent serial runs of half the replicates at
-the same time. *memory*: the largest resident set of each rank. *simulation*: the Dealer that runs
+the same time. *memory*: the largest resident set of each rank. *simulation*: the Schedule that runs
 studies hands out replicates whose costs were measured here, to simulated ranks; rank 0 answers one
 request at a time, in the time that was measured for taking in a chunk and writing it.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from benchmarks.speed.scaling_simulation import measure_costs, measure_desk, simulate
+from benchmarks.speed.scaling_simulation import measure_costs, measure_rank_zero, simulate
 
 BESIDE_PYTHON = Path(sys.executable).parent
 
@@ -114,16 +114,16 @@ def compare_memory(folder, counts, table):
 def simulate_all(folder, quick, table, about):
     """Rows of the simulation; ``about`` receives what was measured for it."""
     costs = measure_costs(20 if quick else 60)
-    desk = measure_desk(folder)
+    rank_zero = measure_rank_zero(folder)
     about.add(
-        costs.number, 1e3 * costs.mean, costs.spread, 1e6 * desk.answer, desk.rows / 1e6,
-        desk.assembly / 1e6,
+        costs.number, 1e3 * costs.mean, costs.spread, 1e6 * rank_zero.answer, rank_zero.rows / 1e6,
+        rank_zero.assembly / 1e6,
     )  # fmt: skip
     for ranks in RANKS[: 4 if quick else None]:
         for per_rank in (1e2, 1e4, 1e5):
             if ranks * per_rank > 1e10:
                 continue
-            table.add(*simulate(ranks, int(ranks * per_rank), costs, desk))
+            table.add(*simulate(ranks, int(ranks * per_rank), costs, rank_zero))
 
 
 def main():

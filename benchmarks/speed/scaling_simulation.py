@@ -1,4 +1,4 @@
-"""Replays measured costs of replicates on simulated ranks, with the Dealer that real ones have."""
+"""Replays measured costs of replicates on simulated ranks, which share the real Schedule."""
 
 import heapq
 import time
@@ -9,9 +9,10 @@ import numpy as np
 from flocsim.ensembles.chunks import ROW, Condition, chunk_record
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, summarize
-from flocsim.ensembles.parallel.dealer import Dealer, chunk_seconds
-from flocsim.ensembles.parallel.desk import Desk, Done
-from flocsim.ensembles.parallel.team import SLEEP, Alone
+from flocsim.ensembles.parallel.communicator import SLEEP
+from flocsim.ensembles.parallel.messages import ChunkResult
+from flocsim.ensembles.parallel.schedule import Schedule, chunk_seconds
+from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import Journal
@@ -48,7 +49,7 @@ class Costs:
 
 
 @attrs.frozen
-class DeskCosts:
+class RankZeroCosts:
     """``answer`` [s] to take in a chunk and hand out another; ``rows`` written, ``assembly``: rows
     made into a results file [1/s]."""
 
@@ -81,27 +82,26 @@ def timed(study, place, replicate):
     return time.perf_counter() - began
 
 
-def measure_desk(folder):
+def measure_rank_zero(folder):
     """What rank 0 needs for a chunk: records of 1 row and of 8192, taken in one by one."""
     conditions = (Condition("I", 4, 0.0),)
     rates = {}
     for rows, count in ((1, 2000), (8192, 60)):
-        path = folder / f"desk{rows}.journal"
+        path = folder / f"chunks{rows}.journal"
         store = RowStore(Journal(path), conditions)
-        dealer = Dealer.of([[]], [10**9], 1000)
-        desk = Desk(Alone(), dealer, store, lambda stop: False, 1e9, lambda left: None)
+        schedule = Schedule.of([[]], [10**9], 1000)
+        state = StudyState(schedule, store, lambda stop: False, 1e9)
         record = chunk_record(conditions[0], 0, np.zeros(rows, ROW), "key")
         start = len(record) - rows * ROW_SIZE
         began = time.perf_counter()
         for _ in range(count):
-            chunk = desk.next_chunk(1)
-            desk.hand_in(
-                1, Done(chunk._replace(stop=chunk.first + rows), rows, record, start), False
-            )
+            chunk = state.next_chunk()
+            chunk = chunk._replace(stop=chunk.first + rows)
+            state.take_in(ChunkResult(chunk, rows, record, start))
         store.journal.sync()
         rates[rows] = (time.perf_counter() - began) / count
     per_row = (rates[8192] - rates[1]) / 8191
-    return DeskCosts(rates[1], 1.0 / per_row, measure_assembly(store, folder))
+    return RankZeroCosts(rates[1], 1.0 / per_row, measure_assembly(store, folder))
 
 
 def measure_assembly(store, folder):
@@ -139,28 +139,28 @@ def run_length(cost, chunk, seconds, rng):
     return done, took * done / count
 
 
-def simulate(ranks, replicates, costs, desk):
+def simulate(ranks, replicates, costs, rank_zero):
     """A row of the table: a study of so many replicates on so many ranks."""
     rng = np.random.default_rng(ranks)
     every = [np.array(each) for each in costs.conditions]
     per_condition = max(replicates // len(every), 1)
-    dealer = Dealer.of([[] for _ in every], [per_condition], ranks)
+    schedule = Schedule.of([[] for _ in every], [per_condition], ranks)
     seconds = chunk_seconds(ranks)
     # (time at which a request arrives, rank, its chunk, how much of that is done)
     requests = [(LATENCY, rank, None, 0) for rank in range(ranks)]
     free, busy, work, idle = 0.0, 0.0, 0.0, []
     while requests:
         now, rank, chunk, done = heapq.heappop(requests)
-        served = desk.answer + done / desk.rows
+        served = rank_zero.answer + done / rank_zero.rows
         free, busy = max(now, free) + served, busy + served
         if chunk is not None:
-            dealer.give_back(chunk, done)
+            schedule.give_back(chunk, done)
         idle.append(rank)
-        while idle and (new := dealer.take()) is not None:
+        while idle and (new := schedule.take()) is not None:
             count, took = run_length(every[new.condition], new, seconds, rng)
             work += took
             heapq.heappush(requests, (free + took + 2.0 * LATENCY, idle.pop(), new, count))
-    assembly = per_condition * len(every) / desk.assembly
+    assembly = per_condition * len(every) / rank_zero.assembly
     ideal = work / ranks
     return (
         ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free, assembly,

@@ -56,12 +56,12 @@ def verlet(cases, exact, allowed, budget):
 def run_scipy(runner, case, name, tolerance, budget):
     """(outcome, CPU time) of one replicate by a SciPy solver."""
     encounter = case.encounter
-    memo, work = encounter.memo(), encounter.start(case.angles, case.share)
+    observed, work = encounter.observed(), encounter.start(case.angles, case.share)
     until = encounter.time_limit()
     runner.system = encounter.system
-    end, code = runner.run(name, tolerance, until, budget, work=work, memo=memo)
+    end, code = runner.run(name, tolerance, until, budget, work=work, observed=observed)
     status = Status[end.status] if end.status in Status.__members__ else Status.STEP_BUDGET
-    return outcome_of(status, code, memo)[0], end.cpu
+    return outcome_of(status, code, observed)[0], end.cpu
 
 
 def scipy_result(runner, cases, exact, allowed, name, tolerance, limit):

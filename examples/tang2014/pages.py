@@ -9,7 +9,7 @@ from output import save_all
 from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.estimates.flips import flips_between
+from flocsim.ensembles.estimates.outcome_changes import outcome_changes
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import CLASSES, read_results
@@ -29,17 +29,17 @@ def write(folder, config, library, readings):
     file}.
     """
     study, check = (read_results(folder / name) for name in ("study.h5", "check.h5"))
-    flips = flips_between(study, check)
+    changes = outcome_changes(study, check)
     entries = read_library(library) if library else None
-    draw_results(folder, study, check, flips)
+    draw_results(folder, study, check, changes)
     if entries:
         for name, figure in POPULATION_FIGURES.items():
             write_figure(folder, name, figure(entries))
-    write_probabilities(folder / "probabilities.csv", study, flips)
+    write_probabilities(folder / "probabilities.csv", study, changes)
     held = hold_readings(readings)
     if held:
         write_readings(folder / "readings.md", held)
-    write_summary(folder, study, flips, check_claims(study, entries), held, zones_of(config))
+    write_summary(folder, study, changes, check_claims(study, entries), held, zones_of(config))
 
 
 def zones_of(config):
@@ -56,12 +56,12 @@ def write_figure(folder, name, figure):
         print(path)
 
 
-def draw_results(folder, study, check, flips):
+def draw_results(folder, study, check, changes):
     """Figs 4, 5, 6 and 8, the numerical error written into each panel."""
     for name, (kind, classes) in FLIPPED.items():
         figure = FIGURES[name](study)
-        among = np.isin(check.replicates["outcome"], classes)[..., : flips.both.shape[-1]]
-        changed = getattr(flips, kind)
+        among = np.isin(check.replicates["outcome"], classes)[..., : changes.both.shape[-1]]
+        changed = getattr(changes, kind)
         for place, axes in enumerate(figure.axes[: len(study.types)]):
             text = flip_text(changed[place] & among[place], among[place])
             axes.set_title(text, loc="right", fontsize=6, color="0.35")
@@ -75,7 +75,7 @@ def flip_text(changed, among):
     return f"flips {flipped} of {count}{share}" if count else ""
 
 
-def write_probabilities(path, study, flips):
+def write_probabilities(path, study, changes):
     """One row per condition: every probability, its interval, and the flips beside it."""
     table = study.probabilities
     heads = ["type", "vertices", "delta", "n_total", "n_missed", "n_undecided", "n_failed"]
@@ -86,11 +86,11 @@ def write_probabilities(path, study, flips):
         for place in np.ndindex(*study.shape):
             t, v, d = place
             values = [table[name][place] for name in heads[3:]]
-            counts = [int(np.sum(getattr(flips, kind)[place]))
+            counts = [int(np.sum(getattr(changes, kind)[place]))
                       for kind in ("zone", "aggregation", "outcome")]  # fmt: skip
             shown = [f"{value:.6g}" for value in values]
             rows.writerow([study.types[t], study.vertices[v], f"{study.delta[d]:g}", *shown,
-                           flips.outcome.shape[-1], *counts])  # fmt: skip
+                           changes.outcome.shape[-1], *counts])  # fmt: skip
     print(path)
 
 

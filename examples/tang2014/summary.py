@@ -23,7 +23,7 @@ BESIDE = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
          "pr_a_outside": "Pr[A|outside]"}  # fmt: skip
 
 
-def write_summary(folder, study, flips, findings, readings, zones):
+def write_summary(folder, study, changes, findings, readings, zones):
     """Write the page: each part stands between marks, as in docs/reproduction.md.
 
     ``findings``: of all claims; ``readings``: {name: (Results, Findings of claims 6 to 18)};
@@ -32,7 +32,7 @@ def write_summary(folder, study, flips, findings, readings, zones):
     parts = {
         "times": times(folder, study),
         "totals": totals(study),
-        "flips": flips_table(flips),
+        "flips": flips_table(changes),
         "claims": claims_table(findings),
         "against": against(study, zones),
         "beside": beside_table(study),
@@ -82,12 +82,12 @@ def reached(flag):
     return "reached" if flag else "**not reached**"
 
 
-def flips_table(flips):
+def flips_table(changes):
     """How many of the replicates that were run again changed."""
     rows = []
     for kind in FLIP_KINDS:
-        among = np.ones_like(flips.outcome) if kind == "outcome" else flips.both
-        changed, count = np.count_nonzero(getattr(flips, kind)), np.count_nonzero(among)
+        among = np.ones_like(changes.outcome) if kind == "outcome" else changes.both
+        changed, count = np.count_nonzero(getattr(changes, kind)), np.count_nonzero(among)
         value, low, high = (100.0 * float(each) for each in proportion(changed, count))
         rows.append((kind, changed, count, f"{value:.2f}", f"[{low:.2f}, {high:.2f}]"))
     heads = ("flips of", "replicates", "among", "share [%]", "95 %")

@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
-from flocsim.io.shapes.fit_report import Bar, picture_line, warn_of_coarse
+from flocsim.io.shapes.fit_report import picture_line, warn_of_coarse
+from flocsim.io.terminal import Progress
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
@@ -57,8 +58,12 @@ def fit_pictures(names, options):
         pictures = list(found_pictures(mapped(find_flocs, tasks), options))
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
-        bar = Bar(len(masks))
-        fits = [bar.count(fit) for fit in mapped(fit_region, masks)]
+        progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
+        fits = []
+        for fit in mapped(fit_region, masks):
+            fits.append(fit)
+            progress.report(len(masks) - len(fits))
+        progress.finish()
     return pictures, fits
 
 

@@ -5,14 +5,14 @@ import math
 import sys
 import tomllib
 
-from flocsim.ensembles.parallel.desk import describe_note
+from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError
 from flocsim.io.results.file import OUTCOMES, read_results, replicate_totals
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
-APART = ("config", "preset", "identity", "failed", "overrides", "history")
+APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus")
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -129,7 +129,16 @@ def origin(results):
         (name.replace("_", " "), readable(name, value))
         for name, value in results.run.items()
         if name not in APART and value != ""
-    ]
+    ] + cpu_kinds(results.run)
+
+
+def cpu_kinds(run):
+    """(name, value) of the kinds of CPU that the rows were computed on."""
+    from flocsim.ensembles.storage.cpu_kind import describe_kind
+
+    kinds = json.loads(run.get("cpus", "[]"))
+    names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
+    return [("kind of CPU", "; ".join(names))] if names else []
 
 
 def readable(name, value):

@@ -6,7 +6,7 @@ import attrs
 
 from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
-from flocsim.ensembles.collision.forces_between import loads_of
+from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
@@ -157,8 +157,8 @@ def draw(args, encounter, arrays, row, title):
     if args.distance:
         written += save_all(draw_distance(*motion, zone, title), args.distance)
     if args.forces:
-        instants, loads = loads_of(encounter, *arrays)
-        written += save_all(draw_forces(instants, loads, touch, title), args.forces)
+        instants, forces = forces_between(encounter, *arrays)
+        written += save_all(draw_forces(instants, forces, touch, title), args.forces)
     if args.animation:
         frames = frames_of(encounter.shapes, times, position, touch, ANIMATION_FRAMES)
         write_animation(args.animation, frames, motion, zone, title)

@@ -1,4 +1,7 @@
-"""Chunks: runs of replicates of one condition, the unit of handing out, writing and resuming."""
+"""Chunks: runs of replicates of one condition, the unit of handing out, writing and resuming.
+
+Replicates of one condition are kept as intervals: sorted, disjoint pairs [first, stop).
+"""
 
 import json
 from typing import NamedTuple
@@ -80,3 +83,32 @@ def fits(description, length):
 def layout():
     """The columns of a chunk as text, to tell another version's."""
     return json.dumps([[name, ROW[name].str] for name in ROW.names])
+
+
+def merged(intervals):
+    """The union of intervals [first, stop), sorted and disjoint."""
+    union = []
+    for first, stop in sorted(intervals):
+        if union and first <= union[-1][1]:
+            union[-1] = (union[-1][0], max(stop, union[-1][1]))
+        elif first < stop:
+            union.append((first, stop))
+    return union
+
+
+def missing(intervals, first, stop):
+    """What a union leaves out of [first, stop)."""
+    gaps, place = [], first
+    for start, end in intervals:
+        if start >= stop:
+            break
+        if start > place:
+            gaps.append((place, start))
+        place = max(place, end)
+    if place < stop:
+        gaps.append((place, stop))
+    return gaps
+
+
+def total(intervals):
+    return sum(stop - first for first, stop in intervals)

@@ -6,16 +6,20 @@ import io
 import sys
 import traceback
 
-from flocsim.ensembles.parallel.team import Alone, StopRequested, find_team, launched_rank
-from flocsim.ensembles.progress import plain_warnings, tell
+from flocsim.ensembles.parallel.communicator import (
+    SerialCommunicator,
+    StopRequested,
+    find_communicator,
+    launched_rank,
+)
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
+from flocsim.io.terminal import plain_warnings, tell
 
 INTERNAL = 70
 
 
 def add_arguments(parser):
-    """The arguments of the command."""
     parser.add_argument("config", help="config file (TOML); `flocsim init` writes an example")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -71,44 +75,43 @@ def checked_config(arguments):
     return config
 
 
-def agree(team, arguments):
+def agree(comm, arguments):
     """The config on every rank; where one rank cannot load it, none goes on."""
     config, problem = None, None
     try:
         config = checked_config(arguments)
     except FlocsimError as error:
         problem = (str(error), error.exit_code)
-    problems = [each for each in team.collect(problem) if each is not None]
+    problems = [each for each in comm.all_gather(problem) if each is not None]
     if problems:
-        if team.rank == 0:
+        if comm.rank == 0:
             tell(problems[0][0], sys.stderr)
         return None, problems[0][1]
     return config, 0
 
 
-def study(config, team, arguments):
+def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
-    from flocsim.ensembles.runner import OtherRankFailed, Told, run_to_file
+    from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
 
     output = config.output.file
     try:
-        ended = run_to_file(config, team, output, arguments.mode, arguments.quiet)
-    except OtherRankFailed as error:
+        ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet)
+    except RankZeroFailed as error:
         return error.args[0]
-    except Told as error:
+    except SharedError as error:
         tell(f"flocsim: {error}", sys.stderr)
         return error.args[0].exit_code
     if ended.code == STOPPED:
-        if team.rank == 0:
+        if comm.rank == 0:
             tell(f"flocsim: {stopped_text(ended, output)}", sys.stderr)
         return STOPPED
-    if team.rank == 0 and not arguments.quiet:
+    if comm.rank == 0 and not arguments.quiet:
         report(ended, output)
     return 0
 
 
 def stopped_text(ended, output):
-    """What was saved when a signal came."""
     who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
     return (
         f"stopped by {who}: {ended.kept} finished replicates are in {output}.journal; go on with "
@@ -117,7 +120,6 @@ def stopped_text(ended, output):
 
 
 def report(ended, output):
-    """Print the table of a finished study, and where it is."""
     from flocsim.ensembles.report import format_table
 
     results = ended.results
@@ -128,80 +130,80 @@ def report(ended, output):
          f"{ended.computed / seconds:.0f}/s")  # fmt: skip
 
 
-def work(team, arguments):
+def run_rank(comm, arguments):
     """The whole command on one rank; its exit code."""
-    config, code = agree(team, arguments)
+    config, code = agree(comm, arguments)
     if config is None:
         return code
     if arguments.dry_run:
         from flocsim.ensembles.dry_run import dry_run
 
-        if team.rank == 0:
-            tell(dry_run(config, team))
+        if comm.rank == 0:
+            tell(dry_run(config, comm.size))
         return 0
-    return study(config, team, arguments)
+    return study(config, comm, arguments)
 
 
-def end_all(team, text, code):
+def end_all(comm, text, code):
     """Print why, and end every rank; returns the exit code where this process is alone."""
-    who = f"rank {team.rank}: " if team.size > 1 else ""
+    who = f"rank {comm.rank}: " if comm.size > 1 else ""
     tell(f"flocsim: {who}{text}", sys.stderr)
-    if team.size > 1:
-        team.abort(code)
+    if comm.size > 1:
+        comm.abort(code)
     return code
 
 
-def guarded(team, arguments):
+def guarded(comm, arguments):
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
     try:
-        code = work(team, arguments)
-        team.close()
+        code = run_rank(comm, arguments)
+        comm.close()
         return code
     except StopRequested as error:
-        if team.rank == 0:
+        if comm.rank == 0:
             tell(f"flocsim: {error}", sys.stderr)
-        if team.size > 1:
-            team.abort(STOPPED)  # others may wait for this rank
+        if comm.size > 1:
+            comm.abort(STOPPED)  # others may wait for this rank
         return STOPPED
     except FlocsimError as error:
-        return end_all(team, str(error), error.exit_code)
+        return end_all(comm, str(error), error.exit_code)
     except KeyboardInterrupt:
-        return end_all(team, "interrupted; go on with --resume", INTERRUPTED)
+        return end_all(comm, "interrupted; go on with --resume", INTERRUPTED)
     except MemoryError:
-        return end_all(team, "out of memory: ask for fewer ranks on a machine", INTERNAL)
+        return end_all(comm, "out of memory: ask for fewer ranks on a machine", INTERNAL)
     except Exception:
         text = f"internal error, please report it:\n{traceback.format_exc()}"
-        return end_all(team, text, INTERNAL)
+        return end_all(comm, text, INTERNAL)
 
 
-def gather_team(arguments):
+def join_ranks(arguments):
     """The ranks of the job: those that a launcher started, or --jobs processes."""
-    team = find_team()
+    comm = find_communicator()
     if arguments.jobs == 1 or arguments.dry_run:
-        return team
+        return comm
     if arguments.jobs < 1:
         raise UsageError(f"--jobs must be at least 1, found {arguments.jobs}")
-    if team.size > 1:
+    if comm.size > 1:
         raise UsageError("--jobs is for runs without an MPI launcher: leave out one of the two")
     from flocsim.ensembles.parallel.processes import start_processes
 
     return start_processes(arguments.jobs, on_process, arguments)
 
 
-def on_process(team, arguments):
+def on_process(comm, arguments):
     """What a process that --jobs started does; its exit code."""
     plain_warnings(silent=True)
-    return guarded(team, arguments)
+    return guarded(comm, arguments)
 
 
 def run_command(arguments):
     """Find the ranks of the job and do the work; the exit code."""
     try:
-        team = gather_team(arguments)
+        comm = join_ranks(arguments)
     except FlocsimError as error:
-        return end_all(Alone(), str(error), error.exit_code)
-    plain_warnings(silent=team.rank > 0)
-    return guarded(team, arguments)
+        return end_all(SerialCommunicator(), str(error), error.exit_code)
+    plain_warnings(silent=comm.rank > 0)
+    return guarded(comm, arguments)
 
 
 @contextlib.contextmanager

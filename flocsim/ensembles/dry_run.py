@@ -29,11 +29,11 @@ def code_lines(config):
     return [f"  {line}" for line in lines]
 
 
-def left_out_lines(team):
+def left_out_lines(ranks):
     """What an ensemble leaves out besides."""
     yield "  out: trajectories: an ensemble records none (see `flocsim trajectory`)"
     yield "  out: plots: none is drawn (see `flocsim plot`)"
-    if team.size == 1:
+    if ranks == 1:
         yield "  out: MPI: one rank needs none"
 
 
@@ -43,8 +43,8 @@ def stiffness_lines(config):
         yield from (f"  {name}: {line}" for line in scale_lines(pair.system))
 
 
-def dry_run(config, team):
-    """The report of --dry-run as text."""
+def dry_run(config, ranks):
+    """The report of --dry-run as text, for so many ranks."""
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
     flocs += f", spheroradius {1e6 * shapes.radius:.4g} um" if shapes.own is None else ""
@@ -52,7 +52,7 @@ def dry_run(config, team):
     count = len(scene.conditions) * len(shapes.vertices) * len(scene.delta)
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
-        f"seed {config.seed}, {team.size} rank(s), results in {config.output.file}",
+        f"seed {config.seed}, {ranks} rank(s), results in {config.output.file}",
         f"  vertices {list(shapes.vertices)}, delta {list(scene.delta)} of the {scene.delta_max} "
         f"delta_max, receiver {scene.receiver}",
         f"  flocs: {flocs}",
@@ -61,7 +61,7 @@ def dry_run(config, team):
         *condition_lines(config),
         "forces and code:",
         *code_lines(config),
-        *left_out_lines(team),
+        *left_out_lines(ranks),
         "stiffness:",
         *stiffness_lines(config),
         "nothing was run (--dry-run)",

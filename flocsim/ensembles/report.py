@@ -46,7 +46,6 @@ def format_table(types, vertices, delta, table):
 
 
 def condition_row(vertices, delta, table, place):
-    """The cells of one condition."""
     _, v, d = place
     counts = ("n_total", "n_collided", "n_inside")
     ends = ("n_missed", "n_undecided", "n_failed")

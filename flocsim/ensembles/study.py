@@ -7,12 +7,10 @@ import numpy as np
 
 from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.encounter import OBSERVER, make_encounter, run_encounter
-from flocsim.ensembles.collision.flocs import Wardrobe, load_flocs
+from flocsim.ensembles.collision.failures import NO_FLOC
+from flocsim.ensembles.collision.flocs import FlocPool, load_flocs
 from flocsim.ensembles.collision.sampling import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
-
-NO_FLOC = -1
-"""In ``floc_i`` and ``floc_j``: a sphere."""
 
 
 def flocs_of(config):
@@ -30,7 +28,7 @@ class Study:
     zones: dict = attrs.Factory(dict)
     encounters: dict = attrs.Factory(dict)
     drivers: dict = attrs.Factory(dict)
-    wardrobe: Wardrobe = None
+    floc_pool: FlocPool = None
 
     def __attrs_post_init__(self):
         config = self.config
@@ -40,7 +38,7 @@ class Study:
         }
         if self.flocs is None:
             self.flocs = flocs_of(config)
-        self.wardrobe = Wardrobe(self.flocs, config.shapes.radius, config.shapes.pool)
+        self.floc_pool = FlocPool(self.flocs, config.shapes.radius, config.shapes.pool)
 
     @property
     def shape(self):
@@ -51,20 +49,24 @@ class Study:
 
     @property
     def size(self):
-        """Number of all replicates."""
         return int(np.prod(self.shape))
 
+    def choose_flocs(self, condition, vertices, numbers):
+        """Places of the flocs of i and j that a replicate's random numbers choose."""
+        if vertices == 1:
+            return NO_FLOC, NO_FLOC
+        _, radius_i, radius_j = self.config.scene.conditions[condition]
+        return self.floc_pool.choose(numbers, radius_i, radius_j)
+
     def encounter(self, condition, vertices, numbers):
-        """The Encounter that a replicate's random numbers choose, and its flocs' names."""
-        name, radius_i, radius_j = self.config.scene.conditions[condition]
-        flocs = (None, None)
-        if vertices > 1:
-            flocs = self.wardrobe.choose(numbers, radius_i, radius_j)
+        """The Encounter that a replicate's random numbers choose."""
+        name, *radii = self.config.scene.conditions[condition]
+        flocs = self.choose_flocs(condition, vertices, numbers)
         key = (name, vertices, *flocs)
         if key not in self.encounters:
             shapes = [
-                self.wardrobe.shape(floc, vertices, radius)
-                for floc, radius in zip(flocs, (radius_i, radius_j), strict=True)
+                self.floc_pool.shape(floc, vertices, radius)
+                for floc, radius in zip(flocs, radii, strict=True)
             ]
             self.encounters[key] = make_encounter(self.config, shapes, self.zones[name])
         return self.encounters[key]
@@ -100,15 +102,10 @@ class Study:
         angles = orientations(numbers)
         max_steps = self.config.integrator.max_steps
         row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)
-        return row if row is None else row | self.flocs_of(condition, vertices, numbers)
-
-    def flocs_of(self, condition, vertices, numbers):
-        """Places of the flocs that a replicate's random numbers choose."""
-        if vertices == 1:
-            return {"floc_i": NO_FLOC, "floc_j": NO_FLOC}
-        _, radius_i, radius_j = self.config.scene.conditions[condition]
-        places = self.wardrobe.choose(numbers, radius_i, radius_j)
-        return dict(zip(("floc_i", "floc_j"), places, strict=True))
+        if row is None:
+            return None
+        floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
+        return row | {"floc_i": floc_i, "floc_j": floc_j}
 
     @property
     def kinds(self):

@@ -1,29 +1,20 @@
-"""A study run by a team: the same arrays whoever ran what."""
+"""A study run by several ranks: the same arrays whoever ran what."""
 
 import numpy as np
 import pytest
 
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.parallel import worker
-from flocsim.ensembles.parallel.dealer import Dealer
-from flocsim.ensembles.parallel.team import Alone
-from flocsim.ensembles.progress import Progress
-from flocsim.ensembles.runner import describe, make_desk, run, run_study
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.study_state import Phase
+from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.results.file import read_results, same_data, write_results
+from flocsim.io.terminal import Progress
 from tests.helpers.small_study import small_study
-
-
-class Rank(Alone):
-    """One rank of several, as far as a line of text goes."""
-
-    def __init__(self, rank, size):
-        """Rank ``rank`` of ``size``."""
-        super().__init__()
-        self.rank, self.size = rank, size
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +30,8 @@ def beginning(study):
 
 def results_of(study):
     """The Results of a Study that this process runs alone."""
-    team = Alone()
-    return run_study(study, beginning(study), team, Progress(study.size, True)).results
+    comm = SerialCommunicator()
+    return lead(study, beginning(study), comm, Progress(study.size, True)).results
 
 
 def same_arrays(table, other):
@@ -59,18 +50,17 @@ def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone,
     from flocsim.ensembles.estimates.summary import Reader
 
     start = beginning(study)
-    dealer = Dealer.of(start.found(3), [3], size)
-    desk = make_desk(study, start, Rank(0, size), dealer, Progress(study.size, True))
-    held = [desk.next_chunk(rank) for rank in range(size)]
+    state = make_state(study, start, size)
+    held = [state.next_chunk() for _ in range(size)]
     rng = np.random.default_rng(size)
     while any(held):
         rank = rng.choice([rank for rank in range(size) if held[rank]])
-        done = worker.run_chunk(study, held[rank], study.places, lambda: False, 1e-9, "key")
-        desk.hand_in(rank, done, False)
-        held[rank] = desk.next_chunk(rank)
-        held = [chunk or desk.next_chunk(other) for other, chunk in enumerate(held)]
-    assert dealer.left == 0
-    assert desk.computed == study.size
+        state.take_in(worker.run_chunk(study, held[rank], lambda: False, 1e-9, "key"))
+        held[rank] = None
+        held = [chunk or state.next_chunk() for chunk in held]
+    assert state.schedule.remaining == 0
+    assert state.phase is Phase.FINISHED
+    assert state.computed == study.size
     assert same_arrays(Reader(start.store, study.shape).arrays(alone), alone)
 
 
@@ -146,5 +136,5 @@ def test_run_is_the_whole_way(tmp_path, capsys):
 
 def test_the_run_is_announced_in_one_line(study):
     line = "36 replicates: 2 types x 3 numbers of vertices x 2 displacements x 3, on "
-    assert describe(study, Alone()) == line + "1 rank"
-    assert describe(study, Rank(0, 4), 7) == line + "4 ranks; 7 of them exist already"
+    assert announcement(study, 1) == line + "1 rank"
+    assert announcement(study, 4, 7) == line + "4 ranks; 7 of them exist already"

@@ -81,26 +81,26 @@ class PolygonSystem(System):
 
 ELASTIC = Contact(k_n=20.0, k_t=0.0, damping_n=0.0, damping_t=0.0)
 
-AWAITED, TOUCHING, CONTACTS, DEEPEST, TOUCH_TIME, TOUCH_GAP, MEMO_SIZE = range(7)
+AWAITED, TOUCHING, CONTACTS, DEEPEST, TOUCH_TIME, TOUCH_GAP, OBSERVED_SIZE = range(7)
 
 
-def is_awaited(memo):
+def is_awaited(observed):
     """Whether a touch is awaited."""
-    return memo[AWAITED] != 0.0
+    return observed[AWAITED] != 0.0
 
 
-def watch(scene, work, memo, time):
+def watch(scene, work, observed, time):
     """Counts touches of the bodies, keeps the deepest overlap, notes the awaited touch."""
     least = least_listed_gap(work)
     touching = 1.0 if least < 0.0 else 0.0
-    if touching > memo[TOUCHING]:
-        memo[CONTACTS] += 1.0
-    memo[TOUCHING] = touching
-    memo[DEEPEST] = max(memo[DEEPEST], -least)
-    if memo[AWAITED] != 0.0 and least < 0.0:
-        memo[AWAITED] = 0.0
-        memo[TOUCH_TIME] = time
-        memo[TOUCH_GAP] = least
+    if touching > observed[TOUCHING]:
+        observed[CONTACTS] += 1.0
+    observed[TOUCHING] = touching
+    observed[DEEPEST] = max(observed[DEEPEST], -least)
+    if observed[AWAITED] != 0.0 and least < 0.0:
+        observed[AWAITED] = 0.0
+        observed[TOUCH_TIME] = time
+        observed[TOUCH_GAP] = least
     return 0
 
 
@@ -133,16 +133,16 @@ class Watched:
 
 def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit=True):
     """Run a system to a time under the observer above, nothing recorded."""
-    memo = np.zeros(MEMO_SIZE)
-    memo[AWAITED] = float(awaited)
-    run = system.begin(until, max_steps=max_steps, observer=WATCH, memo=memo, jit=jit)
+    observed = np.zeros(OBSERVED_SIZE)
+    observed[AWAITED] = float(awaited)
+    run = system.begin(until, max_steps=max_steps, observer=WATCH, observed=observed, jit=jit)
     run.work = with_capacity(run.work, capacity)
     status = run.to_end()
     return Watched(
         motion=run.work.motion[NOW].copy(), status=status, time=run.time, steps=run.steps,
         rejected=run.rejected, error=run.error,
-        contacts=int(memo[CONTACTS]), deepest=float(memo[DEEPEST]),
-        touch_time=float(memo[TOUCH_TIME]), touch_gap=float(memo[TOUCH_GAP]),
+        contacts=int(observed[CONTACTS]), deepest=float(observed[DEEPEST]),
+        touch_time=float(observed[TOUCH_TIME]), touch_gap=float(observed[TOUCH_GAP]),
     )  # fmt: skip
 
 

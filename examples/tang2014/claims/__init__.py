@@ -2,7 +2,7 @@
 
 from . import fits, robust, soft
 from .resampling import counts_of
-from .verdicts import Finding, Lacking
+from .verdicts import Finding, MissingData
 
 __all__ = ["COLLISION_CLAIMS", "FIT_CLAIMS", "check_claims"]
 
@@ -55,7 +55,7 @@ def check(number, claim, parts_of, data):
     try:
         if data is None:
             what = "a shape library" if number in FIT_CLAIMS else f"{FEWEST} replicates at least"
-            raise Lacking(f"needs {what}")
+            raise MissingData(f"needs {what}")
         return Finding(number, claim, tuple(parts_of(*data)))
-    except Lacking as lack:
+    except MissingData as lack:
         return Finding(number, claim, (), str(lack))

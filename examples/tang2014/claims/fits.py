@@ -8,7 +8,7 @@ from flocsim.io.shapes.fit_report import CLASS_LIMIT
 
 from .resampling import resampled_means
 from .trends import kendall
-from .verdicts import Lacking, above, below
+from .verdicts import MissingData, above, below
 
 SPHERE_ERROR = 32.0
 """RE [%] that spheres reach, as the paper says."""
@@ -25,7 +25,7 @@ def errors_of(entries, large=None, radius=None):
         and large in (None, entry.equivalent_radius > CLASS_LIMIT)
     ]  # fmt: skip
     if not members:
-        raise Lacking("a size class has no flocs")
+        raise MissingData("a size class has no flocs")
     counts = sorted(members[0].fits)
     errors = [[entry.fits[n].relative_error for n in counts] for entry in members]
     return np.array(counts), np.array(errors)
@@ -41,7 +41,7 @@ def sphere_error(entries):
     for large in (False, True):
         counts, errors = errors_of(entries, large)
         if 1 not in counts:
-            raise Lacking("the library has no spheres")
+            raise MissingData("the library has no spheres")
         means = resampled_means(errors[:, counts == 1])[:, 0]
         yield above(f"mean RE [%] of spheres, {class_name(large)}", means, SPHERE_ERROR)
 
@@ -59,7 +59,7 @@ def radius_error(entries):
     """(3) RE at r less RE at the next larger r, mean over N and flocs."""
     radii = sorted({entry.spheroradius for entry in entries})
     if len(radii) < 2:
-        raise Lacking("the library has one spheroradius; fit with --radius 1,2,4")
+        raise MissingData("the library has one spheroradius; fit with --radius 1,2,4")
     for small, large in itertools.pairwise(radii):
         counts, less = errors_of(entries, radius=small)
         _, more = errors_of(entries, radius=large)
@@ -80,7 +80,7 @@ def best_error(entries):
     for large in (False, True):
         counts, errors = errors_of(entries, large)
         if BEST_VERTICES not in counts:
-            raise Lacking(f"the library has no N = {BEST_VERTICES}")
+            raise MissingData(f"the library has no N = {BEST_VERTICES}")
         found.append(resampled_means(errors[:, counts == BEST_VERTICES])[:, 0])
     best = min(found, key=lambda means: means[0])
     yield below(f"least class mean of RE [%], N = {BEST_VERTICES}", best, BEST_ERROR)

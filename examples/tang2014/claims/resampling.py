@@ -10,7 +10,7 @@ import numpy as np
 
 from flocsim.io.results.schema import CLASSES, NOT_APPLICABLE
 
-from .verdicts import Lacking
+from .verdicts import MissingData
 
 RESAMPLES = 500
 SEED = 20140601
@@ -32,17 +32,17 @@ class Counts:
     classes: np.ndarray
 
     def type(self, name):
-        """The place of a collision type; Lacking where the results have no such type."""
+        """The place of a collision type; MissingData where the results have no such type."""
         if name not in self.types:
-            raise Lacking(f"there is no Type {name}")
+            raise MissingData(f"there is no Type {name}")
         return self.types.index(name)
 
     @property
     def polygons(self):
-        """Places of the spheropolygons, N > 1, in the order of N; Lacking without."""
+        """Places of the spheropolygons, N > 1, in the order of N; MissingData without."""
         places = [k for k in np.argsort(self.vertices) if self.vertices[k] > 1]
         if not places:
-            raise Lacking("there are no spheropolygons")
+            raise MissingData("there are no spheropolygons")
         return places
 
     @property

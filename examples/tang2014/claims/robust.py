@@ -11,7 +11,7 @@ from .trends import mean_polygons
 from .verdicts import (
     FAILS,
     HOLDS,
-    Lacking,
+    MissingData,
     Part,
     above,
     always,
@@ -44,7 +44,7 @@ def only(results, types=None, vertices=None, delta=None):
             chosen = np.isin(found, wanted)
             flags &= chosen.reshape([-1 if k == axis else 1 for k in range(4)])
     if not flags.any():
-        raise Lacking(f"there are no conditions {types or ''} {vertices or ''}".rstrip())
+        raise MissingData(f"there are no conditions {types or ''} {vertices or ''}".rstrip())
     return flags
 
 
@@ -86,7 +86,7 @@ def least_difference(what, differences):
     cells = differences.reshape(-1, differences.shape[-1])
     cells = cells[np.isfinite(cells[:, 0])]
     if not len(cells):
-        raise Lacking("there are no collisions to compare")
+        raise MissingData("there are no collisions to compare")
     z = NormalDist().inv_cdf(1.0 - 0.025 / len(cells))
     values, reach = cells[:, 0], z * np.nanstd(cells[:, 1:], axis=1)
     least = int(np.argmin(values + reach))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .trends import mean_polygons, with_delta, with_vertices
-from .verdicts import Lacking, above, always, below, occurs, within
+from .verdicts import MissingData, above, always, below, occurs, within
 
 ABOUT_HALF = (0.4, 0.6)
 """ "Approximately 50 %", as it is read here."""
@@ -53,7 +53,7 @@ def aggregation_outside(results, counts):
 def none_at_largest(counts):
     """Part: no aggregation from outside, Type I, δ = δ_max."""
     if 1.0 not in counts.delta:
-        raise Lacking("there is no δ = δ_max")
+        raise MissingData("there is no δ = δ_max")
     largest = list(counts.delta).index(1.0)
     sides = counts.classes[2:, counts.type("I"), :, largest][:, counts.polygons][..., 0]
     departed, trials = int(sides[1].sum()), int(sides.sum())

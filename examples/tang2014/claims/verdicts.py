@@ -18,7 +18,7 @@ RARE = 0.01
 """Below this upper bound an event that was never seen counts as one that does not occur."""
 
 
-class Lacking(Exception):
+class MissingData(Exception):
     """The results or the shapes lack what a claim is about; the argument says what."""
 
 

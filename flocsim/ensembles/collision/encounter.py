@@ -9,7 +9,6 @@ import numpy as np
 from flocsim import hooks
 from flocsim.arrays import work_of
 from flocsim.body import Body
-from flocsim.ensembles.collision import memo as memo_at
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.failures import collided, outcome_of
 from flocsim.ensembles.collision.settling import terminal_motion, turn_time
@@ -72,19 +71,19 @@ class Encounter:
         radii = [shape.equivalent_radius for shape in self.shapes]
         return turn_time(*radii, self.drift)
 
-    def memo(self):
-        """A fresh memo for the observer."""
+    def observed(self):
+        """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
-        memo = np.zeros(memo_at.MEMO_SIZE)
+        observed = np.zeros(outcomes.OBSERVED_SIZE)
         escape = options.start_gap if options.escape_gap == "start_gap" else options.escape_gap
         rest = REST_TURNS * self.turn_time if options.rest_time == "auto" else options.rest_time
-        memo[memo_at.ZONE] = self.zone_distance
-        memo[memo_at.ESCAPE] = escape
-        memo[memo_at.REST_TIME] = rest
-        memo[memo_at.DRIFT_X : memo_at.DRIFT_Y + 1] = self.drift
-        memo[memo_at.MOBILITY_I] = self.settling[0][1]
-        memo[memo_at.MOBILITY_J] = self.settling[1][1]
-        return memo
+        observed[outcomes.ZONE] = self.zone_distance
+        observed[outcomes.ESCAPE] = escape
+        observed[outcomes.REST_TIME] = rest
+        observed[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
+        observed[outcomes.MOBILITY_I] = self.settling[0][1]
+        observed[outcomes.MOBILITY_J] = self.settling[1][1]
+        return observed
 
     def time_limit(self):
         """Simulated time [s] after which a replicate is undecided."""
@@ -108,7 +107,8 @@ class Encounter:
         """A Run of a replicate that has yet to take its first step, to a time [s] at most."""
         return Run(
             driver, self.scene, self.start(angles, share), self.system.integrator,
-            min(self.time_limit(), until), max_steps=max_steps, memo=self.memo(), record=record,
+            min(self.time_limit(), until), max_steps=max_steps, observed=self.observed(),
+            record=record,
         )  # fmt: skip
 
 
@@ -140,19 +140,19 @@ def run_encounter(encounter, driver, angles, share, max_steps, record=None, halt
 
 def replicate_row(status, angles, run):
     """What the table of replicates holds of a Run that has ended."""
-    memo = run.memo
-    outcome, failure = outcome_of(status, run.code, memo)
-    touched = collided(memo)
+    observed = run.observed
+    outcome, failure = outcome_of(status, run.code, observed)
+    touched = collided(observed)
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
         "outcome": outcome,
-        "inside": int(memo[memo_at.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(memo[memo_at.CROSSED]) if touched else NOT_APPLICABLE,
-        "d_c_collision": memo[memo_at.D_COLLISION] if touched else np.nan,
-        "d_c_max": memo[memo_at.D_MAX] if touched else np.nan,
-        "d_c_last": memo[memo_at.D_LAST],
-        "t_collision": memo[memo_at.T_COLLISION] if touched else np.nan,
+        "inside": int(observed[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(observed[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
+        "d_c_collision": observed[outcomes.D_COLLISION] if touched else np.nan,
+        "d_c_max": observed[outcomes.D_MAX] if touched else np.nan,
+        "d_c_last": observed[outcomes.D_LAST],
+        "t_collision": observed[outcomes.T_COLLISION] if touched else np.nan,
         "t_end": run.time,
         "steps": run.steps,
         "rejected": run.rejected,

@@ -1,49 +1,105 @@
-"""How the end of a replicate's run is written down: outcome and reason."""
+"""How the end of a replicate is written down: its outcome, and the reason where it has none.
 
-from flocsim.ensembles.collision.memo import COLLIDED, INSIDE
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, MISSED
+An exception, or a number that is none, costs that one replicate: a row says so, and a note has
+what is needed to run it again.
+"""
+
+import math
+
+from flocsim.ensembles.collision.outcomes import BOUND, COLLIDED, DEPARTED, INSIDE, MISSED
+from flocsim.ensembles.collision.sampling import draws, orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
+
+FAILED = OUTCOMES.index("failed")
 
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""
 
-UNDECIDED = {
+UNDECIDED_ENDS = {
     Status.FINISHED: "time limit",
     Status.STEP_BUDGET: "step budget",
     Status.STALLED: "stalled",
 }
 """Ends without a decision, and their reasons."""
 
-FAILED = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
+FAILED_ENDS = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
 """Ends in which the model was left, and their reasons."""
 
 CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): "D"}
 """Class by (inside, decision)."""
 
+ALWAYS_FINITE = ("angle_i", "angle_j", "d_c_last", "t_end")
+"""Columns that are numbers in every row of a replicate that has not failed."""
 
-def outcome_of(status, code, memo):
+NAN = float("nan")
+NO_FLOC = -1
+"""In ``floc_i`` and ``floc_j``: a sphere."""
+
+LONGEST_REASON = 300
+"""Letters of an exception's words in a note."""
+
+
+def outcome_of(status, code, observed):
     """(outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
         if code == MISSED:
             return OUTCOMES.index("missed"), 0
-        return OUTCOMES.index(CLASSES[int(memo[INSIDE]), int(code)]), 0
-    if status in UNDECIDED:
-        return OUTCOMES.index("undecided"), FAILURES.index(UNDECIDED[status])
-    return OUTCOMES.index("failed"), FAILURES.index(FAILED[status])
+        return OUTCOMES.index(CLASSES[int(observed[INSIDE]), int(code)]), 0
+    if status in UNDECIDED_ENDS:
+        return OUTCOMES.index("undecided"), FAILURES.index(UNDECIDED_ENDS[status])
+    return FAILED, FAILURES.index(FAILED_ENDS[status])
 
 
-EXCEPTION = FAILURES.index("exception")
-NOT_FINITE = FAILURES.index("not finite")
+def collided(observed):
+    """Whether the outlines touched."""
+    return observed[COLLIDED] == 1.0
 
 
-def failed_row(failure, angles=(float("nan"), float("nan"))):
+def run_safely(study, place, replicate, halted=None):
+    """(row, None) of one replicate, or (row, note) where it failed; row None where halted.
+
+    ``place``: of a condition, as Study.places has it. Running out of memory is nobody's fault but
+    the machine's, and goes on.
+    """
+    condition, vertices, share = place
+    try:
+        row = study.run(condition, vertices, share, replicate, halted=halted)
+    except MemoryError:
+        raise
+    except Exception as error:
+        angles = orientations(draws(study.config.seed, replicate))
+        why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
+        return failed_row("exception", angles), make_note(study, place, replicate, why)
+    if row is None:
+        return None, None
+    if row["outcome"] != FAILED and not all(math.isfinite(row[name]) for name in ALWAYS_FINITE):
+        flocs = {name: row[name] for name in ("floc_i", "floc_j")}
+        row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | flocs
+    if row["outcome"] == FAILED:
+        return row, make_note(study, place, replicate, FAILURES[row["failure"]])
+    return row, None
+
+
+def failed_row(reason, angles):
     """The row of a replicate that ended without a result, as a dict."""
     blank = {name: BLANKS[kind] for name, (kind, _, _) in REPLICATES.items()}
-    told = {"outcome": OUTCOMES.index("failed"), "failure": failure}
+    told = {"outcome": FAILED, "failure": FAILURES.index(reason)}
     return blank | {"angle_i": angles[0], "angle_j": angles[1]} | told
 
 
-def collided(memo):
-    """Whether the outlines touched."""
-    return memo[COLLIDED] == 1.0
+def make_note(study, place, replicate, why):
+    """What is needed to run a replicate again, and why one would, as JSON can hold it."""
+    condition, vertices, share = place
+    name = study.config.scene.conditions[condition][0]
+    return {
+        "type": name, "vertices": vertices, "delta": share, "replicate": replicate, "why": why,
+    }  # fmt: skip
+
+
+def describe_note(note):
+    """A failed replicate for messages, with the words that run it again."""
+    return (
+        f"{note['why']} (flocsim trajectory CONFIG --scene "
+        f"{note['type']},{note['vertices']},{note['delta']!r} --replicate {note['replicate']})"
+    )

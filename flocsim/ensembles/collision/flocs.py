@@ -80,8 +80,12 @@ def nearest_in_ratio(flocs, ratio, count):
 
 
 @attrs.define(eq=False)
-class Wardrobe:
-    """Shapes of a study, resized when first asked for."""
+class FlocPool:
+    """The flocs that bodies are drawn from, resized to them when first asked for.
+
+    ``flocs``: all of a study; ``radius``: the spheroradius of its bodies [m]; ``pool``: from how
+    many flocs of about its size a body is drawn.
+    """
 
     flocs: list
     radius: float
@@ -107,7 +111,6 @@ class Wardrobe:
         return self.made[key]
 
     def make(self, place, vertices, equivalent_radius):
-        """Resize one shape."""
         if vertices == 1:
             return Sphere(equivalent_radius)
         return self.flocs[place].resized(vertices, equivalent_radius, self.radius)

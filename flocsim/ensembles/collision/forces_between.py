@@ -52,7 +52,7 @@ def settling_force(encounter, velocity, direction):
     return np.sum(direction * np.array(forces), axis=1)
 
 
-def loads_of(encounter, times, position, velocity):
+def forces_between(encounter, times, position, velocity):
     """(instants (k − 1,) [s], {name: force on body j [N]}), means over the steps of the motion.
 
     Along the line of centres, above 0 where it pushes apart. What acts at the outlines follows

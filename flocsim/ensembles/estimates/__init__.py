@@ -1,4 +1,6 @@
-"""From rows to probabilities: counts, intervals, paired and pooled differences, the stop rule.
+"""From rows to probabilities with intervals: of single conditions, pooled, paired.
+
+Also the rule that stops a study, and which outcomes change between two runs of one.
 
 May import ``storage``.
 """

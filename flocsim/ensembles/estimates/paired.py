@@ -6,12 +6,9 @@ them is correlated, and the difference is known better than from independent sam
 
 import numpy as np
 
+from flocsim.ensembles.estimates.statistics import AGGREGATED, DECIDED
 from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import AXES, NOT_APPLICABLE
-
-AGGREGATED = (0, 2)
-DECIDED = 4
-"""Outcomes below this code are classes A to D."""
 
 
 def events_of(outcome, inside):

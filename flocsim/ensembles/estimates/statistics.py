@@ -1,9 +1,15 @@
-"""From the outcomes of single collisions to counts, probabilities and their intervals."""
+"""From the outcomes of single collisions to counts, probabilities and their intervals.
+
+Of single conditions, and pooled over all displacements. There a replicate has the same orientations
+at every displacement, so that its collisions are not independent: the interval is Wilson's at the
+number of independent events which the spread between replicates shows (a ratio of cluster totals;
+W. G. Cochran, Sampling Techniques, 1977, ch. 6).
+"""
 
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.confidence import proportion, wilson
+from flocsim.io.confidence import clustered_proportion, proportion, wilson
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE, OUTCOMES
 
 __all__ = ["probabilities", "tabulate", "wilson"]
@@ -11,6 +17,10 @@ __all__ = ["probabilities", "tabulate", "wilson"]
 MISSED = OUTCOMES.index("missed")
 UNDECIDED = OUTCOMES.index("undecided")
 FAILED = OUTCOMES.index("failed")
+DECIDED = len(CLASSES)
+"""Outcomes below this code are classes A to D."""
+AGGREGATED = (0, 2)
+INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
 
 
 def tabulate(outcome, inside):
@@ -77,8 +87,8 @@ def checked_codes(outcome, inside):
         raise UsageError(
             f"outcome and inside must have one shape, found {outcome.shape} and {inside.shape}"
         )
-    touched_inside = (inside == 1) & np.isin(outcome, [0, 1, UNDECIDED, FAILED])
-    touched_outside = (inside == 0) & np.isin(outcome, [2, 3, UNDECIDED, FAILED])
+    touched_inside = (inside == 1) & np.isin(outcome, [*INSIDE_CLASSES, UNDECIDED, FAILED])
+    touched_outside = (inside == 0) & np.isin(outcome, [*OUTSIDE_CLASSES, UNDECIDED, FAILED])
     apart = (inside == NOT_APPLICABLE) & np.isin(outcome, [MISSED, UNDECIDED, FAILED])
     wrong = np.argwhere(~(touched_inside | touched_outside | apart))
     if len(wrong):
@@ -88,3 +98,41 @@ def checked_codes(outcome, inside):
             f"({len(wrong)} such replicates): check how the outcomes were recorded"
         )
     return outcome, inside
+
+
+def trials_of(outcome, inside):
+    """{estimate: (trials, successes)}, flags of the codes' shape."""
+    aggregated = np.isin(outcome, AGGREGATED)
+    within = np.isin(outcome, INSIDE_CLASSES)
+    without = np.isin(outcome, OUTSIDE_CLASSES)
+    return {
+        "pr_inside": (inside != NOT_APPLICABLE, inside == 1),
+        "pr_a_given_inside": (within, within & aggregated),
+        "pr_a_given_outside": (without, without & aggregated),
+        "pr_a": (outcome < DECIDED, aggregated),
+    }
+
+
+def pooled_sums(outcome, inside):
+    """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
+
+    S and M are a replicate's successes and trials over all displacements; sums are over
+    replicates. Codes are (type, vertices, delta, replicate).
+    """
+    sums = {}
+    for name, (trials, successes) in trials_of(outcome, inside).items():
+        m = np.sum(trials, axis=2, dtype=np.int64)
+        s = np.sum(successes, axis=2, dtype=np.int64)
+        terms = (s, m, s * s, s * m, m * m, m > 0)
+        sums[name] = np.stack([np.sum(term, axis=-1) for term in terms])
+    return sums
+
+
+def pooled_probabilities(sums):
+    """The arrays of POOLED; NaN where there was no event."""
+    table = {}
+    for name, each in sums.items():
+        share, low, high, effective = clustered_proportion(*each.astype(float))
+        table |= {name: share, f"{name}_low": low, f"{name}_high": high}
+        table[f"n_effective_{name}"] = effective
+    return table

@@ -45,14 +45,12 @@ class StopRule:
         return all(self.is_narrow(counts) for counts in self.counts)
 
     def add(self, place, more):
-        """Add counts to a condition's."""
         if self.counts is None:
             self.counts = [None] * len(self.store.conditions)
         before = self.counts[place]
         self.counts[place] = {n: more[n] + (before[n] if before else 0) for n in more}
 
     def is_narrow(self, counts):
-        """Whether all intervals of one condition are narrow enough."""
         table = probabilities(counts)
         widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]
         return not np.any(0.5 * np.array(widths) > self.stop.half_width)

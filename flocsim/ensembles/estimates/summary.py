@@ -4,8 +4,13 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
-from flocsim.ensembles.estimates.pooled import pooled_probabilities, pooled_sums
-from flocsim.ensembles.estimates.statistics import checked_codes, count, probabilities
+from flocsim.ensembles.estimates.statistics import (
+    checked_codes,
+    count,
+    pooled_probabilities,
+    pooled_sums,
+    probabilities,
+)
 from flocsim.ensembles.storage.row_store import RowStore
 
 BLOCK = 16_384
@@ -24,13 +29,11 @@ class Reader:
         self.known = [self.store.known(place) for place in range(len(self.store.conditions))]
 
     def blocks(self):
-        """(first, stop) of blocks of replicates."""
         count = self.shape[-1]
         for first in range(0, count, BLOCK):
             yield first, min(first + BLOCK, count)
 
     def part(self, name, place, first, stop):
-        """Some values of one condition."""
         return self.store.read(place, name, first, stop, self.known[place])
 
     def block(self, name, first, stop):

@@ -3,7 +3,7 @@
 import sys
 import time
 
-from flocsim.ensembles.parallel.team import Team
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.errors import UsageError
 from flocsim.interruption import INTERRUPTION, end_with_parent
 
@@ -24,7 +24,7 @@ def load_mpi():
     return MPI
 
 
-class MpiTeam(Team):
+class MpiCommunicator(Communicator):
     """The ranks of MPI's world."""
 
     def __init__(self, launched):
@@ -48,22 +48,18 @@ class MpiTeam(Team):
 
     @property
     def threads(self):
-        """Whether a thread of rank 0 may use MPI while the main one computes."""
         return self.mpi.Query_thread() >= self.mpi.THREAD_SERIALIZED
 
     def send(self, to, message):
-        """Send an object to a rank."""
         self.world.send(message, to)
 
     def arrived(self):
-        """(source, message) of all that has come."""
         status = self.mpi.Status()
         while self.world.Iprobe(status=status):
             source = status.Get_source()
             yield source, self.world.recv(source=source)
 
     def abort(self, code):
-        """End the whole job: every rank, wherever it is."""
         sys.stdout.flush()
         sys.stderr.flush()
         time.sleep(LAST_WORDS)

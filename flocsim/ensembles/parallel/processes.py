@@ -6,7 +6,7 @@ import os
 import sys
 from multiprocessing.connection import wait
 
-from flocsim.ensembles.parallel.team import StopRequested, Team
+from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.errors import FlocsimError
 from flocsim.interruption import INTERRUPTION, STOPPED, install, stop_requested
 
@@ -18,10 +18,8 @@ class LostRank(FlocsimError):
     """A process of the job has died."""
 
 
-class ProcessTeam(Team):
+class ProcessCommunicator(Communicator):
     """One process of several, with a pipe to rank 0 or, on rank 0, to each of the others."""
-
-    threads = True
 
     def __init__(self, rank, size, pipes, others=()):
         """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started."""
@@ -31,7 +29,6 @@ class ProcessTeam(Team):
         self.others = others
 
     def send(self, to, message):
-        """Send an object to a rank."""
         try:
             self.pipes[to].send(message)
         except OSError:
@@ -66,13 +63,11 @@ class ProcessTeam(Team):
         self.end_others()
 
     def end_others(self):
-        """End what is left of the other processes."""
         for process in self.others:
             with contextlib.suppress(Exception):
                 process.kill()
 
     def abort(self, code):
-        """End the whole job."""
         sys.stdout.flush()
         sys.stderr.flush()
         self.end_others()
@@ -80,24 +75,24 @@ class ProcessTeam(Team):
 
 
 def start_processes(jobs, target, arguments):
-    """The team of this process, rank 0, and ``jobs`` − 1 others that call ``target(team, …)``."""
+    """Start ``jobs`` − 1 processes that call ``target(communicator, arguments)``; rank 0's own."""
     context = multiprocessing.get_context("spawn")
     pipes, others = {}, []
     for rank in range(1, jobs):
         pipes[rank], far_end = context.Pipe()
         process = context.Process(
-            target=join_team, args=(target, rank, jobs, far_end, arguments), daemon=True
+            target=join_job, args=(target, rank, jobs, far_end, arguments), daemon=True
         )
         process.start()
         far_end.close()
         others.append(process)
-    team = ProcessTeam(0, jobs, pipes, others)
-    INTERRUPTION.leave = team.abort
-    return team
+    comm = ProcessCommunicator(0, jobs, pipes, others)
+    INTERRUPTION.leave = comm.abort
+    return comm
 
 
-def join_team(target, rank, jobs, pipe, arguments):
+def join_job(target, rank, jobs, pipe, arguments):
     """Where a process that rank 0 has started begins."""
     install()
     INTERRUPTION.speaks = False
-    sys.exit(target(ProcessTeam(rank, jobs, {0: pipe}), arguments))
+    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}), arguments))

@@ -29,11 +29,14 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
     "run.py", "compiler",
-    "forces", "integrators", "geometry/shapes", "geometry/contact",
+    "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
     "ensembles/collision", "ensembles/study.py",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
-makes shapes: what it made is compared itself."""
+makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py holds this
+list against all that a replicate imports."""
+
+PACKAGE = Path(__file__).parents[2]
 
 
 def identity_of(study):
@@ -139,15 +142,15 @@ def arithmetic_digest():
     return digest(np.concatenate(found))
 
 
-def physics_digest():
+def physics_digest(root=PACKAGE):
     """A hash of the modules that decide what is in a row: of what they do, not how they look."""
     found = hashlib.blake2b(digest_size=16)
-    for path in physics_files():
+    for path in physics_files(root):
         found.update(essence(path.read_text("utf-8")).encode())
     return found.hexdigest()
 
 
-def physics_files(root=Path(__file__).parents[2]):
+def physics_files(root=PACKAGE):
     """The files of PHYSICS in the package's folder, in an order that is always the same."""
     for name in PHYSICS:
         place = root / name
@@ -165,12 +168,10 @@ def essence(source):
 
 
 def is_text(node):
-    """Whether a statement is nothing but a string."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def digest(array):
-    """A hash of an array's bytes."""
     return hashlib.blake2b(np.ascontiguousarray(array).tobytes(), digest_size=16).hexdigest()
 
 
@@ -197,7 +198,6 @@ def differences(stored, current):
 
 
 def difference(name, stored, current):
-    """One line on what differs."""
     kind, _, rest = name.partition(".")
     if kind in EXPLAINED:
         return EXPLAINED[kind].format(rest)
@@ -217,5 +217,4 @@ EXPLAINED = {
 
 
 def show(value):
-    """A value for messages."""
     return "nothing" if value is None else json.dumps(value)

@@ -9,6 +9,7 @@ import sys
 import attrs
 
 from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, named
+from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore
 from flocsim.errors import FileError, UsageError
@@ -30,7 +31,8 @@ class Beginning:
 
     ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
     ``history`` has date and command of the runs before; ``complete`` is what an older results
-    file holds, (conditions, replicates of each), where nothing else was found.
+    file holds, (conditions, replicates of each), where nothing else was found. ``cpus_now`` are
+    the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of.
     """
 
     store: RowStore
@@ -39,6 +41,8 @@ class Beginning:
     notes: list = attrs.Factory(list)
     history: list = attrs.Factory(list)
     complete: tuple = None
+    cpus_now: list = attrs.Factory(list)
+    cpus_found: list = attrs.Factory(list)
     resources: object = attrs.Factory(contextlib.ExitStack)
 
     @property
@@ -54,8 +58,8 @@ class Beginning:
         ]
 
 
-def begin(study, identity, output, mode):
-    """The Beginning of a study whose results go to the file ``output``.
+def begin(study, identity, output, mode, cpus=()):
+    """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
     Raises UsageError where an unfinished run is in the way, or is one of another config, of other
     shapes or other physics; FileError where the journal cannot be opened.
@@ -70,7 +74,7 @@ def begin(study, identity, output, mode):
         with contextlib.suppress(OSError):
             os.unlink(path)
     journal = Journal(path)
-    start = Beginning(RowStore(journal, study.conditions), identity)
+    start = Beginning(RowStore(journal, study.conditions), identity, cpus_now=list(cpus))
     start.resources.callback(journal.close)
     try:
         take_journal(start)
@@ -84,11 +88,10 @@ def begin(study, identity, output, mode):
 
 
 def session(start):
-    """The description of this run, for the journal."""
     identity = start.identity
     return {
         "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
-        "command": shlex.join(sys.argv),
+        "command": shlex.join(sys.argv), "cpus": start.cpus_now,
     }  # fmt: skip
 
 
@@ -107,9 +110,12 @@ def take_journal(start):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
     known = {*(each["short"] for each in sessions), short(start.identity)}
     places = {condition: place for place, condition in enumerate(start.store.conditions)}
+    cpus = []
     for record in journal.records:
-        if record.kind == CHUNK and fits(record.description, record.length):
-            take_chunk(start, record, known, places)
+        if record.kind == SESSION:
+            cpus = record.description.get("cpus", [])
+        elif record.kind == CHUNK and fits(record.description, record.length):
+            take_chunk(start, record, known, places, cpus)
     for each in journal.damage:
         start.remarks.append(
             f"{journal.path}: damaged from byte {each.start} to {each.stop} "
@@ -130,8 +136,11 @@ def refuse_other(start, path, stored):
         raise UsageError(f"{path} is of another study: {shown}{more}; {REMEDY}")
 
 
-def take_chunk(start, record, known, places):
-    """Note where a chunk's rows lie, if they are of a condition of this study."""
+def take_chunk(start, record, known, places, cpus):
+    """Note where a chunk's rows lie, if they are of a condition of this study.
+
+    ``cpus``: the kinds of CPU of the run that wrote it.
+    """
     about = record.description
     if about["identity"] not in known:
         start.remarks.append(
@@ -143,6 +152,7 @@ def take_chunk(start, record, known, places):
         first = about["first"]
         start.store.add(place, first, first + about["count"], record.offset)
         start.notes += about.get("notes", [])
+        start.cpus_found = distinct([*start.cpus_found, *cpus])
 
 
 def take_results(start, output):
@@ -169,13 +179,13 @@ def take_results(start, output):
             start.store.add(place, 0, count, -1)
     start.store.old = OldTable(rows, places)
     start.notes += stored(file, "failed", [])
+    start.cpus_found = distinct([*stored(file, "cpus", []), *start.cpus_found])
     start.history = [*stored(file, "history", []), earlier(file), *start.history]
     if not begun:
         start.complete = (tuple(places), count)
 
 
 def stored_identity(output, file):
-    """The identity in a results file."""
     if "identity" not in file["run"]:
         raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
     return json.loads(file["run/identity"].asstr()[()])

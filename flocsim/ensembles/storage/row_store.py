@@ -3,8 +3,7 @@
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, STARTS
-from flocsim.ensembles.storage.index_ranges import merged
+from flocsim.ensembles.chunks import ROW, STARTS, merged
 
 ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8")])
 """A run of rows: its replicates, and where its data begin in the journal; −1: in the old file."""
@@ -67,7 +66,6 @@ class RowStore:
         return values
 
     def part(self, place, name, entry, low, high):
-        """Values of one entry."""
         start, end, offset = entry
         if offset < 0:
             return self.old.read(self.conditions[place], name, low, high)

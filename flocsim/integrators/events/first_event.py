@@ -38,10 +38,10 @@ def grain_of(work, clock):
     return max(grain, ROUNDING * furthest_place(work, NEW))
 
 
-def switch_share(scene, work, memo, clock, step):
+def switch_share(scene, work, observed, clock, step):
     """The share of the step at which the first pair switches; above 1 where none does."""
     locate_contacts(scene, work, NEW)
-    if clock[TOLERANCE] < math.inf or awaits_touch(memo):
+    if clock[TOLERANCE] < math.inf or awaits_touch(observed):
         grain = grain_of(work, clock)
         shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
         depth = grain if deepest_overlap(work) > 0.0 else max(grain, shallowest)

@@ -101,17 +101,17 @@ def keep_lists(scene, work):
     return True
 
 
-def look(scene, work, memo, clock, counts, record, lists):
+def look(scene, work, observed, clock, counts, record, lists):
     """Record and watch the state that has been accepted: a Status, or 0 to go on."""
     if record.shape[0] > 0:
         record_row(work, clock, counts, record)
     if lists and too_deep(scene, work):
         return TOO_DEEP
-    counts[CODE] = observe(scene, work, memo, clock[TIME])
+    counts[CODE] = observe(scene, work, observed, clock[TIME])
     return STOPPED if counts[CODE] != 0 else 0
 
 
-def advance(scene, work, memo, clock, counts, record):
+def advance(scene, work, observed, clock, counts, record):
     """Run until a Status; call again to go on after PAUSED, RECORD_FULL or NO_ROOM.
 
     ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
@@ -134,7 +134,7 @@ def advance(scene, work, memo, clock, counts, record):
             if not reject(clock, counts, step, ratio, too_far):
                 return STALLED
             continue
-        share = switch_share(scene, work, memo, clock, step) if lists else math.inf
+        share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             limit, trials = share * step, trials + 1
             counts[LOCATED] += 1
@@ -142,7 +142,7 @@ def advance(scene, work, memo, clock, counts, record):
         switched = accept(scene, work, clock, counts, step, lists)
         plan(clock, step, ratio, trials > 0, switched)
         limit, trials = math.inf, 0
-        status = look(scene, work, memo, clock, counts, record, lists)
+        status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:
             return status
     return FINISHED

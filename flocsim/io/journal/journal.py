@@ -71,7 +71,6 @@ class Journal:
         sync_folder(path.parent)
 
     def size(self):
-        """Bytes in the file."""
         return self.file.seek(0, os.SEEK_END)
 
     def append(self, record):
@@ -127,18 +126,15 @@ class MemoryJournal:
     """The same in memory, for a study that is run from Python."""
 
     def __init__(self):
-        """An empty one."""
         self.file = io.BytesIO()
         self.records, self.damage, self.path = [], [], "memory"
 
     def append(self, record):
-        """Append a record's bytes; the place at which they begin."""
         start = self.file.seek(0, os.SEEK_END)
         self.file.write(record)
         return start
 
     def read(self, offset, length):
-        """Bytes of the journal."""
         with self.file.getbuffer() as view:
             return bytes(view[offset : offset + length])
 

@@ -46,7 +46,6 @@ class Damage:
 
 
 def digest(data, size):
-    """blake2b of bytes."""
     return hashlib.blake2b(data, digest_size=size).digest()
 
 

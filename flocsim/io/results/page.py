@@ -56,7 +56,9 @@ Scalars. `config` (the file's text), `overrides` (JSON: what the command line la
 `kernel_fingerprint`; versions of flocsim, Python, numpy, numba and h5py; `platform`, `processor`,
 `hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `history` (JSON: date and
 command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];
-`failed` (JSON: up to 1000 failed replicates with reasons).
+`cpus` (JSON: every kind of CPU that rows were computed on: what LLVM calls it, what numba compiled
+for, the instructions that numpy used, the C library); `failed` (JSON: up to 1000 failed replicates
+with reasons).
 
 ## flocs
 

@@ -1,49 +1,16 @@
-"""What `flocsim fit` tells a person: progress, a line on every picture, tables."""
+"""What `flocsim fit` tells a person: a line on every picture, tables."""
 
 import csv
 import io
 import sys
-import time
 
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
 
 
-BAR_WIDTH = 30
-"""Letters."""
-
-
 def plural(count, noun):
     """ "1 floc", "2 flocs"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-class Bar:
-    """How far the fits are, on a line that renews itself; only on a terminal."""
-
-    def __init__(self, total, stream=None):
-        """``total`` flocs to fit."""
-        self.total, self.done = total, 0
-        self.stream = stream or sys.stderr
-        self.began = self.shown = time.monotonic()
-
-    def count(self, result):
-        """One more is done; gives its result back."""
-        self.done += 1
-        now = time.monotonic()
-        last = self.done == self.total
-        if self.stream.isatty() and (last or now - self.shown > 0.2):
-            self.shown = now
-            print(f"\r{self.text(now)}\x1b[K", end="", file=self.stream, flush=True)
-        return result
-
-    def text(self, now):
-        """The bar, the count and the time left; nothing when all is done."""
-        if self.done == self.total:
-            return ""
-        left = (now - self.began) * (self.total - self.done) / self.done
-        full = "#" * (BAR_WIDTH * self.done // self.total)
-        return f"[{full:<{BAR_WIDTH}}] floc {self.done} of {self.total}, {left:.0f} s left"
 
 
 def picture_line(name, found, fitted):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere, SpheroPolygon
-from flocsim.ensembles.collision.flocs import Floc, Wardrobe, load_flocs, nearest_in_ratio
+from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError, FileError
 from tests.helpers.small_study import grown, write_star_library
@@ -69,37 +69,37 @@ def test_the_nearest_in_ratio_come_first():
 
 
 def test_the_two_bodies_are_two_flocs_where_there_are_two():
-    wardrobe = Wardrobe(flocs_of([10.0] * 5), 1e-6, 5)
+    pool = FlocPool(flocs_of([10.0] * 5), 1e-6, 5)
     numbers = np.random.default_rng(0).random((500, 4))
-    chosen = [wardrobe.choose(each, 1e-5, 2e-5) for each in numbers]
+    chosen = [pool.choose(each, 1e-5, 2e-5) for each in numbers]
     assert all(first != second for first, second in chosen)
     assert set(chosen) == {(a, b) for a in range(5) for b in range(5) if a != b}
-    assert wardrobe.choose([0.0, 0.0, 0.999999, 0.999999], 1e-5, 2e-5) == (4, 3)
+    assert pool.choose([0.0, 0.0, 0.999999, 0.999999], 1e-5, 2e-5) == (4, 3)
 
 
 def test_a_pool_of_one_serves_both_bodies():
-    wardrobe = Wardrobe(flocs_of([10.0]), 1e-6, 5)
-    assert wardrobe.choose([0.5] * 4, 1e-5, 2e-5) == (0, 0)
+    pool = FlocPool(flocs_of([10.0]), 1e-6, 5)
+    assert pool.choose([0.5] * 4, 1e-5, 2e-5) == (0, 0)
 
 
 def test_each_body_draws_from_flocs_of_its_own_size(library):
-    wardrobe = Wardrobe(from_library(library, (4,)), 1e-6, 1)
-    assert wardrobe.choose([0.5] * 4, 7e-6, 25e-6) == (0, 2)
+    pool = FlocPool(from_library(library, (4,)), 1e-6, 1)
+    assert pool.choose([0.5] * 4, 7e-6, 25e-6) == (0, 2)
 
 
 @pytest.mark.parametrize("size", [2e-6, 4.62e-6, 16.41e-6, 23.02e-6, 1e-4])
 def test_shapes_are_resized_exactly_and_once(size):
-    wardrobe = Wardrobe(grown(1, (1, 4, 16), 2), 1e-6, 2)
+    pool = FlocPool(grown(1, (1, 4, 16), 2), 1e-6, 2)
     for vertices in (4, 16):
-        shape = wardrobe.shape(0, vertices, size)
+        shape = pool.shape(0, vertices, size)
         assert isinstance(shape, SpheroPolygon)
         assert shape.equivalent_radius == pytest.approx(size, rel=1e-12)
         assert shape.radius == pytest.approx(1e-6, rel=1e-9)
-        assert wardrobe.shape(0, vertices, size) is shape
+        assert pool.shape(0, vertices, size) is shape
 
 
 def test_the_sphere_is_the_same_whatever_the_floc():
-    wardrobe = Wardrobe([], 1e-6, 2)
-    sphere = wardrobe.shape(None, 1, 5e-6)
+    pool = FlocPool([], 1e-6, 2)
+    sphere = pool.shape(None, 1, 5e-6)
     assert isinstance(sphere, Sphere)
-    assert wardrobe.shape(7, 1, 5e-6) is sphere
+    assert pool.shape(7, 1, 5e-6) is sphere

@@ -9,8 +9,7 @@ from shapely.geometry import Polygon
 
 from flocsim import SpheroPolygon
 from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
-from flocsim.ensembles.collision import bonds, outcomes
-from flocsim.ensembles.collision import memo as memo_at
+from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
@@ -58,14 +57,14 @@ def go_on(study, condition, vertices, share, replicate, factor=11.0):
     row = study.run(condition, vertices, share, replicate)
     numbers = draws(study.config.seed, replicate)
     encounter = study.encounter(condition, vertices, numbers)
-    work, memo = encounter.start(orientations(numbers), share), encounter.memo()
+    work, observed = encounter.start(orientations(numbers), share), encounter.observed()
     integrator, driver = encounter.system.integrator, study.driver(encounter)
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
     clock[UNTIL] = factor * row["t_end"]
     decisions, widest, status = [], -math.inf, Status.STOPPED
     while status == Status.STOPPED:
         # The observer stops the run behind every step once it has decided.
-        status = Status(driver(encounter.scene, work, memo, clock, counts, np.zeros((0, 13))))
+        status = Status(driver(encounter.scene, work, observed, clock, counts, np.zeros((0, 13))))
         if status == Status.STOPPED:
             decisions.append((int(counts[CODE]), float(clock[TIME])))
             widest = max(widest, least_listed_gap(work))
@@ -250,15 +249,15 @@ def test_the_gap_of_the_outlines_is_that_of_shapely(study):
 def test_a_pair_apart_and_parting_has_departed(study):
     # The observer by itself, uncompiled: two spheres, the heavier one below and drifting on.
     encounter = study.encounter(0, 1, draws(1, 0))
-    work, memo = encounter.start((0.0, 0.0), 0.0), encounter.memo()
+    work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
     contact = sum(shape.radius for shape in encounter.shapes)
 
     def seen(gap, collided):
         work.motion[NOW, 1, :2] = 0.0, -(contact + gap)
-        memo[memo_at.COLLIDED] = collided
-        return watch_pair(encounter.scene, work, memo, 0.0)
+        observed[outcomes.COLLIDED] = collided
+        return watch_pair(encounter.scene, work, observed, 0.0)
 
-    escape = memo[memo_at.ESCAPE]
+    escape = observed[outcomes.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
     work.motion[NOW, 1, 4] = 0.0
@@ -269,15 +268,15 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     # It is at rest within itself as it swings through its lowest point; what it will do at the
     # turning point, where the load is another, is not known yet.
     encounter = study.encounter(0, 1, draws(1, 0))
-    work, memo = encounter.start((0.0, 0.0), 0.0), encounter.memo()
+    work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
     spin, reach = 300.0, 39e-6
     work.motion[NOW] = 0.0
     work.motion[NOW, :, 5] = spin
     work.motion[NOW, 1, 1] = -reach
     work.motion[NOW, 1, 3] = spin * reach
-    later = 2.0 * memo[memo_at.REST_TIME]
-    bonds.start_rest(work, memo, 0.0)
-    assert not bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)
+    later = 2.0 * observed[outcomes.REST_TIME]
+    outcomes.start_rest(work, observed, 0.0)
+    assert not outcomes.has_rested(encounter.scene, work, observed, later, 0.0, -1.0)
     # Without the swing it does.
     work.motion[NOW, :, 3:] = 0.0
-    assert bonds.has_rested(encounter.scene, work, memo, later, 0.0, -1.0)
+    assert outcomes.has_rested(encounter.scene, work, observed, later, 0.0, -1.0)

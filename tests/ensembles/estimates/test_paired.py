@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.ensembles.estimates.paired import joint_counts, newcombe, paired_differences
-from flocsim.ensembles.estimates.pooled import pooled_probabilities, pooled_sums
-from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums, tabulate
 from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.synthetic_results import draw_outcomes

@@ -8,8 +8,13 @@ import time
 
 import pytest
 
-from flocsim.ensembles.parallel import team
-from flocsim.ensembles.parallel.team import Alone, find_team, launched_rank, launched_size
+from flocsim.ensembles.parallel import communicator
+from flocsim.ensembles.parallel.communicator import (
+    SerialCommunicator,
+    find_communicator,
+    launched_rank,
+    launched_size,
+)
 from flocsim.io.results.file import read_results, same_data
 from tests.helpers.small_study import (
     BESIDE_PYTHON,
@@ -20,7 +25,7 @@ from tests.helpers.small_study import (
     write_small,
 )
 
-LAUNCHER = (*team.LAUNCHER_SIZES, *team.LAUNCHER_RANKS)
+LAUNCHER = (*communicator.LAUNCHER_SIZES, *communicator.LAUNCHER_RANKS)
 
 
 @pytest.fixture(scope="module")
@@ -282,15 +287,15 @@ def test_who_launched_this_process(no_launcher):
 
 
 def test_one_rank_works_alone(no_launcher):
-    assert isinstance(find_team(), Alone)
+    assert isinstance(find_communicator(), SerialCommunicator)
     no_launcher.setenv("PMI_SIZE", "1")
-    assert isinstance(find_team(), Alone)
+    assert isinstance(find_communicator(), SerialCommunicator)
 
 
-def test_a_team_of_one():
-    alone = Alone()
-    alone.wait()
-    assert (alone.gather(5), alone.share(5), alone.collect(5)) == ([5], 5, [5])
+def test_a_communicator_of_one():
+    alone = SerialCommunicator()
+    alone.barrier()
+    assert (alone.gather(5), alone.broadcast(5), alone.all_gather(5)) == ([5], 5, [5])
     with pytest.raises(SystemExit) as caught:
         alone.abort(70)
     assert caught.value.code == 70

@@ -8,9 +8,9 @@ import pytest
 
 from flocsim.ensembles import runner
 from flocsim.ensembles.parallel import worker
-from flocsim.ensembles.parallel.desk import Desk, TooManyFailures
-from flocsim.ensembles.parallel.team import Alone
-from flocsim.ensembles.runner import Told, run_to_file
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.study_state import StudyState, TooManyFailures
+from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.errors import FileError, UsageError
@@ -32,27 +32,27 @@ def short_chunks(monkeypatch):
 def whole(tmp_path_factory):
     """The results file of an undisturbed run of 2 × 1 × 2 × 20 replicates."""
     folder = tmp_path_factory.mktemp("whole")
-    run_to_file(small_config(folder, SPHERES), Alone(), folder / "r.h5", NEW)
+    run_to_file(small_config(folder, SPHERES), SerialCommunicator(), folder / "r.h5", NEW)
     return folder / "r.h5"
 
 
 def go_on(folder, mode=RESUME, overrides=None, **more):
     """Run the study of spheres in the folder; how it Ended."""
     config = small_config(folder, SPHERES | (overrides or {}) | more)
-    return run_to_file(config, Alone(), folder / "r.h5", mode)
+    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode)
 
 
 def stop_after(monkeypatch, chunks):
     """Let a signal come after so many chunks."""
     seen = []
 
-    def take_in(desk, done, original=Desk.take_in):
-        original(desk, done)
-        seen.append(done)
+    def take_in(state, result, original=StudyState.take_in):
+        original(state, result)
+        seen.append(result)
         if len(seen) == chunks:
-            desk.halted = desk.stopped = True
+            state.interrupt()
 
-    monkeypatch.setattr(Desk, "take_in", take_in)
+    monkeypatch.setattr(StudyState, "take_in", take_in)
 
 
 @pytest.fixture
@@ -85,7 +85,9 @@ def test_it_may_be_stopped_as_often_as_one_likes(tmp_path, monkeypatch, whole):
 
 
 def test_an_unfinished_run_is_in_the_way_of_a_new_one(stopped, whole):
-    with pytest.raises(Told, match=r"r.h5.journal holds an unfinished run: go on .* --resume"):
+    with pytest.raises(
+        SharedError, match=r"r.h5.journal holds an unfinished run: go on .* --resume"
+    ):
         go_on(stopped, NEW)
     assert go_on(stopped, RESTART).computed == 80
     assert same_data(stopped / "r.h5", whole) == []
@@ -108,7 +110,7 @@ def test_another_study_is_refused(request, tmp_path, whole, change, said, finish
     if finished:
         (folder / "r.h5").write_bytes(whole.read_bytes())
     before = {path: path.read_bytes() for path in folder.glob("r.h5*")}
-    with pytest.raises(Told, match="is of another study") as caught:
+    with pytest.raises(SharedError, match="is of another study") as caught:
         go_on(folder, overrides=change)
     assert isinstance(caught.value.args[0], UsageError)
     assert said in str(caught.value)
@@ -117,13 +119,13 @@ def test_another_study_is_refused(request, tmp_path, whole, change, said, finish
 
 def test_other_physics_are_refused(stopped, monkeypatch):
     monkeypatch.setattr(identity, "physics_digest", lambda: "edited")
-    with pytest.raises(Told, match="flocsim's own code has changed"):
+    with pytest.raises(SharedError, match="flocsim's own code has changed"):
         go_on(stopped)
 
 
 def test_another_kind_of_processor_is_refused_and_said(stopped, monkeypatch):
     monkeypatch.setattr(identity, "arithmetic_digest", lambda: "other")
-    with pytest.raises(Told, match="rounds sin, exp and the like otherwise"):
+    with pytest.raises(SharedError, match="rounds sin, exp and the like otherwise"):
         go_on(stopped)
 
 
@@ -150,7 +152,7 @@ def test_the_digest_of_the_physics_sees_code_and_nothing_else():
 
 def test_other_flocs_are_refused(tmp_path, monkeypatch):
     config = small_config(tmp_path, {"shapes": {"vertices": [4]}, "replicates": 1})
-    run_to_file(config, Alone(), tmp_path / "r.h5", NEW)
+    run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", NEW)
     original = runner.flocs_of
 
     def grown(config):
@@ -158,8 +160,8 @@ def test_other_flocs_are_refused(tmp_path, monkeypatch):
         return [attrs.evolve(first, ratio=first.ratio * 1.01), *others]
 
     monkeypatch.setattr(runner, "flocs_of", grown)
-    with pytest.raises(Told, match="the flocs with N = 4 have changed"):
-        run_to_file(config, Alone(), tmp_path / "r.h5", RESUME)
+    with pytest.raises(SharedError, match="the flocs with N = 4 have changed"):
+        run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", RESUME)
 
 
 def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):
@@ -198,7 +200,7 @@ def test_chunks_without_a_session_to_vouch_for_them_are_run_again(stopped, whole
 
 def test_what_is_no_journal_is_not_written_over(tmp_path):
     (tmp_path / "r.h5.journal").write_text("Dear diary,\n")
-    with pytest.raises(Told, match="is no journal of flocsim") as caught:
+    with pytest.raises(SharedError, match="is no journal of flocsim") as caught:
         go_on(tmp_path)
     assert isinstance(caught.value.args[0], FileError)
     assert (tmp_path / "r.h5.journal").read_text() == "Dear diary,\n"
@@ -206,7 +208,7 @@ def test_what_is_no_journal_is_not_written_over(tmp_path):
 
 def test_a_refused_start_leaves_no_journal_behind(tmp_path, whole):
     (tmp_path / "r.h5").write_bytes(whole.read_bytes())
-    with pytest.raises(Told):
+    with pytest.raises(SharedError):
         go_on(tmp_path, seed=9)
     assert not (tmp_path / "r.h5.journal").exists()
 
@@ -284,7 +286,7 @@ def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(
 
 def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path, monkeypatch):
     failing(monkeypatch, *range(3, 20))
-    with pytest.raises(Told, match="ZeroDivisionError") as caught:
+    with pytest.raises(SharedError, match="ZeroDivisionError") as caught:
         go_on(tmp_path, NEW)
     assert isinstance(caught.value.args[0], TooManyFailures)
     assert "flocsim trajectory CONFIG --scene I,1,0.0 --replicate 3" in str(caught.value)

@@ -12,7 +12,7 @@ from flocsim.io.results.schema import CLASSES
 
 
 @attrs.frozen(eq=False)
-class Flips:
+class OutcomeChanges:
     """Which replicates change: flags (type, vertices, delta, replicate).
 
     ``both``: decided collisions in both runs; ``aggregation`` and ``zone``: those of them that
@@ -26,11 +26,11 @@ class Flips:
     outcome: np.ndarray
 
 
-def flips_between(found, exact):
-    """The Flips of ``found`` against ``exact``, Results of the same conditions, replicates paired.
+def outcome_changes(found, exact):
+    """The OutcomeChanges of ``found`` against ``exact``, Results of the same conditions.
 
-    The shorter of the two decides how many replicates are compared. UsageError where the
-    conditions differ.
+    Replicates are paired; the shorter of the two decides how many are compared. UsageError where
+    the conditions differ.
     """
     same = (
         found.types == exact.types
@@ -42,10 +42,10 @@ def flips_between(found, exact):
     count = min(found.count, exact.count)
     a, b = (each.replicates["outcome"][..., :count] for each in (found, exact))
     both = (a < len(CLASSES)) & (b < len(CLASSES))
-    return Flips(both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), a != b)
+    return OutcomeChanges(both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), a != b)
 
 
-def share(changed, among):
+def percent_changed(changed, among):
     """Percent of what is in ``among`` that has changed; NaN of nothing."""
     count = np.count_nonzero(among)
     return 100.0 * np.count_nonzero(changed & among) / count if count else np.nan

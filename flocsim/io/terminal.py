@@ -1,4 +1,4 @@
-"""How far a study has come, as whole lines or as one line that renews itself on a terminal."""
+"""What a person sees while a command works: its lines, its warnings, and how far it has come."""
 
 import os
 import sys
@@ -44,19 +44,19 @@ def tell(text, stream=None, end="\n"):
 
 
 class Progress:
-    """Reports on rank 0, which knows what is done."""
+    """How far a long work is: whole lines, or on a terminal one line that renews itself."""
 
-    def __init__(self, total, quiet, stream=None):
-        """``total`` replicates in all; nothing is printed where ``quiet``."""
+    def __init__(self, total, quiet, stream=None, noun="replicates"):
+        """``total`` replicates, or what the noun says; nothing is printed where ``quiet``."""
         self.total = self.todo = total
         self.quiet = quiet
+        self.noun = noun
         self.stream = stream or sys.stdout
         self.tty = self.stream.isatty()
         self.began = time.monotonic()
         self.printed = self.began
 
     def say(self, text):
-        """Print a line, unless quiet."""
         if not self.quiet:
             tell(text, self.stream)
 
@@ -65,19 +65,19 @@ class Progress:
         tell(f"flocsim: {text}", sys.stderr)
 
     def start(self, todo):
-        """The work begins now: so many replicates are to be run."""
+        """The work begins now, and is so much of the total."""
         self.todo = todo
         self.began = self.printed = time.monotonic()
 
     def report(self, missing):
-        """Report how many replicates are missing, if it is time to."""
+        """Say how many are missing, if it is time to."""
         share = (self.todo - missing) / self.todo if self.todo else 1.0
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
             return
         self.printed = now
         left = (now - self.began) * (1.0 - share) / share if share > 0.0 else 0.0
-        text = f"{share:4.0%}  {self.total - missing} of {self.total} replicates, "
+        text = f"{share:4.0%}  {self.total - missing} of {self.total} {self.noun}, "
         text += f"{duration(left)} left"
         if self.tty:
             tell(f"\r{text:<70}", self.stream, end="")

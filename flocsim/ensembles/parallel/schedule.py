@@ -1,14 +1,13 @@
-"""Hands out the replicates of a study, a stage after the other, without sending anything.
+"""The order in which the replicates of a study are run, a stage after the other.
 
 Guided self-scheduling: a chunk is a share of what is left, so that the last ones are small, and a
-worker gives back what it has not done when its time for the chunk is up, since replicates cost
+rank gives back what it has not done when its time for the chunk is up, since replicates cost
 1 to 1000 times as much as each other.
 """
 
 import attrs
 
-from flocsim.ensembles.chunks import MOST_ROWS, Chunk
-from flocsim.ensembles.storage.index_ranges import missing, total
+from flocsim.ensembles.chunks import MOST_ROWS, Chunk, missing, total
 
 SHORTEST_SECONDS = 0.25
 """Least time for a chunk [s]: asking costs about 1 ms."""
@@ -27,35 +26,42 @@ def chunk_seconds(size):
 
 @attrs.define
 class Stage:
-    """Replicates [first, stop) of every condition: intervals to hand out, how many
-    replicates these are, and how many are to come."""
+    """Replicates [first, stop) of every condition.
+
+    ``todo``: (condition, first, stop) of what may be handed out, and ``waiting`` how many
+    replicates these are; ``unfinished``: how many are missing, those handed out included.
+    """
 
     first: int
     stop: int
     todo: list
     waiting: int
-    open: int
+    unfinished: int
 
 
 @attrs.define
-class Dealer:
-    """What is to be done in a study, what is being done."""
+class Schedule:
+    """What is to be run, and what is being run, on ``size`` ranks.
+
+    ``remaining``: replicates that are missing; ``final``: with how many of each condition the
+    study has ended, −1 while it goes on.
+    """
 
     size: int
     stages: list
-    left: int = 0
+    remaining: int = 0
     final: int = -1
 
     @classmethod
     def of(cls, done, borders, size):
-        """The Dealer for ``size`` ranks.
+        """The Schedule of what is missing.
 
         ``done``: of every condition the intervals that exist already; ``borders``: where stages
         end, [100, 125, …].
         """
         starts = [0, *borders[:-1]]
         stages = [make_stage(done, *ends) for ends in zip(starts, borders, strict=True)]
-        return cls(size, stages, sum(stage.open for stage in stages))
+        return cls(size, stages, sum(stage.unfinished for stage in stages))
 
     def take(self):
         """The next Chunk, None where all is handed out."""
@@ -75,20 +81,20 @@ class Dealer:
         stages = (stage for stage in self.stages if stage.first <= chunk.first < stage.stop)
         if (stage := next(stages, None)) is None:
             return  # more than was needed
-        stage.open -= done
-        self.left -= done
+        stage.unfinished -= done
+        self.remaining -= done
         if chunk.first + done < chunk.stop:
             stage.todo.append((chunk.condition, chunk.first + done, chunk.stop))
             stage.waiting += chunk.stop - chunk.first - done
 
     def finished_stages(self):
         """Take away the leading stages of which all is there; the last replicate of each."""
-        while self.stages and self.stages[0].open == 0:
+        while self.stages and self.stages[0].unfinished == 0:
             yield self.stages.pop(0).stop
 
     def end_at(self, final):
         """Hand out nothing more: the study ends with this many replicates."""
-        self.final, self.stages, self.left = final, [], 0
+        self.final, self.stages, self.remaining = final, [], 0
 
 
 def make_stage(done, first, stop):

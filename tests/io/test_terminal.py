@@ -4,8 +4,8 @@ import io
 
 import pytest
 
-from flocsim.ensembles import progress
-from flocsim.ensembles.progress import Progress, duration
+from flocsim.io import terminal
+from flocsim.io.terminal import Progress, duration
 
 
 class Terminal(io.StringIO):
@@ -20,7 +20,7 @@ class Terminal(io.StringIO):
 def clock(monkeypatch):
     """A clock that the test sets, in seconds."""
     now = [0.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
     return now
 
 
@@ -79,3 +79,11 @@ def test_nothing_done_yet_divides_by_nothing(clock):
     clock[0] = 6.0
     report.report(10)
     assert stream.getvalue() == "  0%  0 of 10 replicates, 0 s left\n"
+
+
+def test_other_things_than_replicates_are_counted(clock):
+    stream = io.StringIO()
+    report = Progress(4, False, stream, "flocs")
+    clock[0] = 6.0
+    report.report(3)
+    assert stream.getvalue() == " 25%  1 of 4 flocs, 18 s left\n"

@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.ensembles.chunks import MOST_ROWS
-from flocsim.ensembles.parallel.dealer import Dealer, chunk_seconds
-from flocsim.ensembles.storage.index_ranges import merged, missing, total
+from flocsim.ensembles.chunks import MOST_ROWS, merged, missing, total
+from flocsim.ensembles.parallel.schedule import Schedule, chunk_seconds
 
 INTERVALS = st.lists(
     st.tuples(st.integers(0, 30), st.integers(0, 10)).map(lambda pair: (pair[0], sum(pair)))
@@ -41,29 +40,29 @@ def test_what_is_missing_is_handed_out_once(done, size, replicates, seed):
     rng = np.random.default_rng(seed)
     done = [missing(missing(merged(each), 0, replicates), 0, replicates) for each in done]
     borders = sorted({replicates // 3 or 1, replicates // 2 or 1, replicates})
-    dealer = Dealer.of(done, borders, size)
+    schedule = Schedule.of(done, borders, size)
     todo = {(c, k) for c, each in enumerate(done) for k in range(replicates)}
     todo -= {(c, k) for c, each in enumerate(done) for k in numbers(each)}
-    assert dealer.left == len(todo)
-    held, run, ended = [], [], list(dealer.finished_stages())
+    assert schedule.remaining == len(todo)
+    held, run, ended = [], [], list(schedule.finished_stages())
     while True:
-        while len(held) < size and (chunk := dealer.take()) is not None:
+        while len(held) < size and (chunk := schedule.take()) is not None:
             held.append(chunk)
         if not held:
             break
         chunk = held.pop(rng.integers(len(held)))
         count = int(rng.integers(0, chunk.stop - chunk.first + 1))
         run += [(chunk.condition, chunk.first + k) for k in range(count)]
-        dealer.give_back(chunk, count)
-        ended += dealer.finished_stages()
+        schedule.give_back(chunk, count)
+        ended += schedule.finished_stages()
     assert sorted(run) == sorted(todo)
-    assert (dealer.left, ended) == (0, borders)
+    assert (schedule.remaining, ended) == (0, borders)
 
 
 def test_chunks_grow_small_towards_the_end():
-    dealer = Dealer.of([[], []], [10**6], 8)
+    schedule = Schedule.of([[], []], [10**6], 8)
     sizes = []
-    while (chunk := dealer.take()) is not None:
+    while (chunk := schedule.take()) is not None:
         sizes.append(chunk.stop - chunk.first)
     assert sizes[0] == MOST_ROWS
     assert sizes[-1] == 1
@@ -72,15 +71,15 @@ def test_chunks_grow_small_towards_the_end():
 
 
 def test_an_earlier_stage_comes_first_and_an_end_stops_the_rest():
-    dealer = Dealer.of([[]], [4, 8], 1)
-    first = [dealer.take() for _ in range(8)]
+    schedule = Schedule.of([[]], [4, 8], 1)
+    first = [schedule.take() for _ in range(8)]
     assert [chunk.first for chunk in first if chunk] == list(range(8))
     for chunk in first[:4]:
-        dealer.give_back(chunk, 1)
-    assert list(dealer.finished_stages()) == [4]
-    dealer.end_at(4)
-    dealer.give_back(first[5], 0)  # what comes late is no harm
-    assert (dealer.take(), dealer.left, dealer.final) == (None, 0, 4)
+        schedule.give_back(chunk, 1)
+    assert list(schedule.finished_stages()) == [4]
+    schedule.end_at(4)
+    schedule.give_back(first[5], 0)  # what comes late is no harm
+    assert (schedule.take(), schedule.remaining, schedule.final) == (None, 0, 4)
 
 
 @pytest.mark.parametrize(("size", "seconds"), [(1, 0.25), (100, 0.25), (10_000, 10.0)])

@@ -1,4 +1,4 @@
-"""The ranks of a job behind one interface: alone, MPI's, or processes of this machine.
+"""The ranks of a job behind one interface: one process, MPI's, or processes of this machine.
 
 All ranks talk to rank 0 only. Nobody waits inside a library: a rank that waits looks for a message,
 then sleeps a little, so that it takes no processor from those who compute, and hears signals.
@@ -25,25 +25,27 @@ class StopRequested(FlocsimError):
     exit_code = 75
 
 
-class Team:
+class Communicator:
     """Messages between rank 0 and the others, and what can be made of them.
 
-    A subclass has ``rank``, ``size``, ``send(to, message)``, and ``arrived()``, which yields
-    (source, message) of all that has come in.
+    A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
+    job, and ``arrived()``, which yields (source, message) of all that has come in. ``threads``
+    says whether a thread of rank 0 may send and receive while the main one computes.
     """
 
+    threads = True
+
     def __init__(self):
-        """Nothing has come yet."""
         self.inbox = collections.defaultdict(collections.deque)
 
-    def pump(self):
-        """Take in what has come."""
+    def take_in(self):
+        """Put what has come into the inbox."""
         for source, message in self.arrived():
             self.inbox[source].append(message)
 
     def messages(self):
         """(source, message) of all that is here."""
-        self.pump()
+        self.take_in()
         for source in [source for source, queue in self.inbox.items() if queue]:
             while self.inbox[source]:
                 yield source, self.inbox[source].popleft()
@@ -51,7 +53,7 @@ class Team:
     def receive(self, source, heed_signals=True):
         """The next message of a rank; StopRequested where a signal comes first."""
         while not self.inbox[source]:
-            self.pump()
+            self.take_in()
             if self.inbox[source]:
                 break
             if heed_signals and stop_requested():
@@ -66,42 +68,39 @@ class Team:
             return None
         return [value, *(self.receive(rank) for rank in range(1, self.size))]
 
-    def share(self, value, heed_signals=True):
+    def broadcast(self, value):
         """Rank 0's value, on all ranks."""
         if self.rank > 0:
-            return self.receive(0, heed_signals)
+            return self.receive(0)
         for rank in range(1, self.size):
             self.send(rank, value)
         return value
 
-    def collect(self, value):
+    def all_gather(self, value):
         """The values of all ranks, on all ranks."""
-        return self.share(self.gather(value))
+        return self.broadcast(self.gather(value))
 
-    def wait(self):
-        """Until all ranks are here."""
-        self.collect(None)
+    def barrier(self):
+        """Wait until all ranks are here."""
+        self.all_gather(None)
 
     def close(self):
         """The work is done: let the others go."""
 
 
-class Alone(Team):
+class SerialCommunicator(Communicator):
     """One process: what a job without a launcher runs on."""
 
     rank = 0
     size = 1
-    threads = True
 
     def send(self, to, message):
         """There is nobody."""
 
     def arrived(self):
-        """Nothing comes."""
         return ()
 
     def abort(self, code):
-        """End the whole job."""
         sys.stdout.flush()
         sys.stderr.flush()
         sys.exit(code)
@@ -121,14 +120,14 @@ def launched_rank():
     return next((int(rank) for rank in said if rank.isdigit()), 0)
 
 
-def find_team():
+def find_communicator():
     """The ranks of this job: MPI only where a launcher started more than one."""
     try:
         size = launched_size()
         if size in (0, 1):
-            return Alone()
-        from flocsim.ensembles.parallel.mpi import MpiTeam
+            return SerialCommunicator()
+        from flocsim.ensembles.parallel.mpi import MpiCommunicator
 
-        return MpiTeam(size)
+        return MpiCommunicator(size)
     finally:
         INTERRUPTION.held = False

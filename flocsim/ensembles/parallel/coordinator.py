@@ -1,0 +1,158 @@
+"""How rank 0 answers the other ranks while it computes itself, and how they ask it.
+
+Every rank, rank 0 too, runs chunks (`flocsim.ensembles.parallel.worker`) and gets them from an
+object with `exchange` and `is_halted`: rank 0 from its Coordinator, the others from a
+RemoteCoordinator, which sends messages to rank 0's.
+"""
+
+import threading
+import time
+
+import attrs
+
+from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
+from flocsim.ensembles.parallel.messages import Assignment, Dismissal, Halt, Request
+from flocsim.ensembles.parallel.study_state import Phase, StudyState
+from flocsim.interruption import stop_requested
+
+FAREWELL = 5.0
+"""Seconds in which the other ranks leave by themselves, once the study is given up."""
+
+
+@attrs.define(eq=False)
+class Coordinator:
+    """Rank 0's: takes in results and hands out chunks, its own and those of all other ranks.
+
+    A thread serves the others where MPI has threads; elsewhere rank 0 does between two of its own
+    replicates. ``report(remaining)`` tells the user. Of the other ranks ``present`` have not been
+    dismissed yet, ``computing`` have a chunk and no Halt, ``waiting`` want a chunk.
+    """
+
+    comm: Communicator
+    state: StudyState
+    report: object
+    present: int = attrs.field(init=False)
+    computing: set = attrs.Factory(set)
+    waiting: list = attrs.Factory(list)
+    lock: object = attrs.Factory(threading.Lock)
+    thread: object = None
+    error: object = None
+
+    def __attrs_post_init__(self):
+        self.present = self.comm.size - 1
+
+    def start(self):
+        """Begin to serve the other ranks."""
+        self.state.look_at_stages()
+        if self.comm.size > 1 and self.comm.threads:
+            self.thread = threading.Thread(target=self.serve_on, daemon=True)
+            self.thread.start()
+
+    def finish(self):
+        """Serve until all other ranks have been dismissed."""
+        while self.present:
+            self.wait_a_little()
+        if self.thread is not None:
+            self.thread.join()
+
+    def give_up(self):
+        """Dismiss all other ranks, taking nothing in any more; whether they went in time."""
+        self.state.give_up()
+        if self.thread is not None:
+            self.thread.join()
+        until = time.monotonic() + FAREWELL
+        while self.present and time.monotonic() < until:
+            if not self.serve():
+                time.sleep(SLEEP)
+        return self.present == 0
+
+    def exchange(self, result):
+        """Hand in what rank 0 has done, None at first; its next Chunk, None at the end."""
+        self.take_in(result, stop_requested())
+        while (chunk := self.next_chunk()) is None and self.state.is_running:
+            self.wait_a_little()
+        return chunk
+
+    def is_halted(self):
+        """Whether rank 0 is to give up the replicate at hand; serves where no thread does."""
+        if self.error is not None:
+            raise self.error
+        if self.comm.size > 1 and self.thread is None:
+            self.serve()
+        return not self.state.is_running or stop_requested()
+
+    def wait_a_little(self):
+        """Look at what others want, or let the thread do so."""
+        if self.error is not None:
+            raise self.error
+        if self.thread is not None or not self.serve():
+            time.sleep(SLEEP)
+
+    def take_in(self, result, interrupted):
+        with self.lock:
+            if interrupted:
+                self.state.interrupt()
+            if result is not None:
+                self.state.take_in(result)
+                self.report(self.state.schedule.remaining)
+
+    def next_chunk(self):
+        with self.lock:
+            return self.state.next_chunk()
+
+    def serve_on(self):
+        """What the thread does."""
+        try:
+            while self.present and self.state.phase is not Phase.GIVEN_UP:
+                if not self.serve():
+                    time.sleep(SLEEP)
+        except BaseException as error:
+            self.error = error
+
+    def serve(self):
+        """Take in what has come from the other ranks and answer them; whether anything has."""
+        before = len(self.waiting)
+        for rank, request in self.comm.messages():
+            self.computing.discard(rank)
+            self.waiting.append(rank)
+            self.take_in(request.result, request.interrupted)
+        busy = len(self.waiting) > before
+        self.waiting = [rank for rank in self.waiting if not self.answer(rank)]
+        while self.computing and not self.state.is_running:
+            self.comm.send(self.computing.pop(), Halt())
+        return busy
+
+    def answer(self, rank):
+        """Send a rank its next chunk, or home at the end; False where there is neither yet."""
+        chunk = self.next_chunk()
+        if chunk is not None:
+            self.computing.add(rank)
+            self.comm.send(rank, Assignment(chunk))
+        elif self.state.is_running:
+            return False
+        else:
+            self.comm.send(rank, Dismissal())
+            self.present -= 1
+        return True
+
+
+@attrs.define(eq=False)
+class RemoteCoordinator:
+    """The Coordinator as the other ranks see it."""
+
+    comm: Communicator
+    halted: bool = False
+
+    def exchange(self, result):
+        """Hand in what is done; the next Chunk, or None where there is none."""
+        self.comm.send(0, Request(result, stop_requested()))
+        while isinstance(answer := self.comm.receive(0, heed_signals=False), Halt):
+            pass  # it has crossed the request
+        return answer.chunk if isinstance(answer, Assignment) else None
+
+    def is_halted(self):
+        """Whether the replicate at hand is to be given up."""
+        self.comm.take_in()
+        if self.comm.inbox[0]:  # while a rank works, rank 0 says nothing but Halt
+            self.halted = True
+        return self.halted or stop_requested()

@@ -1,0 +1,71 @@
+"""What the ranks say to each other while a study runs.
+
+every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
+rank 0 → another rank         Plan, once (or ExitCode, where the study cannot begin)
+                              Assignment or Dismissal, in answer to a Request
+                              Halt, while it works, when its chunk is of no use any more
+                              ExitCode, after its Dismissal, when all is written
+"""
+
+import attrs
+
+from flocsim.ensembles.chunks import Chunk
+
+
+@attrs.frozen
+class Plan:
+    """How many replicates are to be run, and the key of the study's identity for their records."""
+
+    remaining: int
+    key: str
+
+
+@attrs.frozen
+class ChunkResult:
+    """What came of a chunk: its first ``count`` replicates, as a record of the journal.
+
+    ``data_start``: bytes of the record before the rows; ``failed``: how many replicates have
+    failed; ``notes``: what is known of them.
+    """
+
+    chunk: Chunk
+    count: int
+    record: bytes
+    data_start: int
+    failed: int = 0
+    notes: tuple = ()
+
+
+@attrs.frozen
+class Request:
+    """A rank has finished its chunk (``result`` None: has had none yet) and asks for another.
+
+    ``interrupted``: a signal has asked it to stop.
+    """
+
+    result: ChunkResult | None
+    interrupted: bool
+
+
+@attrs.frozen
+class Assignment:
+    """The next chunk of a rank."""
+
+    chunk: Chunk
+
+
+@attrs.frozen
+class Halt:
+    """Give up the replicate at hand, and hand in what is finished."""
+
+
+@attrs.frozen
+class Dismissal:
+    """There is nothing more to run."""
+
+
+@attrs.frozen
+class ExitCode:
+    """How the run has ended, on all ranks."""
+
+    code: int

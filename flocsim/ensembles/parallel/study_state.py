@@ -1,0 +1,96 @@
+"""What rank 0 knows of a running study: what is finished, what has failed, whether it is enough.
+
+Nothing here sends a message or waits: the same calls give the same state.
+"""
+
+import enum
+
+import attrs
+
+from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.parallel.schedule import Schedule
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.errors import FlocsimError
+
+MOST_NOTES = 1000
+"""Notes on failed replicates that are kept."""
+
+
+class TooManyFailures(FlocsimError):
+    """More replicates have failed than the config allows."""
+
+
+class Phase(enum.Enum):
+    """How far a study is. Chunks are handed out while it is RUNNING, and no more after that."""
+
+    RUNNING = "replicates are missing"
+    INTERRUPTED = "a signal has come; what is finished is still taken in"
+    FINISHED = "all replicates that are needed are there"
+    GIVEN_UP = "an error; nothing is taken in any more"
+
+
+@attrs.define(eq=False)
+class StudyState:
+    """The state of a study while it runs.
+
+    ``is_enough(replicates)``: whether the study may end with so many of each condition;
+    ``allowed``: how many may fail; ``failed``, ``notes``: how many have, and what is known of
+    them; ``computed``: how many this run has taken in.
+    """
+
+    schedule: Schedule
+    store: RowStore
+    is_enough: object
+    allowed: float
+    failed: int = 0
+    notes: list = attrs.Factory(list)
+    computed: int = 0
+    phase: Phase = Phase.RUNNING
+
+    @property
+    def is_running(self):
+        return self.phase is Phase.RUNNING
+
+    def next_chunk(self):
+        """The next Chunk; None where there is none now."""
+        return self.schedule.take() if self.is_running else None
+
+    def take_in(self, result):
+        """Write a ChunkResult down, and see whether that is enough.
+
+        Raises TooManyFailures beyond the allowed number.
+        """
+        if self.phase is Phase.GIVEN_UP:
+            return
+        if result.count:
+            condition, first, _ = result.chunk
+            offset = self.store.journal.append(result.record) + result.data_start
+            self.store.add(condition, first, first + result.count, offset)
+        self.computed += result.count
+        self.schedule.give_back(result.chunk, result.count)
+        self.count_failures(result)
+        self.look_at_stages()
+
+    def count_failures(self, result):
+        self.failed += result.failed
+        self.notes += result.notes[: MOST_NOTES - len(self.notes)]
+        if self.failed > self.allowed:
+            raise TooManyFailures(
+                f"{self.failed} replicates have failed, more than stop.failed allows; the first: "
+                f"{describe_note(self.notes[0]) if self.notes else 'see the journal'}"
+            )
+
+    def look_at_stages(self):
+        """End the study where a finished stage is enough."""
+        for stop in self.schedule.finished_stages():
+            if not self.schedule.stages or self.is_enough(stop):
+                self.phase = Phase.FINISHED
+                self.schedule.end_at(stop)
+
+    def interrupt(self):
+        if self.is_running:
+            self.phase = Phase.INTERRUPTED
+
+    def give_up(self):
+        """An error ends the study."""
+        self.phase = Phase.GIVEN_UP

@@ -1,0 +1,111 @@
+"""The identity of a study: it changes with every file that its rows depend on."""
+
+import ast
+import functools
+import shutil
+
+import pytest
+
+from flocsim.ensembles.storage import identity
+from flocsim.ensembles.storage.identity import PACKAGE, physics_digest, physics_files
+
+ENTRIES = ("ensembles/study.py", "ensembles/collision/encounter.py")
+"""From these files a replicate reaches all that it runs."""
+
+NOT_PHYSICS = {
+    "errors.py": "messages; a row is what comes without an error",
+    "explain/": "text for people",
+    "fingerprint.py": "names what is compiled, and is part of the identity itself",
+    "geometry/fit/": "makes flocs, and these are compared themselves",
+    "io/shapes/library.py": "reads flocs, and these are compared themselves",
+    "io/files.py": "how files are written",
+    "io/journal/records.py": "how rows are stored, sealed by checksums",
+    "ensembles/chunks.py": "how rows are stored; the columns are compared on their own",
+}
+"""What a replicate imports without its rows depending on it, and why."""
+
+
+def file_of(dotted):
+    """The file that a dotted name of flocsim leads to; that of its module where it names a part."""
+    parts = dotted.split(".")[1:]
+    while parts:
+        place = PACKAGE.joinpath(*parts)
+        for path in (place.with_suffix(".py"), place / "__init__.py"):
+            if path.exists():
+                return path
+        parts.pop()
+    return PACKAGE / "__init__.py"
+
+
+def imports_of(path):
+    """The files of flocsim that one imports, inside functions as well."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: a relative import"
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        yield from (file_of(name) for name in names if name.partition(".")[0] == "flocsim")
+
+
+def reached():
+    """Every file of flocsim that a replicate imports, directly or through others."""
+    found, todo = set(), [PACKAGE / entry for entry in ENTRIES]
+    while todo:
+        path = todo.pop()
+        if path not in found:
+            found.add(path)
+            todo += imports_of(path)
+    return {path.relative_to(PACKAGE).as_posix() for path in found}
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the package that may be edited."""
+    folder = tmp_path_factory.mktemp("copy") / "flocsim"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture
+def parsed_once(monkeypatch):
+    """A file that has not been edited need not be parsed again."""
+    monkeypatch.setattr(identity, "essence", functools.cache(identity.essence))
+
+
+def is_exempt(name):
+    """Whether a file stands in NOT_PHYSICS, by itself or by its folder."""
+    return any(name == each or (each[-1] == "/" and name.startswith(each)) for each in NOT_PHYSICS)
+
+
+def test_an_edit_in_any_file_that_rows_depend_on_changes_the_identity(copy, parsed_once):
+    names = {path.relative_to(PACKAGE).as_posix() for path in physics_files()}
+    names |= {name for name in reached() if not is_exempt(name)}
+    assert len(names) > 50
+    before, unseen = physics_digest(copy), []
+    for name in sorted(names):
+        path = copy / name
+        source = path.read_text("utf-8")
+        path.write_text(source + "\nEDITED = 1.0\n", "utf-8")
+        if physics_digest(copy) == before:
+            unseen.append(name)
+        path.write_text(source, "utf-8")
+    assert unseen == [], "add them to PHYSICS, or to NOT_PHYSICS with a reason"
+    assert physics_digest(copy) == before
+
+
+@pytest.mark.parametrize("folder", [name for name in identity.PHYSICS if not name.endswith(".py")])
+def test_a_new_file_in_a_new_room_changes_the_identity(copy, parsed_once, folder):
+    before = physics_digest(copy)
+    room = copy / folder / "new_room"
+    room.mkdir()
+    (room / "fit_of_a_force.py").write_text("STRENGTH = 1.0\n")
+    assert physics_digest(copy) != before
+    shutil.rmtree(room)
+
+
+def test_every_exception_is_still_needed():
+    found = reached()
+    for each in NOT_PHYSICS:
+        assert any(name == each or name.startswith(each) for name in found), each

@@ -1,0 +1,30 @@
+"""The state of a made-up study of one condition, and results of its chunks."""
+
+import numpy as np
+
+from flocsim.ensembles.chunks import ROW, Condition, chunk_record
+from flocsim.ensembles.parallel.messages import ChunkResult
+from flocsim.ensembles.parallel.schedule import Schedule
+from flocsim.ensembles.parallel.study_state import StudyState
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.results.schema import ROW_SIZE
+
+CONDITION = Condition("I", 1, 0.0)
+NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}
+
+
+def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
+    """The state of a study of one condition on one rank, none of it done."""
+    schedule = Schedule.of([[]], list(borders), 1)
+    return StudyState(schedule, RowStore(MemoryJournal(), (CONDITION,)), is_enough, allowed)
+
+
+def result_of(chunk, count=None, failed=0):
+    """The ChunkResult of a chunk, or of its first replicates; steps are the replicates' numbers."""
+    count = chunk.stop - chunk.first if count is None else count
+    rows = np.zeros(count, ROW)
+    rows["steps"] = chunk.first + np.arange(count)
+    record = chunk_record(CONDITION, chunk.first, rows, "key")
+    start = len(record) - count * ROW_SIZE
+    return ChunkResult(chunk, count, record, start, failed, (NOTE,) * failed)
