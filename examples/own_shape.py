@@ -1,39 +1,35 @@
-"""A shape of one's own: a rod, of which flocsim knows no more than its two core points."""
+"""A shape of one's own: a dumbbell, two round lobes joined by a neck."""
 
 import attrs
 import numpy as np
 
+from flocsim import Shape
+from flocsim.errors import ShapeError
 from flocsim.fields import quantity
-from flocsim.geometry.shapes.shape import Shape
 
 
-@attrs.frozen(eq=False)
-class Rod(Shape):
-    """A segment swept by a disk. In an ensemble only length/radius counts: it is scaled to size.
+@attrs.frozen
+class Dumbbell(Shape):
+    """Two lobes, ``length`` [m] between their centres, on a straight neck.
 
-    Parameters: ``length`` L [m] of the segment; ``radius`` r [m] of the disk.
+    Parameters: ``lobe`` and ``neck`` [m], the radius of a lobe and half the width of the neck,
+    both of the outline; ``radius`` [m] < ``neck``, the spheroradius.
     """
 
     length: float = quantity("m", above=0.0)
+    lobe: float = quantity("m", above=0.0)
+    neck: float = quantity("m", above=0.0)
     radius: float = quantity("m", above=0.0)
 
-    @property
-    def vertices(self):
-        """Core points (2, 2) [m] around the centroid."""
-        return np.array([[-0.5 * self.length, 0.0], [0.5 * self.length, 0.0]])
+    def __attrs_post_init__(self):
+        if not self.radius < self.neck < self.lobe < 0.5 * self.length:
+            raise ShapeError("a dumbbell needs radius < neck < lobe < length/2")
 
     @property
-    def area(self):
-        """A = 2 L r + π r² [m²]: a rectangle and two half disks."""
-        return 2.0 * self.length * self.radius + np.pi * self.radius**2
-
-    @property
-    def second_moment(self):
-        """J = ∫ρ² dA about the centroid [m⁴]."""
-        L, r = self.length, self.radius
-        rectangle = L * r * (L**2 + 4.0 * r**2) / 6.0
-        return rectangle + np.pi * r**2 * (L**2 / 4.0 + r**2 / 2.0) + 4.0 * L * r**3 / 3.0
-
-    def scaled(self, factor):
-        """The same rod, ``factor`` times as large."""
-        return Rod(self.length * factor, self.radius * factor)
+    def core(self):
+        """Core points (32, 2) [m]: all that a shape has to give beside its radius."""
+        lobe, neck = self.lobe - self.radius, self.neck - self.radius
+        opening = np.arcsin(neck / lobe)
+        turn = np.linspace(opening, 2.0 * np.pi - opening, 16)
+        left = lobe * np.column_stack([np.cos(turn), np.sin(turn)]) - (0.5 * self.length, 0.0)
+        return np.concatenate([left, -left])

@@ -7,6 +7,7 @@ __version__ = "0.1.0"
 HOMES = {
     "Body": "body",
     "Fluid": "body",
+    "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
     "System": "system",
@@ -14,7 +15,16 @@ HOMES = {
 }
 """Public name → module. Loaded when asked for: a job takes over Ctrl-C before it loads any."""
 
-__all__ = ["Body", "Fluid", "Sphere", "SpheroPolygon", "System", "Trajectory", "__version__"]
+__all__ = [
+    "Body",
+    "Fluid",
+    "Shape",
+    "Sphere",
+    "SpheroPolygon",
+    "System",
+    "Trajectory",
+    "__version__",
+]
 
 
 def __getattr__(name):

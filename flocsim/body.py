@@ -67,7 +67,9 @@ class Fluid:
 def check_shape(instance, attribute, value):
     """attrs validator: the body's shape is a Shape."""
     if not isinstance(value, Shape):
-        raise UsageError(f"shape must be a Sphere or a SpheroPolygon, found {value!r}")
+        raise UsageError(
+            f"shape must be a Sphere or a SpheroPolygon, or a Shape of your own, found {value!r}"
+        )
 
 
 def check_positive_or_none(instance, attribute, value):

@@ -17,9 +17,9 @@ from scipy import stats
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.fit import paper as fit_paper
-from flocsim.geometry.fit.kernels import compiled, count_errors, inset, padded, searched
-from flocsim.geometry.fit.outline import trace_outline
-from flocsim.geometry.fit.search import even_start
+from flocsim.geometry.fit.coverage import compiled, padded
+from flocsim.geometry.fit.search import count_errors, searched
+from flocsim.geometry.fit.starts import even_start, inset, trace_outline
 from flocsim.io.images.masks import read_masks, segment_mask
 
 COUNTS = (4, 8, 16, 28, 64)

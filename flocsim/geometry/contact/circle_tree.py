@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flocsim.arrays import X, Y
-from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 
 LEAF = 2
 """Core points in a run that is not split any more: from this to twice as many."""
@@ -27,17 +27,24 @@ ROUNDING = 1e-13
 """Circles are drawn larger by this share of the outline's size, for the rounding of distances."""
 
 
-def tree_depth(points):
-    """How often that many core points are halved."""
-    return max(points // LEAF, 1).bit_length() - 1
+CIRCLE_X, CIRCLE_Y, CIRCLE_RADIUS = range(3)
+"""Columns of a tree."""
 
 
-def level_runs(points, depth):
-    """Core points (nodes, most) of the runs at a depth; short rows repeat their last point.
+def leaves_of(points):
+    """How many runs that many core points are halved into: a power of two."""
+    leaves = 1
+    while 2 * leaves * LEAF <= points:
+        leaves *= 2
+    return leaves
+
+
+def level_runs(points, nodes):
+    """Core points (nodes, most) of the runs of a level; short rows repeat their last point.
 
     Each run includes the end of its last edge.
     """
-    bounds = (np.arange((1 << depth) + 1) * points) >> depth
+    bounds = np.arange(nodes + 1) * points // nodes
     steps = np.arange(np.diff(bounds).max() + 1)
     return np.minimum(bounds[:-1, None] + steps, bounds[1:, None]) % points
 
@@ -55,15 +62,16 @@ def circles_around(runs, margin):
 def tree_of(vertices):
     """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
 
-    Row 0 holds the depth of the tree; rows that the tree does not fill are 0.
+    Rows that the tree does not fill, row 0 among them, are 0.
     """
     points = len(vertices)
     tree = np.zeros((2 * points, 3))
-    tree[0] = tree_depth(points)
     margin = ROUNDING * np.abs(vertices).max()
-    for depth in range(tree_depth(points) + 1):
-        runs = vertices[level_runs(points, depth)]
-        tree[1 << depth : 2 << depth] = circles_around(runs, margin)
+    nodes = 1
+    while nodes <= leaves_of(points):
+        runs = vertices[level_runs(points, nodes)]
+        tree[nodes : 2 * nodes] = circles_around(runs, margin)
+        nodes *= 2
     return tree
 
 
@@ -99,7 +107,8 @@ def outlines_of(shapes):
 def side_of(outlines, body):
     """(first core point, their number, first row of the tree, leaves) of a body's outline."""
     first = outlines.first[body]
-    return first, outlines.first[body + 1] - first, 2 * first, 1 << int(outlines.tree[2 * first, 0])
+    points = outlines.first[body + 1] - first
+    return first, points, 2 * first, leaves_of(points)
 
 
 def run_of(side, leaf):
@@ -119,20 +128,23 @@ def reversed_pose(pose):
 
 def posed(pose, x, y):
     """A point of one body in the frame of the other."""
-    return pose[0] * x - pose[1] * y + pose[2], pose[1] * x + pose[0] * y + pose[3]
+    c, s, shift_x, shift_y = pose
+    return c * x - s * y + shift_x, s * x + c * y + shift_y
 
 
 def circle_reach(tree, pose, row, other):
     """(squared distance of centres, sum of radii) of two circles, rows of the tree."""
-    x, y = posed(pose, tree[row, 0], tree[row, 1])
-    dx, dy = x - tree[other, 0], y - tree[other, 1]
-    return dx * dx + dy * dy, tree[row, 2] + tree[other, 2]
+    x, y = posed(pose, tree[row, CIRCLE_X], tree[row, CIRCLE_Y])
+    dx, dy = x - tree[other, CIRCLE_X], y - tree[other, CIRCLE_Y]
+    return dx * dx + dy * dy, tree[row, CIRCLE_RADIUS] + tree[other, CIRCLE_RADIUS]
 
 
 def plan_of(tree, side_a, side_b):
     """What steers a walk: first rows and leaves of both trees, radii of their largest circles."""
-    row_a, row_b = side_a[2], side_b[2]
-    return row_a, row_b, side_a[3], side_b[3], tree[row_a + 1, 2], tree[row_b + 1, 2]
+    _, _, row_a, leaves_a = side_a
+    _, _, row_b, leaves_b = side_b
+    size_a, size_b = tree[row_a + 1, CIRCLE_RADIUS], tree[row_b + 1, CIRCLE_RADIUS]
+    return row_a, row_b, leaves_a, leaves_b, size_a, size_b
 
 
 START = (1, 1, 1, 1)
@@ -142,15 +154,30 @@ A walk is over when its first number is 0.
 """
 
 
+def goes_on(walk):
+    """Whether a walk is not over yet."""
+    i, _, _, _ = walk
+    return i > 0
+
+
+def circles_met(tree, pose, plan, walk):
+    """circle_reach of the two nodes."""
+    i, j, _, _ = walk
+    row_a, row_b, _, _, _, _ = plan
+    return circle_reach(tree, pose, row_a + i, row_b + j)
+
+
 def within(tree, pose, plan, walk, distance):
     """Whether the runs of the two nodes can be nearer to each other than a distance."""
-    distance2, radii = circle_reach(tree, pose, plan[0] + walk[0], plan[1] + walk[1])
+    distance2, radii = circles_met(tree, pose, plan, walk)
     return distance2 < (radii + distance) ** 2
 
 
 def at_leaves(plan, walk):
     """Whether neither node can be split."""
-    return walk[2] == plan[2] and walk[3] == plan[3]
+    _, _, level_a, level_b = walk
+    _, _, leaves_a, leaves_b, _, _ = plan
+    return level_a == leaves_a and level_b == leaves_b
 
 
 def descended(plan, walk):
@@ -166,7 +193,7 @@ def descended(plan, walk):
 def passed(plan, walk):
     """The walk at what comes after the two nodes and all below them."""
     i, j, level_a, level_b = walk
-    size_a, size_b = plan[4], plan[5]
+    _, _, _, _, size_a, size_b = plan
     while level_a * level_b > 1:
         # Pieces are split in the order of their sizes, so the smaller piece was split last.
         if level_b == 1 or (level_a > 1 and size_a * level_b < size_b * level_a):
@@ -182,13 +209,14 @@ def passed(plan, walk):
 
 def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
     """The smaller of ``least`` and the squared distances from a's points to b's edges."""
-    edges = side_b[0] + max(edge_count(side_b[1]), 1)
+    first_b, points_b, _, _ = side_b
+    edges = first_b + max(edge_count(points_b), 1)
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
         x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
-            end = edge_end(side_b[0], side_b[1], start)
+            end = edge_end(first_b, points_b, start)
             distance2 = segment_distance2(
                 x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
             )
@@ -198,17 +226,19 @@ def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
 
 def leaf_distance2(vertices, pose, side_a, side_b, walk, least):
     """The smaller of ``least`` and the squared distance of the runs of two leaves."""
-    least = run_distance2(vertices, pose, side_a, walk[0], side_b, walk[1], least)
-    back = reversed_pose(pose)
-    return run_distance2(vertices, back, side_b, walk[1], side_a, walk[0], least)
+    i, j, _, _ = walk
+    least = run_distance2(vertices, pose, side_a, i, side_b, j, least)
+    return run_distance2(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
 
 
 def nearer_child(tree, pose, plan, walk):
     """The walk at that child of the larger piece which seems to be nearer to the other piece."""
+    _, _, level_a, level_b = walk
     child = descended(plan, walk)
-    sibling = (child[0] + (child[2] > walk[2]), child[1] + (child[3] > walk[3]), child[2], child[3])
-    near, radii = circle_reach(tree, pose, plan[0] + child[0], plan[1] + child[1])
-    far, other_radii = circle_reach(tree, pose, plan[0] + sibling[0], plan[1] + sibling[1])
+    i, j, child_a, child_b = child
+    sibling = i + (child_a > level_a), j + (child_b > level_b), child_a, child_b
+    near, radii = circles_met(tree, pose, plan, child)
+    far, other_radii = circles_met(tree, pose, plan, sibling)
     if math.sqrt(near) - radii <= math.sqrt(far) - other_radii:
         return child
     return sibling
@@ -229,7 +259,7 @@ def core_distance(outlines, a, b, pose):
     least2 = leaf_distance2(vertices, pose, side_a, side_b, walk, math.inf)
     least = math.sqrt(least2)
     walk = START
-    while walk[0] > 0:
+    while goes_on(walk):
         if not within(tree, pose, plan, walk, least):
             walk = passed(plan, walk)
         elif at_leaves(plan, walk):

@@ -1,6 +1,6 @@
 """Which vertex–edge pairs of two bodies are near each other, and how near the two outlines are.
 
-Both trees of circles are walked against each other (see hierarchy.py), in the frame of one body.
+Both trees of circles are walked against each other (see circle_tree.py), in the frame of one body.
 """
 
 import math
@@ -25,6 +25,7 @@ from flocsim.geometry.contact.circle_tree import (
     at_leaves,
     core_distance,
     descended,
+    goes_on,
     passed,
     plan_of,
     posed,
@@ -33,7 +34,7 @@ from flocsim.geometry.contact.circle_tree import (
     side_of,
     within,
 )
-from flocsim.geometry.contact.segments import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
 
 
@@ -65,14 +66,15 @@ def add_pair(work, a, point, b, start, end):
 def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
     """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
     vertices = scene.vertices
-    edges = side_b[0] + edge_count(side_b[1])
+    first_b, points_b, _, _ = side_b
+    edges = first_b + edge_count(points_b)
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
         x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
-            end = edge_end(side_b[0], side_b[1], start)
+            end = edge_end(first_b, points_b, start)
             distance2 = segment_distance2(
                 x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
             )
@@ -85,7 +87,9 @@ def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach)
 def list_polygons(scene, work, a, b, cutoff):
     """List the pairs of two bodies, both ways round; False for a full list."""
     side_a, side_b = side_of(scene, a), side_of(scene, b)
-    if side_a[1] == 1 and side_b[1] == 1:
+    _, points_a, _, _ = side_a
+    _, points_b, _, _ = side_b
+    if points_a == 1 and points_b == 1:
         return list_spheres(scene, work, a, b, cutoff)
     reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
     pose = pose_of(work, a, b)
@@ -93,14 +97,13 @@ def list_polygons(scene, work, a, b, cutoff):
     plan = plan_of(scene.tree, side_a, side_b)
     walk = START
     room = True
-    while walk[0] > 0 and room:
+    while goes_on(walk) and room:
         if not within(scene.tree, pose, plan, walk, reach):
             walk = passed(plan, walk)
         elif at_leaves(plan, walk):
-            room = list_one_way(scene, work, pose, a, b, side_a, walk[0], side_b, walk[1], reach)
-            room = room and list_one_way(
-                scene, work, back, b, a, side_b, walk[1], side_a, walk[0], reach
-            )
+            i, j, _, _ = walk
+            room = list_one_way(scene, work, pose, a, b, side_a, i, side_b, j, reach)
+            room = room and list_one_way(scene, work, back, b, a, side_b, j, side_a, i, reach)
             walk = passed(plan, walk)
         else:
             walk = descended(plan, walk)

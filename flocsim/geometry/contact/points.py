@@ -36,7 +36,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
-from flocsim.geometry.contact.segments import closest_share
+from flocsim.geometry.shapes.cores import closest_share
 from flocsim.hooks import hook
 
 TINY = 1e-300

@@ -4,36 +4,21 @@ Pixel coordinates, x = column, y = row (downwards).  A polygon covers a pixel wh
 inside its core (odd number of edges to the right) or within the spheroradius of an edge.  Both
 counts are kept per pixel, so that a moved vertex needs only its two edges recounted.
 
-Plain Python on scalars and arrays; flocsim.geometry.fit.search compiles it.
+Kernels are plain Python on scalars and arrays; ``compiled`` makes them fast.
 """
+
+from functools import cache
 
 import numpy as np
 
-
-def squared_distance(x, y, ax, ay, bx, by):
-    """Squared distance of the point (x, y) from the segment a–b."""
-    ux, uy = bx - ax, by - ay
-    wx, wy = x - ax, y - ay
-    length = ux * ux + uy * uy
-    share = (wx * ux + wy * uy) / length if length > 0.0 else 0.0
-    share = min(1.0, max(0.0, share))
-    dx, dy = wx - share * ux, wy - share * uy
-    return dx * dx + dy * dy
+from flocsim.compiler.composer import compose
+from flocsim.geometry.shapes.cores import is_near
 
 
-def is_near(x, y, ax, ay, bx, by, limit):
-    """Whether (x, y) is within √limit of the segment a–b; squared_distance without dividing."""
-    ux, uy = bx - ax, by - ay
-    wx, wy = x - ax, y - ay
-    along = wx * ux + wy * uy
-    if along <= 0.0:
-        return wx * wx + wy * wy <= limit
-    length = ux * ux + uy * uy
-    if along >= length:
-        wx, wy = x - bx, y - by
-        return wx * wx + wy * wy <= limit
-    across = wx * uy - wy * ux
-    return across * across <= limit * length
+@cache
+def compiled(kernel):
+    """A kernel of a fit, compiled on first use and kept on disk."""
+    return compose(kernel, {}, allocates=True)
 
 
 def crossing(ax, ay, bx, by, y):
@@ -93,10 +78,26 @@ def count_wrong(mask, odd, near):
     return wrong, excess
 
 
-def count_errors(mask, vertices, radius):
-    """V of the polygon `vertices` (N, 2) swept by `radius` [px], against a (h, w) bool mask."""
-    odd, near = cover(vertices, radius, mask.shape)
-    return count_wrong(mask, odd, near)[0]
+def covered(shape, vertices, radius):
+    """The pixels (h, w) bool whose centres the swept polygon covers."""
+    odd, near = compiled(cover)(np.array(vertices), radius, shape)
+    return odd | (near > 0)
+
+
+def padded(mask, count, radius):
+    """The mask with room around it for the swept polygon, and the width of that margin [px]."""
+    margin = int(np.ceil(radius)) + 6 + count // 100
+    return np.pad(mask, margin), margin
+
+
+def neighbours(vertices, k):
+    """The places of vertex k − 1, k and k + 1."""
+    after = (k + 1) % len(vertices)
+    return (
+        (vertices[k - 1, 0], vertices[k - 1, 1]),
+        (vertices[k, 0], vertices[k, 1]),
+        (vertices[after, 0], vertices[after, 1]),
+    )
 
 
 def row_reach(ax, ay, bx, by, row, radius):
@@ -122,49 +123,50 @@ def move_vertex(mask, odd, near, before, old, after, new, radius, keep):
     the two where just one of the four edges' ends lies across the row.
     """
     reach = radius + 1e-6
-    top = min(min(before[1], after[1]), min(old[1], new[1])) - reach
-    bottom = max(max(before[1], after[1]), max(old[1], new[1])) + reach
+    (before_x, before_y), (after_x, after_y) = before, after
+    (old_x, old_y), (new_x, new_y) = old, new
+    top = min(min(before_y, after_y), min(old_y, new_y)) - reach
+    bottom = max(max(before_y, after_y), max(old_y, new_y)) + reach
     change, growth = 0, 0
     ends = before, old, after, new
     for row in range(first_pixel(top, len(mask)), first_pixel(bottom, len(mask))):
-        a1, a2 = row_reach(before[0], before[1], old[0], old[1], row, reach)
-        b1, b2 = row_reach(before[0], before[1], new[0], new[1], row, reach)
-        c1, c2 = row_reach(old[0], old[1], after[0], after[1], row, reach)
-        d1, d2 = row_reach(new[0], new[1], after[0], after[1], row, reach)
+        a1, a2 = row_reach(before_x, before_y, old_x, old_y, row, reach)
+        b1, b2 = row_reach(before_x, before_y, new_x, new_y, row, reach)
+        c1, c2 = row_reach(old_x, old_y, after_x, after_y, row, reach)
+        d1, d2 = row_reach(new_x, new_y, after_x, after_y, row, reach)
         first1, last1 = min(a1, b1), max(a2, b2)
         first2, last2 = min(c1, d1), max(c2, d2)
         apart = first1 > last2 or first2 > last1
-        if apart and (old[1] > row) == (new[1] > row):
-            one = change_in_row(mask, odd, near, ends, radius, keep, row, first1, last1)
-            two = change_in_row(mask, odd, near, ends, radius, keep, row, first2, last2)
-            change, growth = change + one[0] + two[0], growth + one[1] + two[1]
+        if apart and (old_y > row) == (new_y > row):
+            more, wider = change_in_row(mask, odd, near, ends, radius, keep, row, first2, last2)
+            change, growth = change + more, growth + wider
         else:
-            first, last = min(first1, first2), max(last1, last2)
-            one = change_in_row(mask, odd, near, ends, radius, keep, row, first, last)
-            change, growth = change + one[0], growth + one[1]
+            first1, last1 = min(first1, first2), max(last1, last2)
+        more, wider = change_in_row(mask, odd, near, ends, radius, keep, row, first1, last1)
+        change, growth = change + more, growth + wider
     return change, growth
 
 
 def change_in_row(mask, odd, near, ends, radius, keep, row, first, last):
     """move_vertex's share of the pixels of a row with first ≤ x ≤ last."""
-    before, old, after, new = ends
+    (before_x, before_y), (old_x, old_y), (after_x, after_y), (new_x, new_y) = ends
     columns = mask.shape[1]
     limit = radius * radius
-    x1 = crossing(before[0], before[1], old[0], old[1], row)
-    x2 = crossing(old[0], old[1], after[0], after[1], row)
-    x3 = crossing(before[0], before[1], new[0], new[1], row)
-    x4 = crossing(new[0], new[1], after[0], after[1], row)
+    x1 = crossing(before_x, before_y, old_x, old_y, row)
+    x2 = crossing(old_x, old_y, after_x, after_y, row)
+    x3 = crossing(before_x, before_y, new_x, new_y, row)
+    x4 = crossing(new_x, new_y, after_x, after_y, row)
     change, growth = 0, 0
     for column in range(first_pixel(first, columns), first_pixel(last, columns)):
         flip = (column < x1) ^ (column < x2) ^ (column < x3) ^ (column < x4)
         extra = 0
-        if is_near(column, row, before[0], before[1], old[0], old[1], limit):
+        if is_near(column, row, before_x, before_y, old_x, old_y, limit):
             extra -= 1
-        if is_near(column, row, old[0], old[1], after[0], after[1], limit):
+        if is_near(column, row, old_x, old_y, after_x, after_y, limit):
             extra -= 1
-        if is_near(column, row, before[0], before[1], new[0], new[1], limit):
+        if is_near(column, row, before_x, before_y, new_x, new_y, limit):
             extra += 1
-        if is_near(column, row, new[0], new[1], after[0], after[1], limit):
+        if is_near(column, row, new_x, new_y, after_x, after_y, limit):
             extra += 1
         if not flip and extra == 0:
             continue

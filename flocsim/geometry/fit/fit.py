@@ -7,7 +7,11 @@ import numpy as np
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
-from flocsim.geometry.fit.outline import require_one_region
+from flocsim.geometry.fit.coverage import compiled, covered, padded
+from flocsim.geometry.fit.paper import paper_fit
+from flocsim.geometry.fit.search import AREA, INSCRIBED, PLAIN, count_errors, pattern_fit
+from flocsim.geometry.fit.simple import simple_inset
+from flocsim.geometry.fit.starts import even_start
 from flocsim.geometry.shapes.resize import core_factor
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
@@ -65,7 +69,7 @@ def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=Fals
     "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region
     or too thin to inscribe a shape in, UsageError for a wrong option.
     """
-    mask = require_one_region(mask)
+    mask = _require_one_region(mask)
     _check_options(vertices, radius, method)
     if vertices == 1:
         return _equal_area_circle(mask)
@@ -75,6 +79,19 @@ def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=Fals
         _require_room(mask, radius)
     _warn_if_coarse(mask, radius)
     return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area, inscribed)
+
+
+def _require_one_region(mask):
+    """The mask as a bool array; ShapeError unless it holds just one 8-connected region."""
+    from scipy.ndimage import label
+
+    mask = np.asarray(mask)
+    if mask.ndim != 2 or not np.isin(mask, (0, 1)).all():
+        raise ShapeError(f"a mask is an (h, w) array of 0 and 1, found shape {mask.shape}")
+    regions = label(mask, structure=np.ones((3, 3)))[1]
+    if regions != 1:
+        raise ShapeError(f"a mask must hold one floc, found {regions} separate regions")
+    return mask.astype(bool)
 
 
 def _check_options(vertices, radius, method):
@@ -146,9 +163,6 @@ def _settled(mask, points, radius, area):
 
     Pixel centres leave an outline about half a pixel of play; V does not say where in it to be.
     """
-    from flocsim.geometry.fit.kernels import compiled
-    from flocsim.geometry.fit.simple import simple_inset
-
     wrong = _wrong_pixels(mask, points, radius)
     perimeter = np.hypot(*(np.roll(points, -1, axis=0) - points).T).sum() + 2.0 * np.pi * radius
     for share in (1.0, 0.5, 0.25):
@@ -161,11 +175,6 @@ def _settled(mask, points, radius, area):
 
 def _find(mask, count, radius, method, preserve_area, inscribed):
     """The vertices (N, 2) as x, y-down [px] that a method leads to."""
-    from flocsim.geometry.fit.kernels import padded
-    from flocsim.geometry.fit.paper import paper_fit
-    from flocsim.geometry.fit.pattern import AREA, INSCRIBED, PLAIN
-    from flocsim.geometry.fit.search import even_start, pattern_fit
-
     room, margin = padded(mask, count, radius)
     if method == "pattern":
         weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
@@ -176,8 +185,6 @@ def _find(mask, count, radius, method, preserve_area, inscribed):
 
 def _wrong_pixels(mask, points, radius):
     """V, counted on an array that the whole shape fits in."""
-    from flocsim.geometry.fit.kernels import count_errors
-
     margin = _margin(mask, points, radius)
     return count_errors(np.pad(mask, margin), points + margin, radius)
 
@@ -189,8 +196,6 @@ def _margin(mask, points, radius):
 
 def _require_inside(mask, points, radius):
     """ShapeError if the shape covers pixels that are not the mask's."""
-    from flocsim.geometry.fit.kernels import covered
-
     margin = _margin(mask, points, radius)
     cover = covered(np.pad(mask, margin).shape, points + margin, radius)
     outside = np.count_nonzero(cover & ~np.pad(mask, margin))

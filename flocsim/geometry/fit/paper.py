@@ -8,9 +8,8 @@ than a fraction of a pixel, even spacing, and no lower V for a while.
 
 import numpy as np
 
-from flocsim.geometry.fit.coverage import count_wrong, cover, move_vertex
-from flocsim.geometry.fit.kernels import compiled
-from flocsim.geometry.fit.pattern import leaves_room
+from flocsim.geometry.fit.coverage import compiled, count_wrong, cover, move_vertex, neighbours
+from flocsim.geometry.fit.search import leaves_room
 from flocsim.geometry.fit.simple import stays_simple
 
 FORCE = 0.5
@@ -29,24 +28,14 @@ PATIENCE = 200
 """Steps without a lower V after which it counts as the minimum: forty relaxation times."""
 
 
-def neighbours(vertices, k):
-    """The places of vertex k − 1, k and k + 1."""
-    after = (k + 1) % len(vertices)
-    return (
-        (vertices[k - 1, 0], vertices[k - 1, 1]),
-        (vertices[k, 0], vertices[k, 1]),
-        (vertices[after, 0], vertices[after, 1]),
-    )
-
-
 def gradient(mask, odd, near, vertices, k, radius, spacing):
     """∇V [pixels/px] of vertex k by central differences."""
     before, here, after = neighbours(vertices, k)
     x, y = here
-    right = move_vertex(mask, odd, near, before, here, after, (x + spacing, y), radius, False)[0]
-    left = move_vertex(mask, odd, near, before, here, after, (x - spacing, y), radius, False)[0]
-    down = move_vertex(mask, odd, near, before, here, after, (x, y + spacing), radius, False)[0]
-    up = move_vertex(mask, odd, near, before, here, after, (x, y - spacing), radius, False)[0]
+    right, _ = move_vertex(mask, odd, near, before, here, after, (x + spacing, y), radius, False)
+    left, _ = move_vertex(mask, odd, near, before, here, after, (x - spacing, y), radius, False)
+    down, _ = move_vertex(mask, odd, near, before, here, after, (x, y + spacing), radius, False)
+    up, _ = move_vertex(mask, odd, near, before, here, after, (x, y - spacing), radius, False)
     return 0.5 * (right - left) / spacing, 0.5 * (down - up) / spacing
 
 
@@ -56,13 +45,15 @@ def advance(mask, odd, near, vertices, velocities, k, radius, step):
     Returns the change of V.
     """
     before, here, after = neighbours(vertices, k)
-    new = here[0] + step * velocities[k, 0], here[1] + step * velocities[k, 1]
-    room = leaves_room(mask.shape, new, radius + SPACING + 1.0)
-    if not (room and stays_simple(vertices, k, new[0], new[1])):
+    x = vertices[k, 0] + step * velocities[k, 0]
+    y = vertices[k, 1] + step * velocities[k, 1]
+    room = leaves_room(mask.shape, (x, y), radius + SPACING + 1.0)
+    if not (room and stays_simple(vertices, k, x, y)):
         velocities[k] = 0.0
         return 0
-    vertices[k, 0], vertices[k, 1] = new
-    return move_vertex(mask, odd, near, before, here, after, new, radius, True)[0]
+    vertices[k, 0], vertices[k, 1] = x, y
+    change, _ = move_vertex(mask, odd, near, before, here, after, (x, y), radius, True)
+    return change
 
 
 def damped_descent(mask, vertices, radius, force, damping, spacing, step, patience):

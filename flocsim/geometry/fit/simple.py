@@ -1,23 +1,12 @@
-"""Keeping a polygon simple while its vertices move: plain Python, compiled by fit_search."""
+"""Keeping a polygon simple while its vertices move: kernels, and what calls them compiled."""
 
 import numpy as np
 
-from flocsim.geometry.fit.coverage import squared_distance
+from flocsim.geometry.fit.coverage import compiled
+from flocsim.geometry.shapes.cores import segment_distance2, segments_cross
 
 CLEARANCE = 0.01
 """Least distance [px] between a vertex and an edge not its own: simple polygons stay simple."""
-
-
-def side(ax, ay, bx, by, x, y):
-    """Twice the signed area of the triangle a, b, (x, y)."""
-    return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
-
-
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-    """Whether the segments a–b and c–d cross at an inner point of both."""
-    return (side(ax, ay, bx, by, cx, cy) > 0.0) != (side(ax, ay, bx, by, dx, dy) > 0.0) and (
-        side(cx, cy, dx, dy, ax, ay) > 0.0
-    ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
 
 
 def edge_is_clear(vertices, start, stop, moved, x, y):
@@ -35,13 +24,13 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
         cx, cy = vertices[k]
         if k in (start, stop):
             continue
-        if squared_distance(cx, cy, ax, ay, bx, by) < limit:
+        if segment_distance2(cx, cy, ax, ay, bx, by) < limit:
             return False
         following = (k + 1) % count
         if following in (start, stop):
             continue
         dx, dy = vertices[following]
-        if squared_distance(x, y, cx, cy, dx, dy) < limit:
+        if segment_distance2(x, y, cx, cy, dx, dy) < limit:
             return False
         if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
             return False
@@ -57,22 +46,12 @@ def stays_simple(vertices, k, x, y):
     )
 
 
-def is_simple(vertices):
+def all_clear(vertices):
     """Whether no edges cross and every vertex is clear of the edges that are not its own."""
     for k in range(len(vertices)):
         if not stays_simple(vertices, k, vertices[k, 0], vertices[k, 1]):
             return False
     return True
-
-
-def edges_cross(vertices, first, second):
-    """Whether the edges that begin at the vertices `first` and `second` cross."""
-    count = len(vertices)
-    ax, ay = vertices[first]
-    bx, by = vertices[(first + 1) % count]
-    cx, cy = vertices[second]
-    dx, dy = vertices[(second + 1) % count]
-    return segments_cross(ax, ay, bx, by, cx, cy, dx, dy)
 
 
 def reverse(vertices, first, last):
@@ -97,7 +76,11 @@ def untangle(vertices):
         crossed = False
         for first in range(count - 2):
             for second in range(first + 2, count - (first == 0)):
-                if edges_cross(vertices, first, second):
+                ax, ay = vertices[first]
+                bx, by = vertices[first + 1]
+                cx, cy = vertices[second]
+                dx, dy = vertices[(second + 1) % count]
+                if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
                     reverse(vertices, first + 1, second)
                     crossed = True
         if not crossed:
@@ -136,9 +119,15 @@ def draw_in(vertices, depth):
 
 def simple_inset(vertices, depth):
     """Untangle the polygon and draw it in by `depth` [px], in place; whether that succeeded."""
-    if not is_simple(vertices):
+    if not all_clear(vertices):
         untangle(vertices)
-        if not is_simple(vertices):
+        if not all_clear(vertices):
             return False
     draw_in(vertices, depth)
     return True
+
+
+def is_simple(vertices):
+    """Whether no edges cross or nearly touch: simple_inset leaves such a polygon as it is."""
+    drawn = np.array(vertices)
+    return bool(compiled(simple_inset)(drawn, 0.0)) and np.array_equal(drawn, vertices)

@@ -1,6 +1,77 @@
-"""Cores as arrays of points: edges, area, distances, inside or outside."""
+"""Cores as points and edges: distances, areas, crossings, inside or outside.
+
+The one place for what is between points and edges, twice at most: on scalars, for kernels, which
+run compiled or not, and on arrays of points.
+"""
 
 import numpy as np
+
+
+def closest_share(px, py, ax, ay, bx, by):
+    """Where the point of segment a–b nearest to p lies: 0 at a, 1 at b; 0 for a point a = b."""
+    dx = bx - ax
+    dy = by - ay
+    length2 = dx * dx + dy * dy
+    if length2 == 0.0:
+        return 0.0
+    share = ((px - ax) * dx + (py - ay) * dy) / length2
+    return min(max(share, 0.0), 1.0)
+
+
+def segment_distance2(px, py, ax, ay, bx, by):
+    """Squared distance [m²] from point p to segment a–b."""
+    share = closest_share(px, py, ax, ay, bx, by)
+    dx = px - (ax + share * (bx - ax))
+    dy = py - (ay + share * (by - ay))
+    return dx * dx + dy * dy
+
+
+def is_near(px, py, ax, ay, bx, by, limit):
+    """Whether p is within √limit of segment a–b, without a division.
+
+    Exact on whole numbers, where centres of pixels often lie just at the limit.
+    """
+    ux, uy = bx - ax, by - ay
+    wx, wy = px - ax, py - ay
+    along = wx * ux + wy * uy
+    if along <= 0.0:
+        return wx * wx + wy * wy <= limit
+    length2 = ux * ux + uy * uy
+    if along >= length2:
+        wx, wy = px - bx, py - by
+        return wx * wx + wy * wy <= limit
+    across = wx * uy - wy * ux
+    return across * across <= limit * length2
+
+
+def side(ax, ay, bx, by, px, py):
+    """Twice the signed area of the triangle a, b, p: above 0 where p is to the left of a–b."""
+    return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
+
+
+def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+    """Whether the segments a–b and c–d cross at an inner point of both."""
+    return (side(ax, ay, bx, by, cx, cy) > 0.0) != (side(ax, ay, bx, by, dx, dy) > 0.0) and (
+        side(cx, cy, dx, dy, ax, ay) > 0.0
+    ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
+
+
+def edge_count(points):
+    """Edges of a core of that many points: none, one, or as many as points."""
+    if points < 3:
+        return points - 1
+    return points
+
+
+def edge_end(first, points, start):
+    """The core point at which the edge that begins at ``start`` ends.
+
+    ``first`` is the first of the body's core points, ``points`` their number.
+    """
+    following = start + 1
+    if following == first + points:
+        return first
+    return following
 
 
 def edges_of(vertices):
@@ -29,13 +100,18 @@ def signed_area(vertices):
     return 0.5 * np.sum(cross(vertices, np.roll(vertices, -1, axis=0)))
 
 
-def distance_to_edges(points, starts, ends):
-    """Distances (k, edges) from points (k, 2) to each edge."""
+def from_edges(points, starts, ends):
+    """Vectors (k, edges, 2) from the nearest place of each edge to each of the points (k, 2)."""
     along = ends - starts
     relative = points[:, None, :] - starts[None]
     share = np.einsum("kej,ej->ke", relative, along) / np.einsum("ej,ej->e", along, along)
-    gap = relative - np.clip(share, 0.0, 1.0)[..., None] * along[None]
-    return np.hypot(gap[..., 0], gap[..., 1])
+    return relative - np.clip(share, 0.0, 1.0)[..., None] * along[None]
+
+
+def distance_to_edges(points, starts, ends):
+    """Distances (k, edges) from points (k, 2) to each edge."""
+    away = from_edges(points, starts, ends)
+    return np.hypot(away[..., 0], away[..., 1])
 
 
 def inside_polygon(points, vertices):
@@ -48,3 +124,15 @@ def inside_polygon(points, vertices):
     rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
     crossing = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
     return np.count_nonzero(straddles & (x < crossing), axis=1) % 2 == 1
+
+
+def cores_cross(a, b):
+    """Whether any edge of core a properly crosses any edge of core b."""
+    (p, q), (r, s) = edges_of(a), edges_of(b)
+    p, q = p[:, None], q[:, None]
+
+    def signs(origin, end, point):
+        return np.sign(cross(end - origin, point - origin))
+
+    apart = signs(p, q, r) * signs(p, q, s) < 0
+    return bool(np.any(apart & (signs(r, s, p) * signs(r, s, q) < 0)))

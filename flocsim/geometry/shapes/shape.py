@@ -1,35 +1,81 @@
-"""Shape: what every body outline has, core points swept by a disk."""
+"""Shape: what every body outline has, core points swept by a disk, and what follows from them."""
 
-from abc import ABC, abstractmethod
+from functools import cached_property
+from inspect import getattr_static
+from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.geometry.shapes.outline import swept_rings
+from flocsim.errors import ShapeError
+from flocsim.fields import is_number
+from flocsim.geometry.shapes.cores import signed_area
+from flocsim.geometry.shapes.moments import swept_moments
+from flocsim.geometry.shapes.outline import require_simple, swept_rings
+
+TOO_CLOSE = 1e-12
+"""Core points nearer than this share of the core's extent count as repeated."""
 
 
-class Shape(ABC):
-    """Core points (N, 2) [m] around the centroid, swept by a disk of ``radius`` [m].
+class Swept(NamedTuple):
+    """What follows from a core and a radius.
 
-    All shapes are one family: a sphere is one core point. Shapes are frozen; the centroid of the
-    swept area is the origin of the shape's frame.
+    Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
+    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴].
     """
 
     vertices: np.ndarray
+    centroid: np.ndarray
+    area: float
+    second_moment: float
+
+
+class Shape:
+    """Core points swept by a disk: all that the disk covers while its centre goes over the core.
+
+    All shapes are one family: a sphere is one core point.
+
+    A shape of one's own is a frozen subclass that gives two things, each a field or a property
+    (examples/own_shape.py):
+
+    - ``core``: (N, 2) [m], one point, the two ends of a segment, or the corners of a simple
+      polygon, convex or not, in any frame and either sense;
+    - ``radius`` [m] > 0, the spheroradius.
+
+    All the rest follows, is computed once, and is the same for the same core: ``vertices``, the
+    core points around the centroid of the swept area, which is the origin of the shape's frame,
+    ``area`` and ``second_moment``. ShapeError where the core is no such polygon.
+    """
+
+    core: np.ndarray
     radius: float
 
+    @cached_property
+    def swept(self):
+        """The Swept of this core and radius."""
+        for name in ("core", "radius"):
+            if getattr_static(self, name, None) is None:
+                raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
+        return swept_by(read_points("core", self.core), positive_radius(self.radius))
+
     @property
-    @abstractmethod
+    def vertices(self):
+        """Core points (N, 2) [m] around the centroid, counter-clockwise, read-only."""
+        return self.swept.vertices
+
+    @property
+    def centroid(self):
+        """Where the centroid of the swept area lies in the frame of the core given (2,) [m]."""
+        return self.swept.centroid
+
+    @property
     def area(self):
         """Area A of the swept outline [m²]."""
+        return self.swept.area
 
     @property
-    @abstractmethod
     def second_moment(self):
         """Second moment of area J = ∫ρ² dA about the centroid [m⁴]."""
-
-    @abstractmethod
-    def scaled(self, factor):
-        """The same shape, ``factor`` times as large."""
+        return self.swept.second_moment
 
     @property
     def equivalent_radius(self):
@@ -41,6 +87,12 @@ class Shape(ABC):
         """R, the largest distance from the centroid to the outline [m]."""
         return float(np.hypot(*self.vertices.T).max() + self.radius)
 
+    def scaled(self, factor):
+        """The same outline, ``factor`` times as large: a Sphere or a SpheroPolygon."""
+        from flocsim.geometry.shapes.spheropolygon import scaled_outline
+
+        return scaled_outline(self, factor)
+
     def placed_vertices(self, x=0.0, y=0.0, angle=0.0):
         """Core points (N, 2) [m] of the body at (x, y), turned by ``angle`` [rad]."""
         c, s = np.cos(angle), np.sin(angle)
@@ -49,3 +101,65 @@ class Shape(ABC):
     def outline(self, x=0.0, y=0.0, angle=0.0, points_per_quadrant=16):
         """Closed rings [(k, 2), …] of the placed outline, for drawing; the outer one first."""
         return swept_rings(self.placed_vertices(x, y, angle), self.radius, points_per_quadrant)
+
+
+def swept_by(core, radius):
+    """The Swept of core points (N, 2) and a radius [m]; ShapeError where they make no body."""
+    if len(core) > 1:
+        require_distinct(core)
+    if len(core) > 2:
+        require_simple(core)
+        if signed_area(core - core.mean(axis=0)) < 0.0:
+            # Counter-clockwise, the first one kept.
+            core = np.roll(core[::-1], 1, axis=0)
+    # A unit-sized copy keeps fourth powers of micrometres far from underflow.
+    extent = np.ptp(core, axis=0).max() + radius
+    area, centroid, moment = swept_moments(core / extent, radius / extent)
+    centroid = centroid * extent
+    vertices = read_only(core - centroid)
+    return Swept(vertices, centroid, float(area * extent**2), float(moment * extent**4))
+
+
+def read_only(array):
+    """The array, which must not be written to any more."""
+    array.flags.writeable = False
+    return array
+
+
+def positive_radius(radius):
+    """``radius`` as a float; ShapeError unless it is a finite number above 0."""
+    if isinstance(radius, np.generic):
+        radius = radius.item()
+    if not is_number(radius) or radius <= 0.0:
+        raise ShapeError(f"the radius must be a finite number above 0 (metres), found {radius!r}")
+    return float(radius)
+
+
+def read_points(name, points, fewest=1):
+    """``points`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
+    try:
+        array = np.array(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} must be numbers of shape (N, 2): {error}") from None
+    if array.ndim != 2 or array.shape[1] != 2 or len(array) < fewest:
+        advice = "; for one point use Sphere" if fewest == 2 else ""
+        raise ShapeError(
+            f"{name} must have shape (N, 2) with N ≥ {fewest}, found {array.shape}{advice}"
+        )
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise ShapeError(f"vertex {row} is not finite: {tuple(array[row].tolist())}")
+    return array
+
+
+def require_distinct(vertices):
+    """Raise ShapeError where two neighbouring vertices coincide."""
+    extent = np.ptp(vertices, axis=0).max()
+    steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
+    repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)
+    if len(repeated):
+        k = int(repeated[0])
+        raise ShapeError(
+            f"vertices {k} and {(k + 1) % len(vertices)} repeat the same point "
+            f"{tuple(vertices[k].tolist())}; leave one out"
+        )

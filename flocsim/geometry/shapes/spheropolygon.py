@@ -4,61 +4,24 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.moments import swept_moments
-from flocsim.geometry.shapes.outline import require_simple
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import positive_radius
-
-TOO_CLOSE = 1e-12
-"""Vertices nearer than this share of the polygon's extent count as repeated."""
+from flocsim.geometry.shapes.shape import (
+    Shape,
+    Swept,
+    positive_radius,
+    read_only,
+    read_points,
+    swept_by,
+)
+from flocsim.geometry.shapes.sphere import Sphere
 
 
 def read_vertices(vertices):
-    """``vertices`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
-    try:
-        array = np.array(vertices, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"vertices must be numbers of shape (N, 2): {error}") from None
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) < 2:
-        raise ShapeError(
-            f"vertices must have shape (N, 2) with N ≥ 2, found {array.shape}; "
-            "for one point use Sphere"
-        )
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise ShapeError(f"vertex {row} is not finite: {tuple(array[row].tolist())}")
-    return array
+    """``vertices`` as a fresh (N, 2) float array, N ≥ 2; ShapeError for another form."""
+    return read_points("vertices", vertices, fewest=2)
 
 
-def require_distinct(vertices):
-    """Raise ShapeError where two neighbouring vertices coincide."""
-    extent = np.ptp(vertices, axis=0).max()
-    steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
-    repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)
-    if len(repeated):
-        k = int(repeated[0])
-        raise ShapeError(
-            f"vertices {k} and {(k + 1) % len(vertices)} repeat the same point "
-            f"{tuple(vertices[k].tolist())}; leave one out"
-        )
-
-
-def counter_clockwise(vertices):
-    """The polygon's vertices in counter-clockwise order, the first one kept."""
-    if len(vertices) > 2 and signed_area(vertices - vertices.mean(axis=0)) < 0.0:
-        return np.roll(vertices[::-1], 1, axis=0)
-    return vertices
-
-
-def positive_factor(factor):
-    """``factor`` as a float; ShapeError unless it is a finite number above 0."""
-    if not np.isfinite(factor) or factor <= 0.0:
-        raise ShapeError(f"a shape can be scaled by a finite factor above 0, found {factor!r}")
-    return float(factor)
-
-
-@attrs.frozen(eq=False)
+# A dictionary, not slots: a copy keeps what has been computed.
+@attrs.frozen(eq=False, slots=False)
 class SpheroPolygon(Shape):
     """Minkowski sum of a simple polygon, convex or not, and a disk.
 
@@ -69,43 +32,32 @@ class SpheroPolygon(Shape):
     Raises ShapeError for repeated or non-finite vertices, crossing edges, a non-positive radius.
     """
 
-    vertices: np.ndarray = attrs.field(converter=read_vertices)
+    core: np.ndarray = attrs.field(converter=read_vertices, alias="vertices")
     radius: float = attrs.field(converter=positive_radius)
-    centroid: np.ndarray = attrs.field(init=False, repr=False)
-    area: float = attrs.field(init=False, repr=False)
-    second_moment: float = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self):
-        require_distinct(self.vertices)
-        if len(self.vertices) > 2:
-            require_simple(self.vertices)
-        vertices = counter_clockwise(self.vertices)
-        # A unit-sized copy keeps fourth powers of micrometres far from underflow.
-        extent = np.ptp(vertices, axis=0).max() + self.radius
-        area, centroid, moment = swept_moments(vertices / extent, self.radius / extent)
-        centred = vertices - centroid * extent
-        centred.flags.writeable = False
-        for name, value in (
-            ("vertices", centred),
-            ("centroid", centroid * extent),
-            ("area", float(area * extent**2)),
-            ("second_moment", float(moment * extent**4)),
-        ):
-            object.__setattr__(self, name, value)
+        # What is wrong with a polygon is said when it is made, not when it is used.
+        self.__dict__["swept"] = swept_by(self.core, self.radius)
 
-    def scaled(self, factor):
-        """The same outline, ``factor`` times as large: vertices and spheroradius."""
-        factor = positive_factor(factor)
-        copy = object.__new__(SpheroPolygon)
-        vertices = self.vertices * factor
-        vertices.flags.writeable = False
-        # Nothing has to be computed again: areas go with factor², second moments with factor⁴.
-        for name, value in (
-            ("vertices", vertices),
-            ("radius", self.radius * factor),
-            ("centroid", self.centroid * factor),
-            ("area", self.area * factor**2),
-            ("second_moment", self.second_moment * factor**4),
-        ):
-            object.__setattr__(copy, name, value)
-        return copy
+
+def scaled_outline(shape, factor):
+    """A Sphere or SpheroPolygon ``factor`` times as large; ShapeError unless finite, above 0."""
+    if not np.isfinite(factor) or factor <= 0.0:
+        raise ShapeError(f"a shape can be scaled by a finite factor above 0, found {factor!r}")
+    factor = float(factor)
+    if len(shape.vertices) == 1:
+        return Sphere(shape.radius * factor)
+    vertices = read_only(shape.vertices * factor)
+    copy = object.__new__(SpheroPolygon)
+    # Nothing has to be computed again: areas go with factor², second moments with factor⁴.
+    copy.__dict__.update(
+        core=vertices,
+        radius=shape.radius * factor,
+        swept=Swept(
+            vertices,
+            shape.centroid * factor,
+            shape.area * factor**2,
+            shape.second_moment * factor**4,
+        ),
+    )
+    return copy

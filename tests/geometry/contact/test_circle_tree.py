@@ -17,6 +17,7 @@ from flocsim.geometry.contact.circle_tree import (
     at_leaves,
     core_distance,
     descended,
+    leaves_of,
     level_runs,
     outlines_of,
     passed,
@@ -184,10 +185,10 @@ def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
 def test_every_circle_holds_its_run_and_the_leaves_hold_all_points_once(points):
     core = shape(points, 2).vertices
     tree = tree_of(core)
-    depth = int(tree[0, 0])
-    for level in range(depth + 1):
-        circles = tree[1 << level : 2 << level]
-        runs = core[level_runs(points, level)]
+    nodes = [1 << level for level in range(10) if 1 << level <= leaves_of(points)]
+    for count in nodes:
+        circles = tree[count : 2 * count]
+        runs = core[level_runs(points, count)]
         away = np.hypot(*np.moveaxis(runs - circles[:, None, :2], -1, 0))
         assert (away <= circles[:, 2:]).all()
     outlines = outlines_of([shape(4, 1), shape(points, 2)])

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.geometry.contact.overlap import core_distance, overlap_fault, touching_points
+from flocsim.geometry.contact.overlap import distance_between, overlap_fault, touching_points
 from tests.reference.contacts import contacts
 from tests.reference.outline import core_geometry
 from tests.reference.samples import SEEDS, random_core, scene_of
@@ -29,7 +29,7 @@ def test_fault_and_distance_are_those_of_shapely(seed, make_a, make_b, x, y, ang
     if distance == 0.0:
         assert fault is not None
     else:
-        assert core_distance(a, b) == pytest.approx(distance, rel=1e-9, abs=1e-14)
+        assert distance_between(a, b) == pytest.approx(distance, rel=1e-9, abs=1e-14)
         assert (fault is not None) == (distance < 0.15)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.body import Fluid, scene_of
-from flocsim.geometry.contact.segments import closest_share, edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import closest_share, edge_count, edge_end, segment_distance2
 from tests.helpers.fast_scene import bodies_of
 from tests.reference.samples import scene_of as random_scene
 

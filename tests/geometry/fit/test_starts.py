@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.segments import best_breaks, run_costs, split_corners
+from flocsim.geometry.fit.starts import best_breaks, run_costs, split_corners
 
 
 def total_cost(costs, breaks):
