@@ -61,7 +61,7 @@ def test_what_is_no_body_is_refused_in_one_line(case):
 
 
 def test_a_shape_must_be_a_shape():
-    with pytest.raises(UsageError, match="Sphere or a SpheroPolygon, or .*, found 'ball'"):
+    with pytest.raises(UsageError, match=r"Sphere or a SpheroPolygon, or .*, found 'ball'"):
         Body("ball", density=1.0)
 
 
