@@ -5,6 +5,7 @@ It names what the composer files on disk: an edited kernel has another name, who
 
 import dis
 import hashlib
+import inspect
 import sys
 import types
 
@@ -92,15 +93,25 @@ def is_versioned(module):
 
 
 def code_digest(code):
-    """A hash of what the code does; line numbers and file names do not matter."""
+    """A hash of what the code does; docstrings, line numbers and file names do not matter."""
     constants = [
         code_digest(c) if isinstance(c, types.CodeType) else repr(c) for c in code.co_consts
     ]
+    if has_docstring(code):
+        constants[0] = "docstring"
     parts = (code.co_code, constants, code.co_names, code.co_varnames, code.co_argcount)
     return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
 
 
-def describe(name, value):
+def has_docstring(code):
+    """Whether the first constant of the code is its docstring."""
+    if sys.version_info >= (3, 13):
+        return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
+    # Before, that place was None without one.
+    return bool(code.co_consts) and isinstance(code.co_consts[0], str)
+
+
+def line_on(name, value):
     """One line about a global that is no function, for the hash; None for what may change."""
     if isinstance(value, types.ModuleType):
         return f"{name}=module {value.__name__}"
@@ -139,7 +150,7 @@ def fingerprint(entry, fillings, options=""):
                 # Two functions may share a name, so that a number has to tell which is called.
                 lines.append(f"{name}->{visit(value)}")
                 continue
-            line = describe(name, value)
+            line = line_on(name, value)
             if line is None:
                 raise KernelError(
                     f"kernel {where(function)} reads the global {name!r}, a "

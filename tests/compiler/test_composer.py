@@ -131,6 +131,9 @@ def test_comments_docstrings_aside_lines_and_files_do_not_matter(load):
     before = fingerprint(load().nested, {})
     moved = load(("SCALE = 2.0\nTABLE", "# a comment\n\n\nSCALE = 2.0\nTABLE"))
     assert fingerprint(moved.nested, {}) == before
+    told = load(("def doubled(x):", 'def doubled(x):\n    """Twice x."""'))
+    other = load(("def doubled(x):", 'def doubled(x):\n    """2 x."""'))
+    assert fingerprint(told.doubled, {}) == fingerprint(other.doubled, {})
 
 
 def test_which_of_two_functions_of_one_name_is_called_matters():
