@@ -156,7 +156,7 @@ def compiled(entry, fillings, name, allocates):
     """The entry compiled as module ``name`` at its first call, from the disk where it is there."""
     import numba
 
-    from flocsim.compiler.numba_internals import quick_typing
+    from flocsim.compiler.numba_internals import compiler_error, quick_typing
 
     options = options_of(allocates)
     module, kept = linked_module(entry, fillings, name, options)
@@ -168,7 +168,7 @@ def compiled(entry, fillings, name, allocates):
                 with quick_typing():
                     dispatcher.compile(tuple(map(numba.typeof, arguments)))
             return dispatcher(*arguments)
-        except numba.core.errors.NumbaError as error:
+        except compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         except OSError as error:
             # Compiled, but the disk took no copy: go on with what is in memory.
@@ -221,7 +221,7 @@ def compile_law(law, signature):
     """
     import numba
 
-    from flocsim.compiler.numba_internals import address_of, quick_typing
+    from flocsim.compiler.numba_internals import address_of, compiler_error, quick_typing
 
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
@@ -234,7 +234,7 @@ def compile_law(law, signature):
                 except OSError as error:
                     warn_uncached(error)
                     dispatcher = numba.njit(signature, **options)(module.run)
-        except numba.core.errors.NumbaError as error:
+        except compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         _composed[key] = dispatcher, address_of(dispatcher, signature)
     return _composed[key][1]

@@ -29,6 +29,13 @@ NO_COUNTING = {"_nrt": False}
 _one_at_a_time = threading.RLock()
 
 
+def compiler_error():
+    """What numba raises for a function that it cannot compile."""
+    from numba.core.errors import NumbaError
+
+    return NumbaError
+
+
 def call_by_address(signature):
     """A function for compiled code: ``call(address, *arguments)`` of a function of a signature.
 
