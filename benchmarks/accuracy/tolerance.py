@@ -5,21 +5,12 @@
 runs the config's study at every tolerance, in one process, and compares each with the tightest.
 """
 
-import argparse
-import subprocess
-import sys
-
 import numpy as np
 
+from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.outcome_changes import outcome_changes, percent_changed
 from flocsim.ensembles.runner import run
-
-
-def commit():
-    """The commit that is measured, "-dirty" where files differ from it."""
-    command = ["git", "describe", "--always", "--dirty"]
-    return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
 
 
 def study(arguments, tolerance):
@@ -46,20 +37,23 @@ def compare(found, exact):
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = parser_of(__doc__)
     parser.add_argument("config")
     parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-7, 1e-8, 1e-9, 1e-10])
     parser.add_argument("--replicates", type=int)
     arguments = parser.parse_args()
-    print(f"commit {commit()}; {' '.join(sys.argv)}")
+    if arguments.quick:
+        arguments.replicates, arguments.tolerances = 2, [1e-8, 1e-9]
+    print_heading()
     results = {tolerance: study(arguments, tolerance) for tolerance in arguments.tolerances}
     exact = results[min(results)]
-    print("tolerance [m]  aggregation flip          zone flip    any, inner delta  replicates/s")
+    columns = ("tolerance [m]", "aggregation flip [%]", "zone flip [%]", "any, inner delta [%]",
+               "replicates/s")  # fmt: skip
+    table = Table("Outcomes that differ from those at the tightest tolerance", columns)
     for tolerance, found in sorted(results.items(), reverse=True):
-        flips = compare(found, exact)
         rate = found.replicates["outcome"].size / found.run["wall_time"]
-        shares = "  ".join(f"{flip:15.2f} %" for flip in flips)
-        print(f"{tolerance:13g}  {shares}  {rate:12.0f}")
+        table.add(f"{tolerance:g}", *map(float, compare(found, exact)), rate)
+    table.print(arguments.markdown)
 
 
 if __name__ == "__main__":
