@@ -9,7 +9,6 @@ from flocsim.arrays import (
     FIRST_STAGE,
     FREE,
     MOTION_COLUMNS,
-    NEW,
     NOW,
     SLIP_RATES,
     TIME,
@@ -20,7 +19,7 @@ from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import copy_state, limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces, take_stage
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
 
@@ -95,7 +94,7 @@ def evaluate_stages(scene, work, time, step):
         if stage > 0:
             combine_slips(work, MATRIX[stage], stage, step, state)
         sum_forces(scene, work, time + NODES[stage] * step, state)
-    copy_state(work, state, NEW)
+    take_stage(work, state)
 
 
 @attrs.frozen

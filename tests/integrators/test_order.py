@@ -15,8 +15,7 @@ from flocsim.forces import Contact, StokesDrag
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.integrators.loop.driver import keep_lists
-from flocsim.integrators.rhs.forces import copy_state
+from flocsim.integrators.loop.driver import keep_lists, take_new_state
 from tests.helpers.methods import name_of
 from tests.helpers.trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
 
@@ -31,7 +30,7 @@ def even_steps(scene, work, clock, step, count):
         if attempt(scene, work, clock, step) < 0.0:
             return False
         locate_contacts(scene, work, NEW)
-        copy_state(work, NEW, NOW)
+        take_new_state(work)
         clock[TIME] += step
     return True
 

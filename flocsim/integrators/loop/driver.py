@@ -4,10 +4,12 @@ import math
 
 from flocsim.arrays import (
     CANDIDATES,
+    CLOSED,
     CODE,
     EDGE_BODY,
     ERROR,
     GAP,
+    GEOMETRY_COLUMNS,
     LOCATED,
     MAX_STEPS,
     MOTION_COLUMNS,
@@ -34,7 +36,6 @@ from flocsim.hooks import attempt, observe
 from flocsim.integrators.events.first_event import switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
-from flocsim.integrators.rhs.forces import copy_state
 from flocsim.laws import CONTACT_FORCE, has
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
@@ -57,9 +58,21 @@ def too_deep(scene, work):
     return False
 
 
+def take_new_state(work):
+    """Make the new state the current one."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[NOW, body, axis] = work.motion[NEW, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        for column in range(GEOMETRY_COLUMNS):
+            work.geometry[NOW, row, column] = work.geometry[NEW, row, column]
+        if work.candidates[row, CLOSED] == 1:
+            work.slip[NOW, row] = work.slip[NEW, row]
+
+
 def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
-    copy_state(work, NEW, NOW)
+    take_new_state(work)
     clock[TIME] += step
     counts[STEPS] += 1
     clock[ERROR] += clock[STEP_ERROR]

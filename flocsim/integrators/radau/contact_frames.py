@@ -46,12 +46,6 @@ from flocsim.arrays import (
 )
 from flocsim.laws import CENTRE_FORCE, has
 
-SIDES = (
-    (VERTEX_BODY, VERTEX_ARM_N, VERTEX_ARM_T),
-    (EDGE_BODY, EDGE_ARM_N, EDGE_ARM_T),
-)
-"""Columns of the vertex's and of the edge's body in a pair: its number, its arms."""
-
 
 def acts(work, row):
     """Whether a pair acts in this step."""
@@ -89,17 +83,25 @@ def clear_frames(work):
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
     g, state = work.geometry, FIRST_STAGE + stage
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    across = g[NOW, row, VERTEX_ARM_N] - g[state, row, VERTEX_ARM_N]
+    along = g[NOW, row, VERTEX_ARM_T] - g[state, row, VERTEX_ARM_T]
+    add_to_body(work, row, stage, a, across, along)
+    across = g[NOW, row, EDGE_ARM_N] - g[state, row, EDGE_ARM_N]
+    along = g[NOW, row, EDGE_ARM_T] - g[state, row, EDGE_ARM_T]
+    add_to_body(work, row, stage, b, across, along)
+
+
+def add_to_body(work, row, stage, body, across, along):
+    """Add the turn of a pair's normal to a body's frame, and what its arms have changed by."""
+    g, state = work.geometry, FIRST_STAGE + stage
     ox, oy = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
     nx, ny = g[state, row, NORMAL_X], g[state, row, NORMAL_Y]
     frame = FRAMES + FRAME_COLUMNS * stage
-    for body_column, arm_n, arm_t in SIDES:
-        body = work.candidates[row, body_column]
-        across = g[NOW, row, arm_n] - g[state, row, arm_n]
-        along = g[NOW, row, arm_t] - g[state, row, arm_t]
-        work.bodies[body, frame + TURN_COSINE] += ox * nx + oy * ny
-        work.bodies[body, frame + TURN_SINE] += ox * ny - oy * nx
-        work.bodies[body, frame + SHIFT_X] += across * nx - along * ny
-        work.bodies[body, frame + SHIFT_Y] += across * ny + along * nx
+    work.bodies[body, frame + TURN_COSINE] += ox * nx + oy * ny
+    work.bodies[body, frame + TURN_SINE] += ox * ny - oy * nx
+    work.bodies[body, frame + SHIFT_X] += across * nx - along * ny
+    work.bodies[body, frame + SHIFT_Y] += across * ny + along * nx
 
 
 def average_shifts(work):

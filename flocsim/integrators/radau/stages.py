@@ -13,7 +13,6 @@ from flocsim.arrays import (
     CLOSED,
     FIRST_STAGE,
     MEMORY,
-    NEW,
     NOW,
     PACE,
     SLIP_RATES,
@@ -26,7 +25,7 @@ from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve, write_changes, write_loads
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
-from flocsim.integrators.rhs.forces import copy_state, locate_and_rate, rate_slips, sum_forces
+from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces, take_stage
 from flocsim.integrators.rhs.views import lever
 
 MOST_ITERATIONS = 10
@@ -110,7 +109,7 @@ def finish_stages(work, step):
     for state in range(FIRST_STAGE, FIRST_STAGE + 3):
         rate_slips(work, state)
     slip_stages(work, step)
-    copy_state(work, THIRD_STAGE, NEW)
+    take_stage(work, THIRD_STAGE)
 
 
 def solve_stages(scene, work, clock, step):

@@ -53,16 +53,16 @@ def limit_slips(scene, work):
             work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
 
 
-def copy_state(work, source, target):
-    """Make one state the same as another: motion, geometry of the listed pairs, displacements."""
+def take_stage(work, stage):
+    """Make a stage the new state: its motion, and what closed pairs need (see limit_slips)."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
-            work.motion[target, body, axis] = work.motion[source, body, axis]
+            work.motion[NEW, body, axis] = work.motion[stage, body, axis]
     for row in range(work.tally[CANDIDATES]):
-        for column in range(GEOMETRY_COLUMNS):
-            work.geometry[target, row, column] = work.geometry[source, row, column]
         if work.candidates[row, CLOSED] == 1:
-            work.slip[target, row] = work.slip[source, row]
+            work.slip[NEW, row] = work.slip[stage, row]
+            for column in range(GEOMETRY_COLUMNS):
+                work.geometry[NEW, row, column] = work.geometry[stage, row, column]
 
 
 def start_rates(work, state):
