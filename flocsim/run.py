@@ -47,12 +47,12 @@ class Run:
         """Time and state now, as one row of a record."""
         return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
 
-    def advance(self, steps=STEPS_AT_A_TIME):
+    def advance(self, steps=None):
         """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
 
         A pause comes between two steps, so that it changes nothing.
         """
-        self.counts[PAUSE_AT] = self.counts[STEPS] + steps
+        self.counts[PAUSE_AT] = self.counts[STEPS] + (steps or STEPS_AT_A_TIME)
         while True:
             code = self.driver(
                 self.scene, self.work, self.observed, self.clock, self.counts, self.record

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from flocsim import run
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, Record, run_encounter
@@ -74,8 +75,10 @@ def test_a_replicate_repeats_to_the_bit_in_any_order(study):
 
 def recorded(study, rows):
     """(row, arrays) of one replicate, recorded ``rows`` at a time."""
-    record = Record(rows)
-    return study.run(0, 16, 0.0, 0, record), record.arrays()
+    record = Record()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "RECORD_ROWS", rows)
+        return study.run(0, 16, 0.0, 0, record), record.arrays()
 
 
 def test_recording_changes_nothing_and_pieces_make_the_whole(study):

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 from flocsim import SpheroPolygon
 from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.encounter import make_encounter, run_encounter
+from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
 from flocsim.ensembles.collision.sampling import draws, orientations
@@ -118,6 +118,8 @@ class Placed:
 
     def __getattr__(self, name):
         return getattr(self.encounter, name)
+
+    begin = Encounter.begin
 
     def start(self, angles, share):
         """Work arrays at the places, at terminal velocity."""

@@ -14,8 +14,7 @@ ENTRIES = ("ensembles/study.py", "ensembles/collision/encounter.py")
 
 NOT_PHYSICS = {
     "errors.py": "messages; a row is what comes without an error",
-    "explain/": "text for people",
-    "fingerprint.py": "names what is compiled, and is part of the identity itself",
+    "explain.py": "text for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/files.py": "how files are written",
