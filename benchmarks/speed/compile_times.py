@@ -91,12 +91,11 @@ def private_parts():
 
 def main():
     """Print the tables."""
-    private = "--private" in sys.argv
-    sys.argv = [word for word in sys.argv if word != "--private"]
-    arguments = parse_arguments(__doc__)
+    more = {"action": "store_true", "help": "tell what each private part of numba saves, too"}
+    arguments = parse_arguments(__doc__, private=more)
     print_heading()
     starts(arguments.quick).print(arguments.markdown)
-    if private:
+    if arguments.private:
         private_parts().print(arguments.markdown)
 
 
