@@ -8,7 +8,7 @@ uncompiled kernels by differences, so that a user's own force counts like the bu
 import math
 import types
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,7 +57,7 @@ STABLE = 2.0
 """Velocity Verlet is stable below 2/ω of a vibration, an explicit step below 2 τ of a decay."""
 
 
-def explain(system):
+def explain(system: Any) -> str:
     """The report of System.explain() as text: forces, machinery, time scales."""
     return "\n".join(
         [

@@ -22,7 +22,9 @@ import re
 import sys
 import types
 import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
 from flocsim.errors import KernelError
@@ -30,8 +32,8 @@ from flocsim.errors import KernelError
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
 
-_composed = {}
-_warned = []
+_composed: dict = {}
+_warned: list[OSError] = []
 
 
 class Linker:
@@ -64,7 +66,7 @@ class Linker:
         return copy
 
 
-def cache_folder():
+def cache_folder() -> Path | None:
     """The folder of compiled scenes, or None where it cannot be written (said once)."""
     folder = cache_path()
     try:
@@ -89,7 +91,7 @@ def warn_uncached(error):
         )
 
 
-def cache_path():
+def cache_path() -> Path:
     """Where compiled scenes should go."""
     import platformdirs
 
@@ -195,7 +197,13 @@ MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
 """Files that are made here, and say nothing to a user."""
 
 
-def compose(entry, fillings, *, jit=True, allocates=False):
+def compose(
+    entry: Callable,
+    fillings: dict[Callable, Callable],
+    *,
+    jit: bool = True,
+    allocates: bool = False,
+) -> Callable:
     """The driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
@@ -213,7 +221,7 @@ def compose(entry, fillings, *, jit=True, allocates=False):
     return _composed[key]
 
 
-def compile_law(law, signature):
+def compile_law(law: Callable, signature: Any) -> int:
     """The address [int] at which an engine calls a plain function, compiled for a numba signature.
 
     Raises KernelError for what captures variables, reads globals that may change, or cannot be

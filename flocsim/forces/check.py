@@ -5,12 +5,15 @@ import inspect
 import math
 import traceback
 import types
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from numbers import Real
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
@@ -27,7 +30,7 @@ SAMPLE_GAPS = (-1e-9, 1e-10, 1e-7)
 """Gaps [m] of the sample pairs: in contact, nearly so, apart."""
 
 
-def sample_pairs(reach):
+def sample_pairs(reach: float) -> tuple[PairView, ...]:
     """PairViews with gaps of either sign, within the reach of the force [m]."""
     gaps = [min(gap, 0.5 * reach) for gap in SAMPLE_GAPS]
     return tuple(
@@ -85,7 +88,7 @@ def as_numbers(value):
     return float(value)
 
 
-def kernel_arguments(force, fluid, kernel):
+def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
     """What a kernel is called with after its view; KernelError for what is no number."""
     arguments = []
     for name in list(inspect.signature(kernel).parameters)[1:]:
@@ -120,7 +123,9 @@ def is_arithmetic(error):
     return isinstance(error, ArithmeticError) or (isinstance(error, ValueError) and not unpacking)
 
 
-def results(force, kernel, samples, arguments):
+def results(
+    force: Force, kernel: Callable, samples: Iterable, arguments: Sequence
+) -> Iterator[Any]:
     """What a kernel returns for the samples, those beyond its arithmetic left out."""
     for view in samples:
         try:
@@ -175,7 +180,7 @@ class Watched:
         return self.view[index]
 
 
-def fields_read(force, fluid, kernel, samples):
+def fields_read(force: Force, fluid: Fluid, kernel: Callable, samples: Iterable) -> set[str]:
     """Names that a kernel reads of its view: those in its code and its helpers', and those that
     it is seen to read without a name."""
     names, pending, known = set(), [kernel], set()
@@ -191,7 +196,7 @@ def fields_read(force, fluid, kernel, samples):
     return names.union(*(each.read for each in watched))
 
 
-def reach_of(force):
+def reach_of(force: PairForce) -> float:
     """The force's reach; KernelError unless it is a number."""
     reach = computed(force, force, "reach")
     if not isinstance(reach, Real) or math.isnan(reach):
@@ -236,13 +241,13 @@ def check_events(force, fluid):
             )  # fmt: skip
 
 
-def event_count(force, fluid):
+def event_count(force: ContactForce, fluid: Fluid) -> int:
     """How many events a contact force has."""
     arguments = kernel_arguments(force, fluid, force.events)
     return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
 
 
-def check_kernel(force, fluid):
+def check_kernel(force: Force, fluid: Fluid) -> None:
     """KernelError, with force, file and line, unless all kernels of a force can be used.
 
     Each is called uncompiled on samples of the view that it will get, which finds misspelt

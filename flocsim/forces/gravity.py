@@ -17,7 +17,7 @@ class Gravity(BodyForce):
     g: float = quantity("m/s^2", at_least=0.0, default=STANDARD_GRAVITY)
 
     @property
-    def absent(self):
+    def absent(self) -> str:
         """Without g there is no weight."""
         return "g is zero" if self.g == 0.0 else ""
 

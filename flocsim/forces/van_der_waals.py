@@ -24,17 +24,17 @@ class VanDerWaals(PairForce):
     gap: str = choice(*GAPS, default="equivalent_spheres")
 
     @property
-    def acts_on(self):
+    def acts_on(self) -> str:
         """Where the force acts, from ``gap``."""
         return GAPS[self.gap]
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The gap at which the attraction has become negligible [m]."""
         return self.d_min / NEGLIGIBLE_FORCE**0.5
 
     @property
-    def absent(self):
+    def absent(self) -> str:
         """Without a Hamaker constant there is no attraction."""
         return "hamaker is zero" if self.hamaker == 0.0 else ""
 

@@ -1,5 +1,7 @@
 """Implicit: Radau IIA of order 5 on smooth stretches, for any stiffness."""
 
+from collections.abc import Callable
+
 import attrs
 
 from flocsim.arrays import (
@@ -122,6 +124,6 @@ class Implicit(Integrator):
         return step * max(factor, SMALLEST_FACTOR)
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """Dense output by the stages' cubic, and longer lists."""
         return {interpolate: collocate, skin_factor: wide_skin}

@@ -5,6 +5,7 @@ says what ``attempt`` is given and has to fill.
 """
 
 import math
+from collections.abc import Callable
 
 import attrs
 
@@ -104,16 +105,14 @@ class FixedStep(Integrator):
         return clock[LARGEST_STEP]
 
     @property
-    def first_step(self):
-        """All steps are equal."""
+    def first_step(self) -> float:  # type: ignore[override]
         return self.step
 
     @property
-    def largest_step(self):
-        """All steps are equal."""
+    def largest_step(self) -> float:  # type: ignore[override]
         return self.step
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """Pairs are located and flagged at every evaluation."""
         return {locate_acting: locate_and_flag}

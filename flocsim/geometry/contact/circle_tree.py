@@ -12,6 +12,7 @@ single arrays instead of the whole scene, which would cost more to pass than the
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from flocsim.arrays import X, Y
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.shape import Shape
 
 LEAF = 2
 """Core points in a run that is not split any more: from this to twice as many."""
@@ -59,7 +61,7 @@ def circles_around(runs, margin):
     return np.where(box[:, 2:] <= chord[:, 2:], box, chord)
 
 
-def tree_of(vertices):
+def tree_of(vertices: np.ndarray) -> np.ndarray:
     """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
 
     Rows that the tree does not fill, row 0 among them, are 0.
@@ -93,7 +95,7 @@ def tree_of_shape(shape):
     return tree_of(shape.vertices)
 
 
-def outlines_of(shapes):
+def outlines_of(shapes: Sequence[Shape]) -> Outlines:
     """The Outlines of some shapes, one body each."""
     sizes = [len(shape.vertices) for shape in shapes]
     return Outlines(
