@@ -59,7 +59,6 @@ class Interruption:
 
     @property
     def requested(self) -> bool:
-        """Whether a signal has asked to stop."""
         return self.signal != 0
 
     @property

@@ -32,6 +32,12 @@ from flocsim.errors import KernelError
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
 
+UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of functions that only compiled code calls."""
+
+MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
+"""Files that are made here, and say nothing to a user."""
+
 _composed: dict = {}
 _warned: list[OSError] = []
 
@@ -92,7 +98,6 @@ def warn_uncached(error):
 
 
 def cache_path() -> Path:
-    """Where compiled scenes should go."""
     import platformdirs
 
     return Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
@@ -143,10 +148,6 @@ def linked_module(entry, fillings, name, options):
     return module, folder is not None
 
 
-UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Options of functions that only compiled code calls."""
-
-
 def options_of(allocates):
     """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
     from flocsim.compiler.numba_internals import NO_COUNTING
@@ -191,10 +192,6 @@ def compiler_complaint(text):
             words = line.strip()
     complaint = complaint or text.strip().splitlines()[0]
     return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
-
-
-MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
-"""Files that are made here, and say nothing to a user."""
 
 
 def compose(

@@ -108,15 +108,6 @@ def failing_line(error):
     return f"{frame.filename}:{frame.lineno}"
 
 
-def misread(view, error):
-    """What is wrong with a read of an attribute that a view has not."""
-    fields = type(view)._fields
-    near = difflib.get_close_matches(error.name, fields, n=1)
-    advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
-    has_not = f"which a {type(view).__name__} has not"
-    return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
-
-
 def is_arithmetic(error):
     """Whether the numbers are to blame, which the compiled code answers with inf or nan."""
     unpacking = "unpack" in str(error)
@@ -138,20 +129,18 @@ def results(
 def failure(view, error):
     """What a kernel did wrong, in words, from the exception that it raised for a sample."""
     if isinstance(error, AttributeError) and error.obj is view:
-        return misread(view, error)
+        fields = type(view)._fields
+        near = difflib.get_close_matches(error.name, fields, n=1)
+        advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
+        has_not = f"which a {type(view).__name__} has not"
+        return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"fails in {failing_line(error)}: {what}"
 
 
-def is_kind(result, parts):
-    """Whether a result is one number, or a tuple of as many numbers as there are parts."""
-    if parts == 1:
-        return isinstance(result, Real)
-    return (
-        isinstance(result, tuple)
-        and len(result) == parts
-        and all(isinstance(part, Real) for part in result)
-    )
+def are_numbers(result):
+    """Whether a result is a tuple of numbers."""
+    return isinstance(result, tuple) and all(isinstance(part, Real) for part in result)
 
 
 def check_results(force, fluid, kernel, samples, *parts):
@@ -159,7 +148,8 @@ def check_results(force, fluid, kernel, samples, *parts):
     require_plain(force, kernel)
     arguments = kernel_arguments(force, fluid, kernel)
     for result in results(force, kernel, samples, arguments):
-        if not is_kind(result, len(parts)):
+        several = are_numbers(result) and len(result) == len(parts)
+        if not (several if len(parts) > 1 else isinstance(result, Real)):
             wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
             raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
 
@@ -168,7 +158,6 @@ class Watched:
     """A view that notes which of its fields are read, by name, by index, or by unpacking."""
 
     def __init__(self, view):
-        """``read`` collects the names."""
         self.view, self.read = view, set()
 
     def __getattr__(self, name):
@@ -205,7 +194,6 @@ def reach_of(force: PairForce) -> float:
 
 
 def check_pair_force(force, fluid):
-    """KernelError for a pair force whose place, reach, kernel or slope is wrong."""
     if type(force).acts_on is PairForce.acts_on:
         raise KernelError(f"{type(force).__name__} must subclass CentreForce or SurfaceForce")
     samples = sample_pairs(reach_of(force))
@@ -215,7 +203,6 @@ def check_pair_force(force, fluid):
 
 
 def check_contact_force(force, fluid):
-    """KernelError for a contact force whose kernel, slip limit or events are wrong."""
     check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
     if force.slip_limit is not None:
         check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
@@ -233,8 +220,7 @@ def check_events(force, fluid):
     arguments = kernel_arguments(force, fluid, force.events)
     found = list(results(force, force.events, SAMPLE_CONTACTS, arguments))
     for result in found:
-        numbers = isinstance(result, tuple) and all(isinstance(each, Real) for each in result)
-        if not numbers or len(result) != len(found[0]) or not result:
+        if not are_numbers(result) or len(result) != len(found[0]) or not result:
             raise refusal(
                 force, force.events,
                 f"returns {result!r}; it must return a tuple of numbers, always as many",
@@ -242,7 +228,6 @@ def check_events(force, fluid):
 
 
 def event_count(force: ContactForce, fluid: Fluid) -> int:
-    """How many events a contact force has."""
     arguments = kernel_arguments(force, fluid, force.events)
     return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
 

@@ -135,7 +135,6 @@ def write_body_laws(source, forces):
 
 
 def write_pair_laws(source, forces, kind):
-    """Centre forces or surface forces, and their derivatives."""
     force_terms, slope_terms, damping_terms = [], [], []
     for force in forces:
         condition = f"pair.gap < {source.value(reach_of(force))}"

@@ -26,7 +26,6 @@ class DoubleLayer(PairForce):
 
     @property
     def acts_on(self) -> str:
-        """Where the force acts, from ``gap``."""
         return GAPS[self.gap]
 
     @property
@@ -47,7 +46,6 @@ class DoubleLayer(PairForce):
 
     @property
     def absent(self) -> str:
-        """Without a potential there is no repulsion."""
         return "potential is zero" if self.potential == 0.0 else ""
 
     @staticmethod

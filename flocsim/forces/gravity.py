@@ -18,7 +18,6 @@ class Gravity(BodyForce):
 
     @property
     def absent(self) -> str:
-        """Without g there is no weight."""
         return "g is zero" if self.g == 0.0 else ""
 
     @staticmethod

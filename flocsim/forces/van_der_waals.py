@@ -25,7 +25,6 @@ class VanDerWaals(PairForce):
 
     @property
     def acts_on(self) -> str:
-        """Where the force acts, from ``gap``."""
         return GAPS[self.gap]
 
     @property
@@ -35,7 +34,6 @@ class VanDerWaals(PairForce):
 
     @property
     def absent(self) -> str:
-        """Without a Hamaker constant there is no attraction."""
         return "hamaker is zero" if self.hamaker == 0.0 else ""
 
     @staticmethod

@@ -51,7 +51,6 @@ def estimated_rate(work, row, first, step):
 
 
 def write_error_load(scene, work, step):
-    """The load whose solution is the error of the velocities."""
     size = work.jacobian.shape[1]
     damped = step / EIGENVALUES[REAL].real
     for row in range(size):
@@ -66,7 +65,6 @@ def write_error_load(scene, work, step):
 
 
 def estimate_error(scene, work, step):
-    """Write the error of the step into DEVIATION."""
     write_error_load(scene, work, step)
     size = work.jacobian.shape[1]
     sum_over_clusters(work, REAL, size, size + 1)

@@ -79,7 +79,6 @@ def move_slips(scene, work, step):
 
 
 def all_finite(work, state):
-    """Whether every place and velocity of a state is finite."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
             if not math.isfinite(work.motion[state, body, axis]):
@@ -101,7 +100,6 @@ class FixedStep(Integrator):
 
     @staticmethod
     def next_step(clock, step, ratio):
-        """All steps are equal."""
         return clock[LARGEST_STEP]
 
     @property

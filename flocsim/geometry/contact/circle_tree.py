@@ -91,7 +91,6 @@ class Outlines(NamedTuple):
 
 @lru_cache(maxsize=256)
 def tree_of_shape(shape):
-    """The tree of a shape, made once."""
     return tree_of(shape.vertices)
 
 
@@ -157,13 +156,11 @@ A walk is over when its first number is 0.
 
 
 def goes_on(walk):
-    """Whether a walk is not over yet."""
     i, _, _, _ = walk
     return i > 0
 
 
 def circles_met(tree, pose, plan, walk):
-    """circle_reach of the two nodes."""
     i, j, _, _ = walk
     row_a, row_b, _, _, _, _ = plan
     return circle_reach(tree, pose, row_a + i, row_b + j)
@@ -176,7 +173,6 @@ def within(tree, pose, plan, walk, distance):
 
 
 def at_leaves(plan, walk):
-    """Whether neither node can be split."""
     _, _, level_a, level_b = walk
     _, _, leaves_a, leaves_b, _, _ = plan
     return level_a == leaves_a and level_b == leaves_b

@@ -1,7 +1,4 @@
-"""The size of the next step: from the last one's error, the lists, and what is about to switch.
-
-How the error of one step sets the size of the next.
-"""
+"""The size of the next step: from the last one's error, the lists, and what is about to switch."""
 
 import math
 
@@ -36,7 +33,6 @@ SAFETY = 0.9
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
 """Bounds of the change from one step to the next."""
-
 
 LOWEST_ORDER = 0.5
 """Least power of the step that an error is taken to go with."""
@@ -102,7 +98,6 @@ def imminent_switch(scene, work, clock, step):
 
 
 def choose_step(scene, work, clock, lists):
-    """The size of the next step [s]."""
     step = min(clock[STEP], clock[LARGEST_STEP])
     if lists:
         step = min(step, time_within(scene, work, 0.5))

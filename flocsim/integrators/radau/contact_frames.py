@@ -54,7 +54,6 @@ SIDES = (
 
 
 def acts(work, row):
-    """Whether a pair acts in this step."""
     return work.candidates[row, CLOSED] + work.candidates[row, CLOSEST] > 0
 
 
@@ -80,7 +79,6 @@ def gather_clusters(scene, work):
 
 
 def clear_frames(work):
-    """No contact seen yet."""
     for body in range(work.bodies.shape[0]):
         for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
             work.bodies[body, column] = 0.0

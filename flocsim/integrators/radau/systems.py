@@ -1,11 +1,9 @@
 """The linear systems of a Newton step: from what the stages fail to balance to new velocities.
 
-Radau's stages are decoupled along two eigenvectors (radau_tableau.py), in frames that go along with
-the contacts (frames.py).
-
-Small dense complex systems, factorised in place: compiles fast, unlike numpy.linalg in a kernel.
-
-System k is (m, m + 1): the matrix, then its factors; the load, then the solution.
+Radau's stages are decoupled along two eigenvectors (tableau.py), in frames that go along with the
+contacts (contact_frames.py). Their small dense complex systems are factorised in place here, which
+compiles fast, unlike numpy.linalg in a kernel; system k is (m, m + 1): the matrix, then its
+factors; the load, then the solution.
 """
 
 from flocsim.arrays import (
