@@ -78,12 +78,6 @@ def gather_clusters(scene, work):
             join(scene, work, work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
 
 
-def clear_frames(work):
-    for body in range(work.bodies.shape[0]):
-        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
-            work.bodies[body, column] = 0.0
-
-
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
     g, state = work.geometry, FIRST_STAGE + stage
@@ -131,7 +125,9 @@ def share_turns(work):
 
 def follow_contacts(work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
-    clear_frames(work)
+    for body in range(work.bodies.shape[0]):
+        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
+            work.bodies[body, column] = 0.0
     for row in range(work.tally[CANDIDATES]):
         if acts(work, row):
             for stage in range(3):

@@ -63,14 +63,6 @@ def copy_state(work, source, target):
             work.slip[target, row] = work.slip[source, row]
 
 
-def start_rates(work, state):
-    """The velocities of a state, and no force yet."""
-    for body in range(work.bodies.shape[0]):
-        for axis in range(3):
-            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
-            work.rates[state, body, FORCE + axis] = 0.0
-
-
 def add_body_forces(scene, work, time, state):
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, state, body)
@@ -119,7 +111,10 @@ def locate_and_rate(scene, work, state):
 def sum_forces(scene, work, time, state):
     """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
     work.tally[EVALUATIONS] += 1
-    start_rates(work, state)
+    for body in range(work.bodies.shape[0]):
+        for axis in range(3):
+            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
+            work.rates[state, body, FORCE + axis] = 0.0
     if has(scene, BODY_FORCE):
         add_body_forces(scene, work, time, state)
     if has(scene, CENTRE_FORCE):

@@ -205,13 +205,6 @@ def add_position_derivative(scene, work, view, body):
             work.jacobian[STIFFNESS, 3 * body + part, 3 * body + axis] += stiffness
 
 
-def clear_jacobian(work):
-    for which in range(2):
-        for row in range(work.jacobian.shape[1]):
-            for column in range(work.jacobian.shape[2]):
-                work.jacobian[which, row, column] = 0.0
-
-
 def add_bodies(scene, work, time):
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, NOW, body)
@@ -251,7 +244,10 @@ def add_surfaces(scene, work, time):
 
 def weigh_velocities(scene, work, time, remaining):
     """Derivatives of the body forces, and from them how long each body remembers its velocity."""
-    clear_jacobian(work)
+    for which in range(2):
+        for row in range(work.jacobian.shape[1]):
+            for column in range(work.jacobian.shape[2]):
+                work.jacobian[which, row, column] = 0.0
     add_bodies(scene, work, time)
     remember_velocities(scene, work, remaining)
 
