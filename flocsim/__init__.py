@@ -1,6 +1,14 @@
 """flocsim: when two flocs of real shape meet in water, do they collide, and do they stick?"""
 
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flocsim.body import Body, Fluid
+    from flocsim.geometry.shapes.shape import Shape
+    from flocsim.geometry.shapes.sphere import Sphere
+    from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+    from flocsim.system import System, Trajectory
 
 __version__ = "0.1.0"
 
@@ -27,7 +35,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> object:
     if name not in HOMES:
         raise AttributeError(f"module 'flocsim' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"flocsim.{HOMES[name]}"), name)
@@ -35,5 +43,5 @@ def __getattr__(name):
     return value
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted({*globals(), *HOMES})

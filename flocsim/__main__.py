@@ -3,6 +3,7 @@
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 
 from flocsim import __version__
 from flocsim.interruption import install
@@ -18,8 +19,7 @@ from flocsim.io.terminal import plain_warnings
 COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
 
 
-def make_parser():
-    """The parser of the command and of all its subcommands."""
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="flocsim",
         description="When two flocs of real shape meet in water: do they collide, do they stick?",
@@ -31,14 +31,14 @@ def make_parser():
     return parser
 
 
-def tolerant_streams():
+def tolerant_streams() -> None:
     """Print on any terminal: a letter that it does not know must not end a command."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
 
 
-def main(argv=None):
+def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; the exit code. Errors are one line on stderr."""
     tolerant_streams()
     plain_warnings()

@@ -1,12 +1,10 @@
-"""The tuples of scalars and of arrays that kernels and drivers see.
-
-Where things lie in the arrays that kernels and drivers share.
+"""The tuples of scalars and of arrays that kernels and drivers see, and where things lie in them.
 
 Few arrays with named places, because every array that a compiled function is handed costs compile
 time in all of its callers.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -179,8 +177,7 @@ class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
     ``bodies`` (n, 7): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
-    flocsim.geometry.contact.circle_tree.Outlines. Few arrays, because every array that a compiled
-    function is handed costs compile time in all of its callers.
+    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws.
     """
 
     bodies: np.ndarray
@@ -188,7 +185,7 @@ class Scene(NamedTuple):
     vertices: np.ndarray
     tree: np.ndarray
     parameters: np.ndarray
-    laws: np.ndarray
+    laws: Any
     surface_reach: float
     events: int
 
@@ -225,7 +222,7 @@ class Work(NamedTuple):
     tally: np.ndarray
 
 
-def work_of(scene, position, velocity, capacity=256):
+def work_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, capacity: int = 256) -> Work:
     """Work arrays for a scene at the given position and velocity (n, 3), no contact yet."""
     n = len(scene.bodies)
     motion = np.zeros((MOTION_ROWS, n, MOTION_COLUMNS))
@@ -247,10 +244,10 @@ def work_of(scene, position, velocity, capacity=256):
     )
 
 
-def with_capacity(work, capacity):
+def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
 
-    def grown(array, axis):
+    def grown(array: np.ndarray, axis: int) -> np.ndarray:
         shape = list(array.shape)
         shape[axis] = capacity
         larger = np.zeros(shape, dtype=array.dtype)

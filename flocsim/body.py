@@ -1,6 +1,8 @@
 """Body and Fluid: what a user builds a scene of."""
 
 import math
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -17,19 +19,27 @@ NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""
 
 
-def read_vector(name, length, unit):
-    """An attrs converter: ``length`` finite numbers as a tuple of floats."""
+def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
+    """``length`` finite numbers as a tuple of floats; UsageError for anything else."""
+    try:
+        numbers = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != length or not all(math.isfinite(number) for number in numbers):
+        raise UsageError(f"{name} must be {length} finite numbers [{unit}], found {values!r}")
+    return numbers
 
-    def convert(values):
-        try:
-            numbers = tuple(float(value) for value in values)
-        except (TypeError, ValueError):
-            numbers = ()
-        if len(numbers) != length or not all(math.isfinite(number) for number in numbers):
-            raise UsageError(f"{name} must be {length} finite numbers [{unit}], found {values!r}")
-        return numbers
 
-    return convert
+def read_position(values: Iterable[float]) -> tuple[float, float]:
+    return read_vector("position", 2, "m", values)
+
+
+def read_velocity(values: Iterable[float]) -> tuple[float, float]:
+    return read_vector("velocity", 2, "m/s", values)
+
+
+def read_gradient(values: Iterable[float]) -> tuple[float, float, float, float]:
+    return read_vector("gradient", 4, "1/s", values)
 
 
 @attrs.frozen(eq=False)
@@ -43,14 +53,14 @@ class Fluid:
     viscosity: float = quantity("Pa s", above=0.0, default=WATER_VISCOSITY, help="γ")
     density: float = quantity("kg/m^3", at_least=0.0, default=WATER_DENSITY, help="ρ_f")
     buoyancy: bool = flag(default=False, help="subtract the displaced fluid's weight")
-    velocity: tuple = attrs.field(
+    velocity: tuple[float, float] = attrs.field(
         default=(0.0, 0.0),
-        converter=read_vector("velocity", 2, "m/s"),
+        converter=read_velocity,
         metadata={"vector": 2, "unit": "m/s", "help": "of the background flow at the origin"},
     )
-    gradient: tuple = attrs.field(
+    gradient: tuple[float, float, float, float] = attrs.field(
         default=(0.0, 0.0, 0.0, 0.0),
-        converter=read_vector("gradient", 4, "1/s"),
+        converter=read_gradient,
         metadata={
             "vector": 4,
             "unit": "1/s",
@@ -59,27 +69,24 @@ class Fluid:
     )
 
     @property
-    def flow(self):
+    def flow(self) -> tuple[float, ...]:
         """Velocity and gradient as the parameters (u_x, u_y, g_xx, g_xy, g_yx, g_yy)."""
         return (*self.velocity, *self.gradient)
 
 
-def check_shape(instance, attribute, value):
-    """attrs validator: the body's shape is a Shape."""
+def check_shape(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if not isinstance(value, Shape):
         raise UsageError(
             f"shape must be a Sphere or a SpheroPolygon, or a Shape of your own, found {value!r}"
         )
 
 
-def check_positive_or_none(instance, attribute, value):
-    """attrs validator: None, or a finite number above zero."""
+def check_positive_or_none(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if value is not None and not (is_number(value) and value > 0.0):
         raise UsageError(f"{attribute.name} must be a finite number above 0, found {value!r}")
 
 
-def check_depth(instance, attribute, value):
-    """attrs validator: a depth is "sphere" or a length above zero."""
+def check_depth(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if value != "sphere":
         check_positive_or_none(instance, attribute, value)
 
@@ -90,23 +97,25 @@ class Body:
 
     Mass m = ρ_s A and inertia I = ρ_s J, with ρ_s [kg/m²] either ``surface_density`` or
     ``density`` · ``depth``; depth is a length [m] or "sphere" = 4/3 r_eq (then m is the mass of the
-    equivalent solid sphere). A ``fixed`` body is held: no force
-    changes its velocity, which is zero unless given.
+    equivalent solid sphere). A ``fixed`` body is held: no force changes its velocity, which is
+    zero unless given.
     """
 
     shape: Shape = attrs.field(validator=check_shape)
-    position: tuple = attrs.field(default=(0.0, 0.0), converter=read_vector("position", 2, "m"))
+    position: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_position)
     angle: float = quantity("rad", default=0.0)
-    velocity: tuple = attrs.field(default=(0.0, 0.0), converter=read_vector("velocity", 2, "m/s"))
+    velocity: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_velocity)
     spin: float = quantity("rad/s", default=0.0)
-    surface_density: float = attrs.field(
+    surface_density: float | None = attrs.field(
         default=None, kw_only=True, validator=check_positive_or_none
     )
-    density: float = attrs.field(default=None, kw_only=True, validator=check_positive_or_none)
-    depth: float = attrs.field(default="sphere", kw_only=True, validator=check_depth)
+    density: float | None = attrs.field(
+        default=None, kw_only=True, validator=check_positive_or_none
+    )
+    depth: float | str = attrs.field(default="sphere", kw_only=True, validator=check_depth)
     fixed: bool = flag(default=False)
 
-    def __attrs_post_init__(self):
+    def __attrs_post_init__(self) -> None:
         if (self.surface_density is None) == (self.density is None):
             raise UsageError(
                 "a body needs either surface_density [kg/m^2] or density [kg/m^3], not both: "
@@ -114,25 +123,26 @@ class Body:
             )
 
     @property
-    def areal_density(self):
+    def areal_density(self) -> float:
         """ρ_s [kg/m²]."""
         if self.surface_density is not None:
             return self.surface_density
-        if self.depth == "sphere":
+        assert self.density is not None
+        if isinstance(self.depth, str):
             return self.density * 4.0 / 3.0 * self.shape.equivalent_radius
         return self.density * self.depth
 
     @property
-    def mass(self):
+    def mass(self) -> float:
         """m = ρ_s A [kg]."""
         return self.areal_density * self.shape.area
 
     @property
-    def inertia(self):
+    def inertia(self) -> float:
         """I = ρ_s J [kg m²]."""
         return self.areal_density * self.shape.second_moment
 
-    def buoyant_mass(self, fluid):
+    def buoyant_mass(self, fluid: Fluid) -> float:
         """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known."""
         if not fluid.buoyancy:
             return self.mass
@@ -144,7 +154,14 @@ class Body:
         return self.mass * (1.0 - fluid.density / self.density)
 
 
-def scene_of(bodies, fluid, parameters=(), laws=NO_LAWS, surface_reach=-1.0, events=0):
+def scene_of(
+    bodies: Sequence[Body],
+    fluid: Fluid,
+    parameters: Sequence[float] = (),
+    laws: Any = NO_LAWS,
+    surface_reach: float = -1.0,
+    events: int = 0,
+) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
     (flocsim.forces.codegen.Pieces); without, a scene that has no laws."""
     shapes = [body.shape for body in bodies]

@@ -8,7 +8,7 @@ uncompiled kernels by differences, so that a user's own force counts like the bu
 import math
 import types
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,7 +57,7 @@ STABLE = 2.0
 """Velocity Verlet is stable below 2/ω of a vibration, an explicit step below 2 τ of a decay."""
 
 
-def explain(system):
+def explain(system: Any) -> str:
     """The report of System.explain() as text: forces, machinery, time scales."""
     return "\n".join(
         [
@@ -72,7 +72,6 @@ def explain(system):
 
 
 def heading(system):
-    """One line on bodies, core points and method."""
     bodies = system.bodies
     sizes = sorted({len(body.shape.vertices) for body in bodies})
     kind = "spheres only" if system.spheres_only else "polygons"
@@ -116,7 +115,6 @@ def about(system, force, implicit):
 
 
 def body_derivative(system, force):
-    """By what a body force has to be differentiated."""
     reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
     by = [name for name, fields in (("velocity", SPEEDS), ("place", PLACES)) if reads & fields]
     if not by:
@@ -125,7 +123,6 @@ def body_derivative(system, force):
 
 
 def pair_derivative(system, force):
-    """Whence the derivatives of a pair force come."""
     samples = sample_pairs(force.reach)
     damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
@@ -157,7 +154,6 @@ def gap_between(a, b, size):
 
 
 def sliding(system, force):
-    """Whether the tangential displacement of a contact force has a limit."""
     if force.slip_limit is None:
         return "no sliding"
     limits = tried(system, force, force.slip_limit, SAMPLE_CONTACTS)
@@ -165,7 +161,6 @@ def sliding(system, force):
 
 
 def machinery_lines(system):
-    """ "in: …" or "out: …" for every piece of machinery around the forces."""
     laws = system.pieces.laws
     touching = "contact_force" in laws or "surface_force" in laws
     lines = [search_line(system, touching)]
@@ -183,7 +178,6 @@ def machinery_lines(system):
 
 
 def search_line(system, touching):
-    """Whether contacts are looked for, and how long they are not."""
     if not touching:
         return "out: contact search: no force acts at contacts or closest points"
     far = [gap_between(a, b, "bounding_radius") for a, b in combinations(system.bodies, 2)]
@@ -194,7 +188,6 @@ def search_line(system, touching):
 
 
 def spin_line(system):
-    """Whether anything can turn the bodies."""
     turning = [type(force).__name__ for force in system.forces if exerts_torque(system, force)]
     if turning:
         return f"in:  rotation of bodies: torques come from {', '.join(dict.fromkeys(turning))}"
@@ -204,7 +197,6 @@ def spin_line(system):
 
 
 def history_line(system):
-    """Whether tangential displacements are carried, and matter."""
     forces = [force for force in system.forces if isinstance(force, ContactForce)]
     if not forces:
         return "out: tangential history: no contact force"
@@ -306,26 +298,22 @@ def slope_of(force, view, field, size, parameters, part=None):
 
 def contact_scales(system):
     """1/ω0 = √(M/k) of a contact and 1/λ of its damping, the shortest over the pairs."""
-    force = system.pieces.laws.get("contact_force")
-    found = [contact_pair(force, system, *pair) for pair in pairs_of(system)] if force else []
-    if not found:
+    force, known = system.pieces.laws.get("contact_force"), system.pieces.parameters
+    vibration, decay = [], []
+    for a, b, mass in pairs_of(system) if force else ():
+        radii = a.shape.radius, b.shape.radius
+        overlap = OVERLAP_SHARE * sum(radii)
+        view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
+        stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
+        damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
+        vibration.append(vibration_time(mass, stiffness))
+        decay.append(decay_time(mass, damping))
+    if not vibration:
         return []
-    vibration, decay = (min(times) for times in zip(*found, strict=True))
     return [
-        Scale("contact 1/omega0", vibration, True),
-        Scale("contact damping 1/lambda", decay, True),
+        Scale("contact 1/omega0", min(vibration), True),
+        Scale("contact damping 1/lambda", min(decay), True),
     ]
-
-
-def contact_pair(force, system, a, b, mass):
-    """(1/ω0, 1/λ) [s] of one pair's normal contact; inf where there is none."""
-    radii = a.shape.radius, b.shape.radius
-    overlap = OVERLAP_SHARE * sum(radii)
-    view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
-    known = system.pieces.parameters
-    stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
-    damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
-    return vibration_time(mass, stiffness), decay_time(mass, damping)
 
 
 def vibration_time(mass, stiffness):
@@ -340,48 +328,39 @@ def decay_time(mass, damping):
 
 def pair_scales(system):
     """√(M/|dF/dd|) where centre or surface forces are steepest, the shortest over the pairs."""
-    found = []
+    found, known = [], system.pieces.parameters
     for name in ("centre", "surface"):
-        force = system.pieces.laws.get(f"{name}_force")
-        times = [steepest(force, system, *pair) for pair in pairs_of(system)] if force else []
-        found += [Scale(f"{name} forces at their steepest", min(times), True)] if times else []
+        force, times = system.pieces.laws.get(f"{name}_force"), []
+        for a, b, mass in pairs_of(system) if force else ():
+            r_a, r_b = a.shape.equivalent_radius, b.shape.equivalent_radius
+            view = PairView(0.0, 0.0, 0.0, r_a + r_b, r_a, r_b, r_a * r_b / (r_a + r_b), mass)
+            slopes = [
+                slope_of(force, view._replace(gap=gap), "gap", 1e-3 * gap, known) for gap in GAPS
+            ]
+            times.append(vibration_time(mass, max(map(abs, slopes))))
+        if times:
+            found.append(Scale(f"{name} forces at their steepest", min(times), True))
     return found
-
-
-def steepest(force, system, a, b, mass):
-    """√(M/|dF/dd|) [s] of one pair at the gap where the force changes most."""
-    r_a, r_b = a.shape.equivalent_radius, b.shape.equivalent_radius
-    view = PairView(0.0, 0.0, 0.0, r_a + r_b, r_a, r_b, r_a * r_b / (r_a + r_b), mass)
-    known = system.pieces.parameters
-    slopes = [
-        abs(slope_of(force, view._replace(gap=gap), "gap", 1e-3 * gap, known)) for gap in GAPS
-    ]
-    return vibration_time(mass, max(slopes))
 
 
 def body_scales(system):
     """Stokes relaxation m/(6πγ r) and the time of settling by a radius, of the free bodies."""
-    force = system.pieces.laws.get("body_force")
+    force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
     free = [body for body in system.bodies if not body.fixed]
     if force is None or not free:
         return []
-    times = [body_times(force, system, body) for body in free]
-    relaxation, settling = zip(*times, strict=True)
+    relaxation, settling = [], []
+    for body in free:
+        radius, weight = body.shape.equivalent_radius, body.buoyant_mass(system.fluid)
+        at_rest = BodyView(
+            0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
+        )
+        resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
+        load = math.hypot(*force(at_rest, known)[:2])
+        sinks = load > 0.0 and resistance > 0.0
+        settling.append(radius * resistance / load if sinks else math.inf)
+        relaxation.append(decay_time(body.mass, resistance))
     return [
         Scale("Stokes relaxation", min(relaxation), True),
         Scale("settling by a radius", max(settling), False),
     ]
-
-
-def body_times(force, system, body):
-    """(relaxation, settling by a radius) [s] of one body that starts from rest; inf without."""
-    radius = body.shape.equivalent_radius
-    weight = body.buoyant_mass(system.fluid)
-    view = BodyView(
-        0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
-    )
-    known = system.pieces.parameters
-    resistance = -slope_of(force, view, "vy", 1e-9, known, 1)
-    load = math.hypot(*force(view, known)[:2])
-    settling = radius * resistance / load if load > 0.0 and resistance > 0.0 else math.inf
-    return decay_time(body.mass, resistance), settling

@@ -6,6 +6,7 @@ in words), ``unit``, ``choices``, ``flag``, ``help``.
 """
 
 import math
+from collections.abc import Callable, Iterable
 from numbers import Integral, Real
 from typing import Any
 
@@ -29,16 +30,18 @@ def is_whole(value: Any) -> bool:
     return isinstance(value, Integral) and not isinstance(value, bool)
 
 
-def list_words(words):
+def list_words(words: Iterable[str]) -> str:
     """'a', 'b' or 'c'."""
     *most, last = [repr(word) for word in words]
     return f"{', '.join(most)} or {last}" if most else last
 
 
-def number_range(above=None, at_least=None, at_most=None):
+def number_range(
+    above: float | None = None, at_least: float | None = None, at_most: float | None = None
+) -> tuple[Callable[[Any], bool], str]:
     """(check, words): whether a value is a finite number within the limits, and those in words."""
 
-    def check(value):
+    def check(value: Any) -> bool:
         return (
             is_number(value)
             and (above is None or value > above)
@@ -51,15 +54,15 @@ def number_range(above=None, at_least=None, at_most=None):
     return check, f"a finite number {words}".strip()
 
 
-def may_be_none(default):
+def may_be_none(default: Any) -> bool:
     """Whether a field with this default may hold None: it is the default, or may come of it."""
-    return default is None or isinstance(default, attrs.Factory)
+    return default is None or isinstance(default, attrs.Factory)  # type: ignore[arg-type]
 
 
-def checked_field(check, allowed, default, **metadata):
+def checked_field(check: Callable[[Any], bool], allowed: str, default: Any, **metadata: Any) -> Any:
     """A field whose values pass ``check``; RangeError says what is ``allowed`` of all others."""
 
-    def validate(instance, attribute, value):
+    def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
         if not (check(value) or (value is None and may_be_none(default))):
             raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 

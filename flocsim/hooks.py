@@ -6,11 +6,16 @@ that the driver reaches, before that is compiled. Physics is no matter of hooks:
 has is told and called through its laws (flocsim.laws).
 """
 
-HOOKS = {}
+from collections.abc import Callable
+from typing import TypeVar
+
+Function = TypeVar("Function", bound=Callable)
+
+HOOKS: dict[str, Callable] = {}
 """{"module.name": function}: what may be replaced."""
 
 
-def hook(function):
+def hook(function: Function) -> Function:
     """Mark a function that a scene may replace; it stays what it is."""
     HOOKS[f"{function.__module__}.{function.__qualname__}"] = function
     return function

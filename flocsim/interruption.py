@@ -12,6 +12,8 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 STOPPED = 75
 """Exit code of a run that was stopped early and can be resumed."""
@@ -47,26 +49,24 @@ class Interruption:
     ever if it went now; ``leave(code)`` ends it, and under MPI them; ``speaks``: it may say so.
     """
 
-    def __init__(self):
-        """Nothing has been asked."""
+    def __init__(self) -> None:
         self.signal = 0
         self.since = 0.0
         self.installed = False
         self.speaks = True
         self.held = False
-        self.leave = os._exit
+        self.leave: Callable[[int], Any] = os._exit
 
     @property
-    def requested(self):
-        """Whether a signal has asked to stop."""
+    def requested(self) -> bool:
         return self.signal != 0
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name of the signal, "SIGTERM"."""
         return signal.Signals(self.signal).name if self.signal else "no signal"
 
-    def note(self, number):
+    def note(self, number: int) -> None:
         """A signal has come: remember it, or end at once where it is the second."""
         now = time.monotonic()
         if self.signal and now - self.since > INSISTENCE:
@@ -78,12 +78,12 @@ class Interruption:
 INTERRUPTION = Interruption()
 
 
-def stop_requested():
+def stop_requested() -> bool:
     """Whether this process has been asked to stop."""
     return INTERRUPTION.requested
 
 
-def install():
+def install() -> None:
     """Take over the signals; only in the main thread of a program, and only once."""
     if INTERRUPTION.installed or threading.current_thread() is not threading.main_thread():
         return
@@ -97,7 +97,7 @@ def install():
     threading.Thread(target=watch, args=(reading,), daemon=True).start()
 
 
-def watch(reading):
+def watch(reading: int) -> None:
     """Note the signals that come through the pipe; the first one starts the clock."""
     while True:
         for number in os.read(reading, 64):
@@ -108,7 +108,7 @@ def watch(reading):
                     threading.Thread(target=end_in_time, daemon=True).start()
 
 
-def end_in_time():
+def end_in_time() -> None:
     """End the process where the run has not done so by itself."""
     while INTERRUPTION.held:
         time.sleep(0.05)
@@ -121,11 +121,11 @@ def end_in_time():
     INTERRUPTION.leave(STOPPED)
 
 
-def end_with_parent():
+def end_with_parent() -> None:
     """End this process when the one that started it is gone: a rank without its launcher."""
     parent = os.getppid()
 
-    def look():
+    def look() -> None:
         while os.getppid() == parent:
             time.sleep(PARENT_SECONDS)
         os._exit(STOPPED)

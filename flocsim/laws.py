@@ -10,6 +10,8 @@ functions (None: none) where it runs uncompiled, for debugging and as a referenc
 """
 
 import functools
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -128,14 +130,14 @@ def has_address(scene, law):
 
 
 @functools.cache
-def compiled_calls():
+def compiled_calls() -> dict[Callable, Callable]:
     """{hook: function} that let the compiled engine call laws by their addresses."""
     from flocsim.compiler.numba_internals import call_by_address
 
-    calls = {has: has_address}
+    calls: dict[Callable, Callable] = {has: has_address}
     for index, (law, signature) in enumerate(signatures().items()):
         more = ", which" if law == "contact_event" else ""
-        names = {"call": call_by_address(signature), "__name__": __name__}
+        names: dict[str, Any] = {"call": call_by_address(signature), "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
             f"    return call(scene.laws[{index}], view, scene.parameters{more})\n",
@@ -145,7 +147,7 @@ def compiled_calls():
     return calls
 
 
-def law_table(functions, *, jit):
+def law_table(functions: dict[str, Callable], *, jit: bool) -> Any:
     """The laws {name: plain function} as ``scene.laws``: addresses, or the functions themselves.
 
     KernelError for a law that cannot be compiled.

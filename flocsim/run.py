@@ -1,5 +1,7 @@
 """Run: one run of a scene in progress, and the only caller of a driver."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from flocsim.arrays import (
@@ -13,9 +15,11 @@ from flocsim.arrays import (
     STEPS,
     TIME,
     UNTIL,
+    Scene,
+    Work,
     with_capacity,
 )
-from flocsim.integrators.base import Status
+from flocsim.integrators.base import Integrator, Status
 
 STEPS_AT_A_TIME = 5_000
 """Steps between two looks at whether to go on: some 50 ms."""
@@ -33,8 +37,17 @@ class Run:
     """
 
     def __init__(
-        self, driver, scene, work, integrator, until, *, max_steps, observed=None, record=False
-    ):
+        self,
+        driver: Callable[..., int],
+        scene: Scene,
+        work: Work,
+        integrator: Integrator,
+        until: float,
+        *,
+        max_steps: int,
+        observed: np.ndarray | None = None,
+        record: bool = False,
+    ) -> None:
         self.driver, self.scene, self.work = driver, scene, work
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
         self.clock[UNTIL] = until
@@ -43,11 +56,11 @@ class Run:
         self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
         self.saved = [self.row_now()]
 
-    def row_now(self):
+    def row_now(self) -> np.ndarray:
         """Time and state now, as one row of a record."""
         return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
 
-    def advance(self, steps=None):
+    def advance(self, steps: int | None = None) -> Status:
         """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
 
         A pause comes between two steps, so that it changes nothing.
@@ -65,51 +78,50 @@ class Run:
             elif code != Status.RECORD_FULL:
                 return Status(code)
 
-    def to_end(self, halted=None):
+    def to_end(self, halted: Callable[[], bool] | None = None) -> Status:
         """Go on until the run has ended: its Status; PAUSED where ``halted()`` said to give up."""
         while (status := self.advance()) == Status.PAUSED:
             if halted is not None and halted():
                 break
         return status
 
-    def rows(self):
+    def rows(self) -> np.ndarray:
         """The record (k, 1 + 6 n): time, then x, y, angle, vx, vy, spin of every body; start and
         end alone where steps are not kept."""
         end = [] if len(self.record) else [self.row_now()]
         return np.concatenate([*self.saved, *end])
 
-    def motion(self):
+    def motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (k,) [s], places (k, n, 3) [m, m, rad] and velocities (k, n, 3) of the record."""
         rows = self.rows()
         states = rows[:, 1:].reshape(len(rows), -1, 6)
         return rows[:, 0], states[:, :, :3], states[:, :, 3:]
 
     @property
-    def time(self):
+    def time(self) -> float:
         """How far it has come [s]."""
         return float(self.clock[TIME])
 
     @property
-    def steps(self):
-        """Steps taken."""
+    def steps(self) -> int:
         return int(self.counts[STEPS])
 
     @property
-    def rejected(self):
+    def rejected(self) -> int:
         """Steps tried in vain."""
         return int(self.counts[REJECTED])
 
     @property
-    def evaluations(self):
+    def evaluations(self) -> int:
         """How often the forces were summed."""
         return int(self.work.tally[EVALUATIONS])
 
     @property
-    def error(self):
+    def error(self) -> float:
         """The sum of the steps' estimated errors [m]."""
         return float(self.clock[ERROR])
 
     @property
-    def code(self):
+    def code(self) -> int:
         """The observer's last code."""
         return int(self.counts[CODE])

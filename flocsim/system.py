@@ -1,19 +1,21 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
 import time
+from collections.abc import Callable, Iterable
 from itertools import combinations
+from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.arrays import TOLERANCE, work_of
+from flocsim.arrays import TOLERANCE, Scene, work_of
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.explain import explain
 from flocsim.fields import is_number, is_whole
 from flocsim.forces.base import Force
-from flocsim.forces.codegen import laws_of
+from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.integrators.base import Integrator, Status
@@ -21,6 +23,9 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
 from flocsim.run import Run
+
+Fillings = dict[Callable, Callable]
+"""{hook of flocsim.hooks.HOOKS: the function in its place}."""
 
 
 @attrs.frozen(eq=False)
@@ -45,7 +50,7 @@ class Trajectory:
     wall_time: float
 
     @classmethod
-    def of(cls, run, status, wall_time):
+    def of(cls, run: Run, status: Status, wall_time: float) -> "Trajectory":
         """What a Run has come to."""
         times, position, velocity = run.motion()
         adaptive = np.isfinite(run.clock[TOLERANCE])
@@ -55,7 +60,7 @@ class Trajectory:
         )  # fmt: skip
 
 
-def as_tuple(values, what):
+def as_tuple(values: Any, what: str) -> tuple:
     """A sequence as a tuple; UsageError for one lone object."""
     try:
         return tuple(values)
@@ -63,7 +68,7 @@ def as_tuple(values, what):
         raise UsageError(f"{what} must be a list, found {values!r}: write [{what}]") from None
 
 
-def check_bodies(bodies):
+def check_bodies(bodies: Iterable[Body]) -> tuple[Body, ...]:
     """The bodies as a tuple; UsageError for none, or for what is no Body."""
     bodies = as_tuple(bodies, "bodies")
     if not bodies:
@@ -74,7 +79,7 @@ def check_bodies(bodies):
     return bodies
 
 
-def check_forces(forces):
+def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
     """The forces as a tuple; UsageError for what is no Force object."""
     forces = as_tuple(forces, "forces")
     for force in forces:
@@ -86,13 +91,12 @@ def check_forces(forces):
     return forces
 
 
-def check_fluid(instance, attribute, value):
-    """attrs validator: a Fluid object."""
+def check_fluid(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if not isinstance(value, Fluid):
         raise UsageError(f"the fluid must be a Fluid object, found {value!r}")
 
 
-def check_limits(until, max_steps):
+def check_limits(until: float, max_steps: int) -> None:
     """UsageError unless ``until`` is a time above zero and ``max_steps`` a whole number."""
     if not is_number(until) or not until > 0.0:
         raise UsageError(f"until must be a time above 0 s, found {until!r}")
@@ -100,8 +104,7 @@ def check_limits(until, max_steps):
         raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
 
 
-def check_integrator(instance, attribute, value):
-    """attrs validator: an Integrator object."""
+def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if not isinstance(value, Integrator):
         raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
 
@@ -118,21 +121,21 @@ class System:
     'FINISHED'
     """
 
-    bodies: tuple = attrs.field(converter=check_bodies)
-    forces: tuple = attrs.field(default=(), converter=check_forces)
+    bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
+    forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
     integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
     fluid: Fluid = attrs.field(factory=Fluid, validator=check_fluid)
-    pieces: object = attrs.field(init=False, repr=False)
+    pieces: Pieces = attrs.field(init=False, repr=False)
 
-    def __attrs_post_init__(self):
+    def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
 
     @property
-    def spheres_only(self):
+    def spheres_only(self) -> bool:
         """Whether no body has an edge."""
         return all(len(body.shape.vertices) == 1 for body in self.bodies)
 
-    def scene(self, *, jit=True):
+    def scene(self, *, jit: bool = True) -> Scene:
         """The bodies as arrays for the drivers, with the laws that their forces add up to.
 
         KernelError for a law that cannot be compiled.
@@ -144,23 +147,25 @@ class System:
             surface_reach=pieces.surface_reach, events=pieces.events,
         )  # fmt: skip
 
-    def motion(self):
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (n, 3) at the start."""
         position = [(*body.position, body.angle) for body in self.bodies]
         velocity = [(*body.velocity, body.spin) for body in self.bodies]
         return np.array(position, dtype=float), np.array(velocity, dtype=float)
 
-    def fillings(self, observer=None):
+    def fillings(self, observer: Fillings | None = None) -> Fillings:
         """{hook: function} of integrator, shapes and an observer."""
-        shapes = spheres_only.FILLINGS if self.spheres_only else {}
+        shapes: Fillings = spheres_only.FILLINGS if self.spheres_only else {}
         return {**self.integrator.fillings, **shapes, **(observer or {})}
 
-    def compose(self, entry=advance, observer=None, *, jit=True):
+    def compose(
+        self, entry: Callable = advance, observer: Fillings | None = None, *, jit: bool = True
+    ) -> Callable:
         """The driver of this family of scenes as one function, compiled unless ``jit=False``."""
         calls = compiled_calls() if jit else {}
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit)
 
-    def check_overlaps(self):
+    def check_overlaps(self) -> None:
         """UsageError where two bodies start with crossing cores or too deep an overlap."""
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
             fault = overlap_fault(
@@ -170,7 +175,9 @@ class System:
             if fault:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
 
-    def run(self, until, *, max_steps=1_000_000, record=True, jit=True):
+    def run(
+        self, until: float, *, max_steps: int = 1_000_000, record: bool = True, jit: bool = True
+    ) -> Trajectory:
         """Move the bodies until a time [s] and return the Trajectory.
 
         A run that ends early says why in ``Trajectory.status``; it raises no exception.
@@ -183,8 +190,15 @@ class System:
         return Trajectory.of(run, status, time.perf_counter() - began)
 
     def begin(
-        self, until, *, max_steps=1_000_000, record=False, observer=None, observed=None, jit=True
-    ):
+        self,
+        until: float,
+        *,
+        max_steps: int = 1_000_000,
+        record: bool = False,
+        observer: Fillings | None = None,
+        observed: np.ndarray | None = None,
+        jit: bool = True,
+    ) -> Run:
         """A Run to a time [s] that has yet to take its first step.
 
         ``observer`` {hook: function} may stand in for hooks.observe and hooks.awaits_touch, and
@@ -196,7 +210,7 @@ class System:
             self.integrator, until, max_steps=max_steps, observed=observed, record=record,
         )  # fmt: skip
 
-    def explain(self):
+    def explain(self) -> str:
         """What is compiled into this scene and what is left out, each with its reason, as text.
 
         Ends with the scene's time scales and the step that an explicit method would need.

@@ -22,7 +22,9 @@ import re
 import sys
 import types
 import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
 from flocsim.errors import KernelError
@@ -30,8 +32,14 @@ from flocsim.errors import KernelError
 INLINED_SIZE = 800
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
 
-_composed = {}
-_warned = []
+UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of functions that only compiled code calls."""
+
+MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
+"""Files that are made here, and say nothing to a user."""
+
+_composed: dict = {}
+_warned: list[OSError] = []
 
 
 class Linker:
@@ -64,7 +72,7 @@ class Linker:
         return copy
 
 
-def cache_folder():
+def cache_folder() -> Path | None:
     """The folder of compiled scenes, or None where it cannot be written (said once)."""
     folder = cache_path()
     try:
@@ -89,8 +97,7 @@ def warn_uncached(error):
         )
 
 
-def cache_path():
-    """Where compiled scenes should go."""
+def cache_path() -> Path:
     import platformdirs
 
     return Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
@@ -141,10 +148,6 @@ def linked_module(entry, fillings, name, options):
     return module, folder is not None
 
 
-UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Options of functions that only compiled code calls."""
-
-
 def options_of(allocates):
     """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
     from flocsim.compiler.numba_internals import NO_COUNTING
@@ -191,11 +194,13 @@ def compiler_complaint(text):
     return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
 
 
-MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
-"""Files that are made here, and say nothing to a user."""
-
-
-def compose(entry, fillings, *, jit=True, allocates=False):
+def compose(
+    entry: Callable,
+    fillings: dict[Callable, Callable],
+    *,
+    jit: bool = True,
+    allocates: bool = False,
+) -> Callable:
     """The driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
@@ -213,7 +218,7 @@ def compose(entry, fillings, *, jit=True, allocates=False):
     return _composed[key]
 
 
-def compile_law(law, signature):
+def compile_law(law: Callable, signature: Any) -> int:
     """The address [int] at which an engine calls a plain function, compiled for a numba signature.
 
     Raises KernelError for what captures variables, reads globals that may change, or cannot be

@@ -8,6 +8,8 @@ import hashlib
 import inspect
 import sys
 import types
+from collections.abc import Callable
+from typing import Any
 
 from flocsim.errors import KernelError
 
@@ -15,13 +17,13 @@ LITERALS = (bool, int, float, complex, str, bytes, type(None))
 """Types of globals that a kernel may read: their value is part of the hash."""
 
 
-def where(function):
+def where(function: Any) -> str:
     """ "name (file:line)" of a function, for messages."""
     code = function.__code__
     return f"{function.__qualname__} ({code.co_filename}:{code.co_firstlineno})"
 
 
-def refuse_closure(function):
+def refuse_closure(function: Any) -> None:
     """KernelError where the function captures variables."""
     if function.__closure__:
         captured = ", ".join(function.__code__.co_freevars)
@@ -31,7 +33,7 @@ def refuse_closure(function):
         )
 
 
-def names_in(code):
+def names_in(code: types.CodeType) -> set[str]:
     """Global names that the code reads, those of nested code included."""
     names = set(code.co_names)
     for constant in code.co_consts:
@@ -45,7 +47,7 @@ def plain(value):
     return getattr(value, "py_func", value)
 
 
-def reached(function):
+def reached(function: Any) -> dict[str, Any]:
     """The globals that a function reads: {name: value}."""
     known = function.__globals__
     names = sorted(names_in(function.__code__))
@@ -129,13 +131,13 @@ def is_literal(value):
     return isinstance(value, LITERALS)
 
 
-def fingerprint(entry, fillings, options=""):
+def fingerprint(entry: Any, fillings: dict[Callable, Callable], options: str = "") -> str:
     """A hash of everything that the composed function does, and of how it is compiled."""
     import numba
     import numpy
 
     lines = [sys.version, numba.__version__, numpy.__version__, options]
-    seen = {}
+    seen: dict[Callable, int] = {}
 
     def visit(function):
         function = fillings.get(function, function)

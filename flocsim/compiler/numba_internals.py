@@ -19,6 +19,8 @@ import functools
 import gc
 import os
 import threading
+from collections.abc import Callable, Iterator
+from typing import Any
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 """Names of what to leave out, to measure what it gains."""
@@ -29,14 +31,14 @@ NO_COUNTING = {"_nrt": False}
 _one_at_a_time = threading.RLock()
 
 
-def compiler_error():
+def compiler_error() -> type[Exception]:
     """What numba raises for a function that it cannot compile."""
     from numba.core.errors import NumbaError
 
     return NumbaError
 
 
-def call_by_address(signature):
+def call_by_address(signature: Any) -> Callable:
     """A function for compiled code: ``call(address, *arguments)`` of a function of a signature.
 
     The arguments must have just the types of the signature.
@@ -77,7 +79,7 @@ def call_by_address(signature):
     return call
 
 
-def address_of(dispatcher, signature):
+def address_of(dispatcher: Any, signature: Any) -> int:
     """The address of a compiled function of a signature, for ``call_by_address``.
 
     It holds as long as the dispatcher lives.
@@ -125,7 +127,7 @@ def linked_library(base):
 
 
 @functools.cache
-def inner_compiler():
+def inner_compiler() -> dict[str, Any]:
     """{option: value} of numba.njit for functions that are only linked into others."""
     if "inner_compiler" in WITHOUT:
         return {}
@@ -162,7 +164,7 @@ def inner_compiler():
     return {"pipeline_class": InnerCompiler}
 
 
-def typed_once(dispatcher):
+def typed_once(dispatcher: Any) -> Any:
     """The function, not compiled anew for every constant that it is called with."""
     from numba import types
 
@@ -224,7 +226,7 @@ def types_remembered():
 
 
 @contextlib.contextmanager
-def quick_typing():
+def quick_typing() -> Iterator[None]:
     """Compile in here, one thread at a time, as numba does."""
     if "quick_typing" in WITHOUT:
         yield

@@ -7,8 +7,13 @@ it runs uncompiled for debugging and compiled at the speed of hand-written code.
 values never recompile.
 """
 
+from collections.abc import Callable
+from typing import Any, ClassVar
+
 import attrs
 import numpy as np
+
+from flocsim.body import Fluid
 
 
 @attrs.frozen
@@ -20,12 +25,12 @@ class Force:
         """The law itself; each kind says what it returns."""
         raise NotImplementedError("a force needs a static method `kernel`")
 
-    def kernel_in(self, fluid):
+    def kernel_in(self, fluid: Fluid) -> Callable:
         """The kernel to use in this fluid; a subclass may have a cheaper one for some fluids."""
         return self.kernel
 
     @property
-    def absent(self):
+    def absent(self) -> str:
         """Why a scene can leave this force out ("" where it cannot), e.g. a zero strength."""
         return ""
 
@@ -43,15 +48,15 @@ class PairForce(Force):
     the implicit integrators; without it they take differences of the kernel.
     """
 
-    slope = None
+    slope: ClassVar[Any] = None
 
     @property
-    def acts_on(self):
+    def acts_on(self) -> str:
         """ "centres" (along the line of centres) or "surfaces" (at the closest points)."""
         raise NotImplementedError("subclass CentreForce or SurfaceForce")
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The gap [m] beyond which the force is left out, and not even called."""
         return np.inf
 
@@ -61,7 +66,7 @@ class CentreForce(PairForce):
     """A PairForce along the line of centres, of the gap between the equivalent spheres."""
 
     @property
-    def acts_on(self):
+    def acts_on(self) -> str:
         """Always the centres: no torque."""
         return "centres"
 
@@ -71,7 +76,7 @@ class SurfaceForce(PairForce):
     """A PairForce at the closest points of the two outlines, of the gap between them."""
 
     @property
-    def acts_on(self):
+    def acts_on(self) -> str:
         """Always the surfaces: with torque."""
         return "surfaces"
 
@@ -87,10 +92,10 @@ class ContactForce(Force):
     (a clip, a threshold), and steps of controlled error end there.
     """
 
-    slip_limit = None
-    events = None
+    slip_limit: ClassVar[Any] = None
+    events: ClassVar[Any] = None
 
     @property
-    def has_events(self):
+    def has_events(self) -> bool:
         """Whether the law has kinks with these parameters."""
         return self.events is not None

@@ -5,12 +5,15 @@ import inspect
 import math
 import traceback
 import types
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from numbers import Real
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import names_in, reached, refuse_closure, where
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
@@ -27,7 +30,7 @@ SAMPLE_GAPS = (-1e-9, 1e-10, 1e-7)
 """Gaps [m] of the sample pairs: in contact, nearly so, apart."""
 
 
-def sample_pairs(reach):
+def sample_pairs(reach: float) -> tuple[PairView, ...]:
     """PairViews with gaps of either sign, within the reach of the force [m]."""
     gaps = [min(gap, 0.5 * reach) for gap in SAMPLE_GAPS]
     return tuple(
@@ -85,7 +88,7 @@ def as_numbers(value):
     return float(value)
 
 
-def kernel_arguments(force, fluid, kernel):
+def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
     """What a kernel is called with after its view; KernelError for what is no number."""
     arguments = []
     for name in list(inspect.signature(kernel).parameters)[1:]:
@@ -105,22 +108,15 @@ def failing_line(error):
     return f"{frame.filename}:{frame.lineno}"
 
 
-def misread(view, error):
-    """What is wrong with a read of an attribute that a view has not."""
-    fields = type(view)._fields
-    near = difflib.get_close_matches(error.name, fields, n=1)
-    advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
-    has_not = f"which a {type(view).__name__} has not"
-    return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
-
-
 def is_arithmetic(error):
     """Whether the numbers are to blame, which the compiled code answers with inf or nan."""
     unpacking = "unpack" in str(error)
     return isinstance(error, ArithmeticError) or (isinstance(error, ValueError) and not unpacking)
 
 
-def results(force, kernel, samples, arguments):
+def results(
+    force: Force, kernel: Callable, samples: Iterable, arguments: Sequence
+) -> Iterator[Any]:
     """What a kernel returns for the samples, those beyond its arithmetic left out."""
     for view in samples:
         try:
@@ -133,20 +129,18 @@ def results(force, kernel, samples, arguments):
 def failure(view, error):
     """What a kernel did wrong, in words, from the exception that it raised for a sample."""
     if isinstance(error, AttributeError) and error.obj is view:
-        return misread(view, error)
+        fields = type(view)._fields
+        near = difflib.get_close_matches(error.name, fields, n=1)
+        advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
+        has_not = f"which a {type(view).__name__} has not"
+        return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"fails in {failing_line(error)}: {what}"
 
 
-def is_kind(result, parts):
-    """Whether a result is one number, or a tuple of as many numbers as there are parts."""
-    if parts == 1:
-        return isinstance(result, Real)
-    return (
-        isinstance(result, tuple)
-        and len(result) == parts
-        and all(isinstance(part, Real) for part in result)
-    )
+def are_numbers(result):
+    """Whether a result is a tuple of numbers."""
+    return isinstance(result, tuple) and all(isinstance(part, Real) for part in result)
 
 
 def check_results(force, fluid, kernel, samples, *parts):
@@ -154,7 +148,8 @@ def check_results(force, fluid, kernel, samples, *parts):
     require_plain(force, kernel)
     arguments = kernel_arguments(force, fluid, kernel)
     for result in results(force, kernel, samples, arguments):
-        if not is_kind(result, len(parts)):
+        several = are_numbers(result) and len(result) == len(parts)
+        if not (several if len(parts) > 1 else isinstance(result, Real)):
             wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
             raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
 
@@ -163,7 +158,6 @@ class Watched:
     """A view that notes which of its fields are read, by name, by index, or by unpacking."""
 
     def __init__(self, view):
-        """``read`` collects the names."""
         self.view, self.read = view, set()
 
     def __getattr__(self, name):
@@ -175,7 +169,7 @@ class Watched:
         return self.view[index]
 
 
-def fields_read(force, fluid, kernel, samples):
+def fields_read(force: Force, fluid: Fluid, kernel: Callable, samples: Iterable) -> set[str]:
     """Names that a kernel reads of its view: those in its code and its helpers', and those that
     it is seen to read without a name."""
     names, pending, known = set(), [kernel], set()
@@ -191,7 +185,7 @@ def fields_read(force, fluid, kernel, samples):
     return names.union(*(each.read for each in watched))
 
 
-def reach_of(force):
+def reach_of(force: PairForce) -> float:
     """The force's reach; KernelError unless it is a number."""
     reach = computed(force, force, "reach")
     if not isinstance(reach, Real) or math.isnan(reach):
@@ -200,7 +194,6 @@ def reach_of(force):
 
 
 def check_pair_force(force, fluid):
-    """KernelError for a pair force whose place, reach, kernel or slope is wrong."""
     if type(force).acts_on is PairForce.acts_on:
         raise KernelError(f"{type(force).__name__} must subclass CentreForce or SurfaceForce")
     samples = sample_pairs(reach_of(force))
@@ -210,7 +203,6 @@ def check_pair_force(force, fluid):
 
 
 def check_contact_force(force, fluid):
-    """KernelError for a contact force whose kernel, slip limit or events are wrong."""
     check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
     if force.slip_limit is not None:
         check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
@@ -228,21 +220,19 @@ def check_events(force, fluid):
     arguments = kernel_arguments(force, fluid, force.events)
     found = list(results(force, force.events, SAMPLE_CONTACTS, arguments))
     for result in found:
-        numbers = isinstance(result, tuple) and all(isinstance(each, Real) for each in result)
-        if not numbers or len(result) != len(found[0]) or not result:
+        if not are_numbers(result) or len(result) != len(found[0]) or not result:
             raise refusal(
                 force, force.events,
                 f"returns {result!r}; it must return a tuple of numbers, always as many",
             )  # fmt: skip
 
 
-def event_count(force, fluid):
-    """How many events a contact force has."""
+def event_count(force: ContactForce, fluid: Fluid) -> int:
     arguments = kernel_arguments(force, fluid, force.events)
     return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
 
 
-def check_kernel(force, fluid):
+def check_kernel(force: Force, fluid: Fluid) -> None:
     """KernelError, with force, file and line, unless all kernels of a force can be used.
 
     Each is called uncompiled on samples of the view that it will get, which finds misspelt

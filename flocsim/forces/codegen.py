@@ -6,10 +6,12 @@ derivatives of what no kernel reads) is not written, and is no law of the scene.
 """
 
 import functools
+from collections.abc import Callable, Iterable
 
 import attrs
 
 from flocsim.arrays import PairView
+from flocsim.body import Fluid
 from flocsim.errors import UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.forces.check import (
@@ -38,12 +40,12 @@ class Pieces:
     numbers, the gap up to which surface forces reach (−1: there are none), how many events its
     contact forces have, and which forces are used and left out."""
 
-    laws: dict = attrs.Factory(dict)
-    parameters: list = attrs.Factory(list)
+    laws: dict[str, Callable] = attrs.Factory(dict)
+    parameters: list[float] = attrs.Factory(list)
     surface_reach: float = -1.0
     events: int = 0
-    used: dict = attrs.Factory(dict)
-    left_out: dict = attrs.Factory(dict)
+    used: dict[str, Force] = attrs.Factory(dict)
+    left_out: dict[str, str] = attrs.Factory(dict)
 
 
 @attrs.define
@@ -51,10 +53,10 @@ class Source:
     """The source of the laws of one kind of force, the kernels that it names, and the numbers that
     it reads from ``parameters``, from place ``BASE`` on."""
 
-    fluid: object
-    functions: list = attrs.Factory(list)
-    kernels: dict = attrs.Factory(dict)
-    numbers: list = attrs.Factory(list)
+    fluid: Fluid
+    functions: list[str] = attrs.Factory(list)
+    kernels: dict[str, Callable] = attrs.Factory(dict)
+    numbers: list[float] = attrs.Factory(list)
 
     def value(self, value):
         """Keep a number or a tuple of numbers; the text that reads it back."""
@@ -133,7 +135,6 @@ def write_body_laws(source, forces):
 
 
 def write_pair_laws(source, forces, kind):
-    """Centre forces or surface forces, and their derivatives."""
     force_terms, slope_terms, damping_terms = [], [], []
     for force in forces:
         condition = f"pair.gap < {source.value(reach_of(force))}"
@@ -216,7 +217,7 @@ def sort_forces(pieces, forces, fluid):
     return kinds
 
 
-def laws_of(forces, fluid):
+def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     """The Pieces of a scene with these forces in this fluid."""
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)

@@ -41,32 +41,32 @@ class Contact(ContactForce):
     tension: bool = flag(default=True, help="false: the normal force never pulls")
 
     @property
-    def critical(self):
+    def critical(self) -> float:
         """1.0 where λ_n follows from critical damping, else 0.0."""
         return float(self.damping_n == "critical")
 
     @property
-    def lambda_n(self):
+    def lambda_n(self) -> float:
         """λ_n [1/s] where it is given, else 0."""
         return 0.0 if self.damping_n == "critical" else float(self.damping_n)
 
     @property
-    def proportional(self):
+    def proportional(self) -> float:
         """k_t/k_n where λ_t follows λ_n, else 0."""
         return self.k_t / self.k_n if self.damping_t == "proportional" else 0.0
 
     @property
-    def lambda_t(self):
+    def lambda_t(self) -> float:
         """λ_t [1/s] where it is given, else 0."""
         return 0.0 if self.damping_t == "proportional" else float(self.damping_t)
 
     @property
-    def friction_limit(self):
+    def friction_limit(self) -> float:
         """µ as a number: inf where nothing slides."""
         return math.inf if self.friction == "none" else float(self.friction)
 
     @property
-    def has_events(self):
+    def has_events(self) -> bool:
         """Whether anything is clipped."""
         return not self.tension or self.friction_limit < math.inf
 

@@ -25,29 +25,27 @@ class DoubleLayer(PairForce):
     gap: str = choice(*GAPS, default="equivalent_spheres")
 
     @property
-    def acts_on(self):
-        """Where the force acts, from ``gap``."""
+    def acts_on(self) -> str:
         return GAPS[self.gap]
 
     @property
-    def kappa(self):
+    def kappa(self) -> float:
         """κ [1/m], the reciprocal Debye length."""
         return 1.0 / self.debye_length
 
     @property
-    def strength(self):
+    def strength(self) -> float:
         """4π ε0 ε_r κ φ² [N/m]: the repulsion at contact for unit reduced radius."""
         charge = 4.0 * math.pi * VACUUM_PERMITTIVITY * self.permittivity
         return charge * self.potential**2 / self.debye_length
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The gap at which the repulsion has become negligible [m]."""
         return -math.log(NEGLIGIBLE_FORCE) * self.debye_length
 
     @property
-    def absent(self):
-        """Without a potential there is no repulsion."""
+    def absent(self) -> str:
         return "potential is zero" if self.potential == 0.0 else ""
 
     @staticmethod

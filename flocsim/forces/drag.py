@@ -1,9 +1,11 @@
 """Stokes drag."""
 
 import math
+from collections.abc import Callable
 
 import attrs
 
+from flocsim.body import Fluid
 from flocsim.fields import flag
 from flocsim.forces.base import BodyForce
 
@@ -24,7 +26,7 @@ class StokesDrag(BodyForce):
 
     rotational: bool = flag(default=True, help="drag torque on spinning bodies")
 
-    def kernel_in(self, fluid):
+    def kernel_in(self, fluid: Fluid) -> Callable:
         """Still water needs no flow, and no derivative by the place."""
         return self.kernel if any(fluid.flow) else self.still
 

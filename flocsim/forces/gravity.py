@@ -17,8 +17,7 @@ class Gravity(BodyForce):
     g: float = quantity("m/s^2", at_least=0.0, default=STANDARD_GRAVITY)
 
     @property
-    def absent(self):
-        """Without g there is no weight."""
+    def absent(self) -> str:
         return "g is zero" if self.g == 0.0 else ""
 
     @staticmethod

@@ -24,18 +24,16 @@ class VanDerWaals(PairForce):
     gap: str = choice(*GAPS, default="equivalent_spheres")
 
     @property
-    def acts_on(self):
-        """Where the force acts, from ``gap``."""
+    def acts_on(self) -> str:
         return GAPS[self.gap]
 
     @property
-    def reach(self):
+    def reach(self) -> float:
         """The gap at which the attraction has become negligible [m]."""
         return self.d_min / NEGLIGIBLE_FORCE**0.5
 
     @property
-    def absent(self):
-        """Without a Hamaker constant there is no attraction."""
+    def absent(self) -> str:
         return "hamaker is zero" if self.hamaker == 0.0 else ""
 
     @staticmethod

@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from enum import IntEnum
 
 import attrs
@@ -37,7 +38,7 @@ class Status(IntEnum):
     NOT_FINITE = 9
 
     @property
-    def reason(self):
+    def reason(self) -> str:
         """What happened and what to do, in one line."""
         return REASONS[self]
 
@@ -94,18 +95,18 @@ class Integrator(ABC):
         """The size of the step after one of that size [s]."""
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """{hook of flocsim.hooks.HOOKS: function} besides."""
         return {}
 
     @property
-    def fillings(self):
+    def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of this integrator."""
         return {
             hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
         }  # fmt: skip
 
-    def fresh_clock(self):
+    def fresh_clock(self) -> np.ndarray:
         """The float state of a run that starts at time zero."""
         clock = np.zeros(CLOCK_SIZE)
         clock[UNTIL] = math.inf
@@ -117,7 +118,7 @@ class Integrator(ABC):
         clock[SETTLED_STEP] = math.inf
         return clock
 
-    def fresh_counts(self, max_steps):
+    def fresh_counts(self, max_steps: int) -> np.ndarray:
         """The integer state of a run with a step budget."""
         counts = np.zeros(COUNTS_SIZE, dtype=np.int64)
         counts[MAX_STEPS] = max_steps

@@ -79,7 +79,6 @@ def combine_slips(work, weights, stages, step, end):
 
 
 def times(weights, step):
-    """Seven weights times a number."""
     a, b, c, d, e, f, g = weights
     return a * step, b * step, c * step, d * step, e * step, f * step, g * step
 

@@ -1,5 +1,7 @@
 """Implicit: Radau IIA of order 5 on smooth stretches, for any stiffness."""
 
+from collections.abc import Callable
+
 import attrs
 
 from flocsim.arrays import (
@@ -49,7 +51,6 @@ def estimated_rate(work, row, first, step):
 
 
 def write_error_load(scene, work, step):
-    """The load whose solution is the error of the velocities."""
     size = work.jacobian.shape[1]
     damped = step / EIGENVALUES[REAL].real
     for row in range(size):
@@ -64,7 +65,6 @@ def write_error_load(scene, work, step):
 
 
 def estimate_error(scene, work, step):
-    """Write the error of the step into DEVIATION."""
     write_error_load(scene, work, step)
     size = work.jacobian.shape[1]
     sum_over_clusters(work, REAL, size, size + 1)
@@ -122,6 +122,6 @@ class Implicit(Integrator):
         return step * max(factor, SMALLEST_FACTOR)
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """Dense output by the stages' cubic, and longer lists."""
         return {interpolate: collocate, skin_factor: wide_skin}

@@ -1,5 +1,7 @@
 """Overdamped: no inertia, for scenes of small Stokes number."""
 
+from collections.abc import Callable
+
 import attrs
 
 from flocsim.integrators.implicit import Implicit
@@ -21,6 +23,6 @@ class Overdamped(Implicit):
     """
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """No inertia besides what Implicit replaces."""
         return {**super().replaces, inertia: massless}

@@ -5,6 +5,7 @@ says what ``attempt`` is given and has to fill.
 """
 
 import math
+from collections.abc import Callable
 
 import attrs
 
@@ -78,7 +79,6 @@ def move_slips(scene, work, step):
 
 
 def all_finite(work, state):
-    """Whether every place and velocity of a state is finite."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
             if not math.isfinite(work.motion[state, body, axis]):
@@ -100,20 +100,17 @@ class FixedStep(Integrator):
 
     @staticmethod
     def next_step(clock, step, ratio):
-        """All steps are equal."""
         return clock[LARGEST_STEP]
 
     @property
-    def first_step(self):
-        """All steps are equal."""
+    def first_step(self) -> float:  # type: ignore[override]
         return self.step
 
     @property
-    def largest_step(self):
-        """All steps are equal."""
+    def largest_step(self) -> float:  # type: ignore[override]
         return self.step
 
     @property
-    def replaces(self):
+    def replaces(self) -> dict[Callable, Callable]:
         """Pairs are located and flagged at every evaluation."""
         return {locate_acting: locate_and_flag}

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from flocsim import Body, Sphere, SpheroPolygon, System, hooks
-from flocsim.arrays import NOW, with_capacity
+from flocsim.arrays import NOW, work_of
 from flocsim.forces import BodyForce, CentreForce, Contact, ContactForce, SurfaceForce
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators import Status
@@ -136,7 +136,7 @@ def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit
     observed = np.zeros(OBSERVED_SIZE)
     observed[AWAITED] = float(awaited)
     run = system.begin(until, max_steps=max_steps, observer=WATCH, observed=observed, jit=jit)
-    run.work = with_capacity(run.work, capacity)
+    run.work = work_of(run.scene, *system.motion(), capacity)
     status = run.to_end()
     return Watched(
         motion=run.work.motion[NOW].copy(), status=status, time=run.time, steps=run.steps,

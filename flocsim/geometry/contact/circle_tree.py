@@ -12,6 +12,7 @@ single arrays instead of the whole scene, which would cost more to pass than the
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from flocsim.arrays import X, Y
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.shape import Shape
 
 LEAF = 2
 """Core points in a run that is not split any more: from this to twice as many."""
@@ -59,7 +61,7 @@ def circles_around(runs, margin):
     return np.where(box[:, 2:] <= chord[:, 2:], box, chord)
 
 
-def tree_of(vertices):
+def tree_of(vertices: np.ndarray) -> np.ndarray:
     """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
 
     Rows that the tree does not fill, row 0 among them, are 0.
@@ -89,11 +91,10 @@ class Outlines(NamedTuple):
 
 @lru_cache(maxsize=256)
 def tree_of_shape(shape):
-    """The tree of a shape, made once."""
     return tree_of(shape.vertices)
 
 
-def outlines_of(shapes):
+def outlines_of(shapes: Sequence[Shape]) -> Outlines:
     """The Outlines of some shapes, one body each."""
     sizes = [len(shape.vertices) for shape in shapes]
     return Outlines(
@@ -155,13 +156,11 @@ A walk is over when its first number is 0.
 
 
 def goes_on(walk):
-    """Whether a walk is not over yet."""
     i, _, _, _ = walk
     return i > 0
 
 
 def circles_met(tree, pose, plan, walk):
-    """circle_reach of the two nodes."""
     i, j, _, _ = walk
     row_a, row_b, _, _, _, _ = plan
     return circle_reach(tree, pose, row_a + i, row_b + j)
@@ -174,7 +173,6 @@ def within(tree, pose, plan, walk, distance):
 
 
 def at_leaves(plan, walk):
-    """Whether neither node can be split."""
     _, _, level_a, level_b = walk
     _, _, leaves_a, leaves_b, _, _ = plan
     return level_a == leaves_a and level_b == leaves_b

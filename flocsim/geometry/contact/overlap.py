@@ -12,7 +12,7 @@ from flocsim.geometry.shapes.cores import (
 )
 
 
-def distance_between(a, b):
+def distance_between(a: np.ndarray, b: np.ndarray) -> float:
     """Smallest distance [m] between a core point of one and the core of the other."""
     distances = [np.hypot(*(a[0] - b[0]))]
     for points, core in ((a, b), (b, a)):
@@ -22,7 +22,7 @@ def distance_between(a, b):
     return min(distances)
 
 
-def overlap_fault(a, radius_a, b, radius_b):
+def overlap_fault(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> str | None:
     """What is wrong with two placed cores (N, 2) and their radii, in words; None if nothing is."""
     if inside_polygon(a, b).any() or inside_polygon(b, a).any() or cores_cross(a, b):
         return "with one core inside or across the other"
@@ -32,7 +32,7 @@ def overlap_fault(a, radius_a, b, radius_b):
     return None
 
 
-def touching_points(a, radius_a, b, radius_b):
+def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
     """Middles (c, 2) [m] of the overlaps of two placed cores (N, 2) with their radii."""
     found = []
     for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):

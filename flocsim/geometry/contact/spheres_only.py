@@ -1,5 +1,7 @@
 """What replaces the polygon code in a scene of spheres: one pair per two bodies."""
 
+from collections.abc import Callable
+
 from flocsim.geometry.contact import near_pairs
 from flocsim.geometry.contact import points as contacts
 
@@ -8,7 +10,7 @@ def turn_nothing(work, state):
     """Spheres look the same at every angle."""
 
 
-FILLINGS = {
+FILLINGS: dict[Callable, Callable] = {
     contacts.turn_bodies: turn_nothing,
     near_pairs.list_polygons: near_pairs.list_spheres,
     near_pairs.gap_between: near_pairs.sphere_gap,

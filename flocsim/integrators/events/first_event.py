@@ -1,15 +1,22 @@
-"""How finely touching is told from not touching, and where in a step a pair switches."""
+"""Where in a step the first thing happens that must end it: a pair switches, a law has a kink.
+
+How finely touching is told from not touching. A contact force may have several kinks, as a clip or
+a threshold, and each is watched by itself: two that change their signs in one step would hide each
+other in a product. The force is continuous there, so that a step that ends a little behind the
+kink errs by the square of that little alone.
+"""
 
 import math
 
-from flocsim.arrays import CANDIDATES, GAP, NEW, NOW, TOLERANCE
+from flocsim.arrays import CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import first_switch
-from flocsim.integrators.events.law_events import law_event_share
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
+from flocsim.integrators.rhs.views import contact_view, pressed_view
+from flocsim.laws import contact_event
 
 GRAIN = 1e-3
 """A switch is located to this share of the tolerance, …"""
@@ -19,6 +26,13 @@ GRAIN_OF_OVERLAP = 0.02
 
 ROUNDING = 4e-16
 """… but not finer than this share of the places that the gap is the difference of."""
+
+KINK_FINENESS = 1e-4
+"""A kink is located to this share of how far the step began from it, …"""
+
+KINK_ROUNDING = 1e-6
+"""… and what lies within this share of the value for the same overlap at rest is as good as there:
+its sign may be rounding, and steps would end there for ever, and no time would go by."""
 
 
 def deepest_overlap(work):
@@ -36,6 +50,30 @@ def grain_of(work, clock):
     if deepest > 0.0:
         grain = min(grain, GRAIN_OF_OVERLAP * deepest)
     return max(grain, ROUNDING * furthest_place(work, NEW))
+
+
+def event_share(scene, work, row, which):
+    """The share of the step at which one contact passes one of its kinks, by linear interpolation;
+    2.0 where it does not, or is as good as there at either end."""
+    view = contact_view(scene, work, NOW, row)
+    before = contact_event(scene, view, which)
+    after = contact_event(scene, contact_view(scene, work, NEW, row), which)
+    nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
+    at_rest = contact_event(scene, pressed_view(view, view.overlap, 0.0), which)
+    as_good_as_there = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
+    if before * after >= 0.0 or nearer <= as_good_as_there:
+        return 2.0
+    # A little further than the kink, so that the next step begins behind it.
+    return (1.0 + 0.5 * KINK_FINENESS) * before / (before - after)
+
+
+def law_event_share(scene, work, share):
+    """The share of the step at which the first contact passes a kink, or the given one before."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            for which in range(scene.events):
+                share = min(share, event_share(scene, work, row, which))
+    return share
 
 
 def switch_share(scene, work, observed, clock, step):

@@ -2,7 +2,7 @@
 
 A pair is closed where its outlines overlap; of all pairs of two bodies one is the closest. Inside a
 step the flags stay as they are, so that the forces are smooth functions of the state; the driver
-ends the step where a flag would change (see switches.py).
+ends the step where a flag would change (see crossings.py).
 """
 
 from flocsim.arrays import CANDIDATES, CLOSED, CLOSEST, GAP, NOW

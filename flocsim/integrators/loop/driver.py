@@ -41,7 +41,7 @@ from flocsim.laws import CONTACT_FORCE, has
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10
 )
-"""The values of integrators.status.Status, as plain numbers for the compiled loop."""
+"""The values of integrators.base.Status, as plain numbers for the compiled loop."""
 
 MOST_TRIALS = 12
 """Steps tried to end at one switch."""

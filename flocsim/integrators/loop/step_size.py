@@ -1,7 +1,4 @@
-"""The size of the next step: from the last one's error, the lists, and what is about to switch.
-
-How the error of one step sets the size of the next.
-"""
+"""The size of the next step: from the last one's error, the lists, and what is about to switch."""
 
 import math
 
@@ -36,7 +33,6 @@ SAFETY = 0.9
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
 """Bounds of the change from one step to the next."""
-
 
 LOWEST_ORDER = 0.5
 """Least power of the step that an error is taken to go with."""
@@ -102,7 +98,6 @@ def imminent_switch(scene, work, clock, step):
 
 
 def choose_step(scene, work, clock, lists):
-    """The size of the next step [s]."""
     step = min(clock[STEP], clock[LARGEST_STEP])
     if lists:
         step = min(step, time_within(scene, work, 0.5))
@@ -129,39 +124,26 @@ def reject(clock, counts, step, ratio, too_far):
     return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
 
 
-def plan_behind_switch(clock):
-    """Behind a switch the forces are new, and settle about as fast as behind the last one."""
-    clock[PREVIOUS_STEP] = math.inf
-    clock[STAGED_STEP] = 0.0
-    clock[SETTLING] = 1.0
-    clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
-
-
-def plan_behind_alarm(clock, step):
-    """Behind a step that was cut for a switch which then did not come: too long to tell."""
-    clock[PREVIOUS_STEP] = math.inf
-    clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
-    clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
-
-
-def plan_next_step(clock, step, ratio):
-    """The size of the step after an accepted one that ran its length."""
-    if clock[SETTLING] == 1.0:
-        clock[SETTLED_STEP] = step
-        clock[SETTLING] = 0.0
-    cut = step < 0.5 * clock[STEP]
-    clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
-    clock[BEARABLE_STEP] *= RECOVERY
-    clock[PREVIOUS_STEP] = math.inf if cut else step
-    clock[PREVIOUS_RATIO] = ratio
-
-
 def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
     clock[REJECTED_STEP] = 0.0
     if switched == OTHER_CONTACTS or (was_cut and switched == OTHER_CLOSEST):
-        plan_behind_switch(clock)
+        # The forces are new, and settle about as fast as behind the last switch.
+        clock[PREVIOUS_STEP] = math.inf
+        clock[STAGED_STEP] = 0.0
+        clock[SETTLING] = 1.0
+        clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
     elif was_cut:
-        plan_behind_alarm(clock, step)
+        # The switch did not come: the step was too long to tell.
+        clock[PREVIOUS_STEP] = math.inf
+        clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
+        clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
     else:
-        plan_next_step(clock, step, ratio)
+        if clock[SETTLING] == 1.0:
+            clock[SETTLED_STEP] = step
+            clock[SETTLING] = 0.0
+        cut = step < 0.5 * clock[STEP]
+        clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
+        clock[BEARABLE_STEP] *= RECOVERY
+        clock[PREVIOUS_STEP] = math.inf if cut else step
+        clock[PREVIOUS_RATIO] = ratio

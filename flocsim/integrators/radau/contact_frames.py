@@ -48,7 +48,6 @@ from flocsim.laws import CENTRE_FORCE, has
 
 
 def acts(work, row):
-    """Whether a pair acts in this step."""
     return work.candidates[row, CLOSED] + work.candidates[row, CLOSEST] > 0
 
 
@@ -71,13 +70,6 @@ def gather_clusters(scene, work):
     for row in range(work.tally[CANDIDATES]):
         if acts(work, row):
             join(scene, work, work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
-
-
-def clear_frames(work):
-    """No contact seen yet."""
-    for body in range(work.bodies.shape[0]):
-        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
-            work.bodies[body, column] = 0.0
 
 
 def add_frame(work, row, stage):
@@ -135,7 +127,9 @@ def share_turns(work):
 
 def follow_contacts(work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
-    clear_frames(work)
+    for body in range(work.bodies.shape[0]):
+        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
+            work.bodies[body, column] = 0.0
     for row in range(work.tally[CANDIDATES]):
         if acts(work, row):
             for stage in range(3):

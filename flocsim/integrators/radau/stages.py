@@ -1,8 +1,8 @@
 """The stages of a Radau IIA step: collocation of place, velocity and tangential displacement.
 
 Unknown are the stages' velocities; places and displacements follow from them. Newton's method with
-the derivatives of the step's start, carried along with the contacts (frames.py), solves one real
-and one complex system of 3n equations.
+the derivatives of the step's start, carried along with the contacts (contact_frames.py), solves one
+real and one complex system of 3n equations.
 """
 
 import math
@@ -39,7 +39,6 @@ NEWTON_SHARE = 1e-3
 
 
 def place_stages(work, step):
-    """Places at the stages from the velocities there."""
     motion = work.motion
     for body in range(motion.shape[1]):
         for axis in range(3):
@@ -52,7 +51,6 @@ def place_stages(work, step):
 
 
 def slip_stages(work, step):
-    """Tangential displacements at the stages from their rates there."""
     slip = work.slip
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:

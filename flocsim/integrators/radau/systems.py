@@ -1,11 +1,9 @@
 """The linear systems of a Newton step: from what the stages fail to balance to new velocities.
 
-Radau's stages are decoupled along two eigenvectors (radau_tableau.py), in frames that go along with
-the contacts (frames.py).
-
-Small dense complex systems, factorised in place: compiles fast, unlike numpy.linalg in a kernel.
-
-System k is (m, m + 1): the matrix, then its factors; the load, then the solution.
+Radau's stages are decoupled along two eigenvectors (tableau.py), in frames that go along with the
+contacts (contact_frames.py). Their small dense complex systems are factorised in place here, which
+compiles fast, unlike numpy.linalg in a kernel; system k is (m, m + 1): the matrix, then its
+factors; the load, then the solution.
 """
 
 from flocsim.arrays import (
@@ -35,66 +33,44 @@ from flocsim.integrators.radau.tableau import (
 from flocsim.integrators.rhs.views import inertia
 
 
-def pivot_row(system, which, column):
-    """The row at or below the diagonal with the largest entry of the column."""
-    best = column
-    largest = abs(system[which, best, column])
-    for row in range(column + 1, system.shape[1]):
-        size = abs(system[which, row, column])
-        if size > largest:
-            best = row
-            largest = size
-    return best
-
-
-def swap_rows(system, which, a, b, columns):
-    """Exchange the first columns of two rows."""
-    for column in range(columns):
-        kept = system[which, a, column]
-        system[which, a, column] = system[which, b, column]
-        system[which, b, column] = kept
-
-
-def eliminate(system, which, pivot):
-    """Subtract the pivot's row from all below it, and keep the shares in their places."""
-    size = system.shape[1]
-    reciprocal = 1.0 / system[which, pivot, pivot]
-    for row in range(pivot + 1, size):
-        if system[which, row, pivot] != 0.0:
-            share = system[which, row, pivot] * reciprocal
-            system[which, row, pivot] = share
-            for column in range(pivot + 1, size):
-                system[which, row, column] -= share * system[which, pivot, column]
-
-
 def factorise(system, pivots, which):
     """Factorise a matrix with row pivoting (pivots (2, m)); False where it is singular."""
     size = system.shape[1]
     for pivot in range(size):
-        best = pivot_row(system, which, pivot)
+        best = pivot
+        largest = abs(system[which, best, pivot])
+        for row in range(pivot + 1, size):
+            entry = abs(system[which, row, pivot])
+            if entry > largest:
+                best = row
+                largest = entry
         if not abs(system[which, best, pivot]) > 0.0:
             return False
         pivots[which, pivot] = best
         if best != pivot:
-            swap_rows(system, which, pivot, best, size)
-        eliminate(system, which, pivot)
+            for column in range(size):
+                kept = system[which, pivot, column]
+                system[which, pivot, column] = system[which, best, column]
+                system[which, best, column] = kept
+        # Subtract the pivot's row from all below it, and keep the shares in their places.
+        reciprocal = 1.0 / system[which, pivot, pivot]
+        for row in range(pivot + 1, size):
+            if system[which, row, pivot] != 0.0:
+                share = system[which, row, pivot] * reciprocal
+                system[which, row, pivot] = share
+                for column in range(pivot + 1, size):
+                    system[which, row, column] -= share * system[which, pivot, column]
     return True
 
 
-def order_load(system, pivots, which):
-    """Bring the load into the order of the pivots."""
+def solve(system, pivots, which):
+    """Replace the load of a factorised system by the solution."""
     size = system.shape[1]
     for row in range(size):
         other = pivots[which, row]
         kept = system[which, row, size]
         system[which, row, size] = system[which, other, size]
         system[which, other, size] = kept
-
-
-def solve(system, pivots, which):
-    """Replace the load of a factorised system by the solution."""
-    size = system.shape[1]
-    order_load(system, pivots, which)
     for row in range(size):
         for column in range(row):
             system[which, row, size] -= system[which, row, column] * system[which, column, size]

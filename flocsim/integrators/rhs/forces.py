@@ -2,8 +2,6 @@
 
 Forces act through the listed pairs that are flagged as closed, or as the closest of two bodies.
 An integrator that freezes these flags for a step has a smooth right-hand side in it.
-
-What contacts can hold: the limit of their tangential displacements.
 """
 
 from flocsim.arrays import (
@@ -65,16 +63,7 @@ def take_stage(work, stage):
                 work.geometry[NEW, row, column] = work.geometry[stage, row, column]
 
 
-def start_rates(work, state):
-    """The velocities of a state, and no force yet."""
-    for body in range(work.bodies.shape[0]):
-        for axis in range(3):
-            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
-            work.rates[state, body, FORCE + axis] = 0.0
-
-
 def add_body_forces(scene, work, time, state):
-    """Weight, drag and their like."""
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, state, body)
         fx, fy, torque = body_force(scene, view)
@@ -82,7 +71,6 @@ def add_body_forces(scene, work, time, state):
 
 
 def add_centre_forces(scene, work, time, state):
-    """Forces along the lines of centres."""
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             view = centre_view(scene, work, time, state, a, b)
@@ -93,7 +81,6 @@ def add_centre_forces(scene, work, time, state):
 
 
 def add_surface_forces(scene, work, time, state):
-    """Forces at the closest points of the outlines."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSEST] == 1:
             view = surface_view(scene, work, time, state, row)
@@ -101,7 +88,6 @@ def add_surface_forces(scene, work, time, state):
 
 
 def add_contact_forces(scene, work, state):
-    """Visco-elastic forces of all closed pairs."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             view = contact_view(scene, work, state, row)
@@ -110,7 +96,6 @@ def add_contact_forces(scene, work, state):
 
 
 def rate_slips(work, state):
-    """Rates of the tangential displacements of all closed pairs."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             work.slip[SLIP_RATES + state, row] = tangential_rate(work, state, row)
@@ -126,7 +111,10 @@ def locate_and_rate(scene, work, state):
 def sum_forces(scene, work, time, state):
     """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
     work.tally[EVALUATIONS] += 1
-    start_rates(work, state)
+    for body in range(work.bodies.shape[0]):
+        for axis in range(3):
+            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
+            work.rates[state, body, FORCE + axis] = 0.0
     if has(scene, BODY_FORCE):
         add_body_forces(scene, work, time, state)
     if has(scene, CENTRE_FORCE):

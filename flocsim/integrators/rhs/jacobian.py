@@ -4,16 +4,11 @@ A force along a direction J (its entries on two bodies, three each) whose size d
 J·v gives products JᵀJ. What turning does to the directions is kept where it is of first order in
 the contact forces; the rest is left to Newton's iterations, whose result it does not touch.
 
-Directions of pairs on the coordinates of their two bodies, and products of them.
-
-What turning does to the force of a pair: its normal and its arms change with the bodies' places.
-
+Turning changes the force of a pair, whose normal and arms go with the bodies' places.
 With f = N n + T t the normal turns by ψ, and the force by (N t − T n) ψ. On the vertex's body the
 torque changes by A (ψ − θ_a), where A = p·f and p leads from the centroid to the vertex. On the
 edge's body, the same holds for an end of the edge; on its inside the foot slides by σ instead, and
 the torque changes by N σ.
-
-Derivatives of the contact forces, taken from the kernels by differences.
 """
 
 from flocsim.arrays import (
@@ -38,7 +33,7 @@ from flocsim.arrays import (
     BodyView,
     ContactView,
 )
-from flocsim.integrators.rhs.velocity_memory import remember_velocities
+from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.views import (
     body_view,
     centre_line,
@@ -112,7 +107,6 @@ def sliding_row(scene, work, row):
 
 
 def scaled(row, share):
-    """A direction's entries on one body, times a number."""
     x, y, angle = row
     return x * share, y * share, angle * share
 
@@ -156,7 +150,6 @@ def change_of(view, axis):
 
 
 def add_contact(scene, work, row):
-    """The derivatives of one contact's forces."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     view = contact_view(scene, work, NOW, row)
     normal, tangential = contact_force(scene, view)
@@ -173,7 +166,6 @@ def add_contact(scene, work, row):
 
 
 def add_contacts(scene, work):
-    """The derivatives of all closed pairs."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             add_contact(scene, work, row)
@@ -213,16 +205,7 @@ def add_position_derivative(scene, work, view, body):
             work.jacobian[STIFFNESS, 3 * body + part, 3 * body + axis] += stiffness
 
 
-def clear_jacobian(work):
-    """No derivative yet."""
-    for which in range(2):
-        for row in range(work.jacobian.shape[1]):
-            for column in range(work.jacobian.shape[2]):
-                work.jacobian[which, row, column] = 0.0
-
-
 def add_bodies(scene, work, time):
-    """Derivatives of the body forces."""
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, NOW, body)
         if has(scene, VELOCITY_FORCE):
@@ -232,7 +215,6 @@ def add_bodies(scene, work, time):
 
 
 def add_centres(scene, work, time):
-    """Derivatives of the centre forces."""
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             view = centre_view(scene, work, time, NOW, a, b)
@@ -262,7 +244,10 @@ def add_surfaces(scene, work, time):
 
 def weigh_velocities(scene, work, time, remaining):
     """Derivatives of the body forces, and from them how long each body remembers its velocity."""
-    clear_jacobian(work)
+    for which in range(2):
+        for row in range(work.jacobian.shape[1]):
+            for column in range(work.jacobian.shape[2]):
+                work.jacobian[which, row, column] = 0.0
     add_bodies(scene, work, time)
     remember_velocities(scene, work, remaining)
 

@@ -37,7 +37,6 @@ from flocsim.hooks import hook
 
 
 def body_view(scene, work, time, state, body):
-    """The BodyView of one body in a state."""
     motion, known = work.motion, scene.bodies
     return BodyView(
         time,
@@ -59,7 +58,6 @@ def effective_mass(scene, a, b):
 
 
 def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
-    """The PairView of two bodies."""
     radius_a = scene.bodies[a, EQUIVALENT_RADIUS]
     radius_b = scene.bodies[b, EQUIVALENT_RADIUS]
     return PairView(
@@ -95,7 +93,6 @@ def tangential_rate(work, state, row):
 
 
 def contact_view(scene, work, state, row):
-    """The ContactView of a listed pair in a state."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     return ContactView(
         -work.geometry[state, row, GAP], -normal_rate(work, state, row),
@@ -123,7 +120,6 @@ def lever(scene, body, axis):
 
 
 def add_force(work, state, body, fx, fy, torque):
-    """Add to the force and torque on a body in a state."""
     work.rates[state, body, FX] += fx
     work.rates[state, body, FY] += fy
     work.rates[state, body, TORQUE] += torque
