@@ -107,8 +107,7 @@ def frame_of(results: Results) -> Frame:
     with h5py.File(frame.image, "w") as file:
         file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
         study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
-        axes = (*AXES, "class")
-        write_group(file, "probabilities", results.probabilities, TABLE, axes,
+        write_group(file, "probabilities", results.probabilities, TABLE, (*AXES, "class"),
                     study | {"class": list(CLASSES)})  # fmt: skip
         if results.pooled:
             write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)

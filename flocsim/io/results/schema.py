@@ -124,7 +124,7 @@ class Results:
     flocs: tuple[str, ...] = attrs.field(default=(), converter=tuple)
     pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
     differences: dict[str, np.ndarray] = attrs.field(factory=dict)
-    count: int | None = None
+    count: int = 0
 
     def __attrs_post_init__(self):
         shape = self.shape
