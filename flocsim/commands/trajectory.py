@@ -1,6 +1,8 @@
 """`flocsim trajectory cfg.toml --replicate 17`: one collision as a strip of frames (Fig. 7)."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -10,6 +12,7 @@ from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import check_output, check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -21,7 +24,7 @@ from flocsim.io.trajectory import centre_distance, write_trajectory
 ANIMATION_FRAMES = 60
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "trajectory", help="run one replicate of a config and draw it as a strip of frames"
     )
@@ -53,10 +56,9 @@ def add_parser(subparsers):
     )  # fmt: skip
     parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
-    return parser
 
 
-def add_replicate(parser):
+def add_replicate(parser: ArgumentParser) -> None:
     """The arguments that name a replicate of a config; `select` finds it."""
     parser.add_argument("config", help="config file (TOML)")
     parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
@@ -90,7 +92,7 @@ def take_scene(args):
         raise UsageError(f"--scene must be TYPE,N,F such as I,16,0.5, found {args.scene}") from None
 
 
-def select(config, args):
+def select(config: Config, args: Namespace) -> tuple[int, int, float]:
     """(place of the condition, N, share of δ_max) that the arguments choose."""
     if not args.replicate >= 0:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
@@ -104,7 +106,7 @@ def select(config, args):
     return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
 
 
-def with_one_count(config, vertex_count):
+def with_one_count(config: Config, vertex_count: int) -> Config:
     """The config with one number of vertices: the flocs need no fits at the others."""
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
@@ -120,7 +122,6 @@ def check_outputs(args, figures):
 
 
 def outcome_line(config, place, replicate, row):
-    """One line on what happened."""
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
     reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
@@ -136,7 +137,6 @@ def outcome_line(config, place, replicate, row):
 
 
 def overrides(args):
-    """The command line's values as a nested dict over the config's."""
     from flocsim.ensembles.config.overrides import nested, parse_setting
 
     given = nested(map(parse_setting, args.settings))
@@ -167,14 +167,13 @@ def draw(args, encounter, arrays, row, title):
 
 
 def save_all(figure, names):
-    """Save a figure under every name; the paths."""
     paths = [Path(name) for name in names]
     for path in paths:
         save(figure, path)
     return paths
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
     config = load_config(args.config, overrides(args))
     take_scene(args)
@@ -195,6 +194,7 @@ def run(args):
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate}
         facts["zone_distance"] = encounter.zone_distance
-        write_trajectory(args.save, *arrays, encounter.shapes, facts)
+        times, position, velocity = arrays
+        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts)
         print(args.save)
     return 0

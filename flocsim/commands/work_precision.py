@@ -1,5 +1,8 @@
 """`flocsim work-precision cfg.toml --replicate 17`: error against run time of one collision."""
 
+from argparse import Namespace
+from typing import Any
+
 import attrs
 
 from flocsim.commands.trajectory import add_replicate, select, with_one_count
@@ -26,7 +29,7 @@ MOST_STEPS = 1_000_000
 HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'steps':>9}  end"
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "work-precision",
         help="error against run time of the integrators on one replicate of a config",
@@ -84,7 +87,7 @@ def replicate(config, place, number):
     return system, float(found["t_end"]), found
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the methods, print the table; the exit code."""
     config = load_config(args.config)
     place = select(config, args)

@@ -160,7 +160,14 @@ def pattern_search(mask, vertices, radius, directions, steps, active, weights):
     return objective
 
 
-def searched(mask, start, radius, steps, weights=PLAIN, active=None):
+def searched(
+    mask: np.ndarray,
+    start: np.ndarray,
+    radius: float,
+    steps: np.ndarray,
+    weights: tuple[int, int] = PLAIN,
+    active: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
     """pattern_search of a start, which is left as it is: (vertices, objective)."""
     vertices = np.array(start)
     active = np.ones(len(vertices), bool) if active is None else active
@@ -168,7 +175,7 @@ def searched(mask, start, radius, steps, weights=PLAIN, active=None):
     return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active, weights))
 
 
-def count_errors(mask, vertices, radius):
+def count_errors(mask: np.ndarray, vertices: np.ndarray, radius: float) -> int:
     """V of the swept polygon against the mask: a search without steps."""
     return searched(mask, vertices, radius, NO_STEPS)[1]
 
@@ -247,7 +254,9 @@ def relocate(mask, vertices, objective, radius, weights):
     return vertices
 
 
-def pattern_fit(mask, count, radius, weights=PLAIN):
+def pattern_fit(
+    mask: np.ndarray, count: int, radius: float, weights: tuple[int, int] = PLAIN
+) -> np.ndarray:
     """The best of several pattern searches, refined: (N, 2) as x, y-down [px].
 
     mask: with room around it (coverage.padded); weights: what counts beside V.

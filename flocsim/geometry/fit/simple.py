@@ -127,7 +127,7 @@ def simple_inset(vertices, depth):
     return True
 
 
-def is_simple(vertices):
+def is_simple(vertices: np.ndarray) -> bool:
     """Whether no edges cross or nearly touch: simple_inset leaves such a polygon as it is."""
     drawn = np.array(vertices)
     return bool(compiled(simple_inset)(drawn, 0.0)) and np.array_equal(drawn, vertices)

@@ -13,6 +13,6 @@ class Sphere(Shape):
     radius: float = attrs.field(converter=positive_radius)
 
     @property
-    def core(self):
+    def core(self) -> np.ndarray:
         """The one core point (1, 2): the centre."""
         return np.zeros((1, 2))
