@@ -12,6 +12,7 @@ from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import check_output, check_study
 from flocsim.ensembles.study import Study
@@ -111,16 +112,6 @@ def with_one_count(config: Config, vertex_count: int) -> Config:
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
 
-def check_outputs(args, figures):
-    """FlocsimError now, rather than after the run, for files that could not be written."""
-    for path in figures:
-        checked_format(path)
-    if args.animation and Path(args.animation).suffix.lower() != ".gif":
-        raise UsageError(f"--animation {args.animation} must end in .gif")
-    for path in [*figures, *filter(None, (args.animation, args.save))]:
-        check_output(path, args.config)
-
-
 def outcome_line(config, place, replicate, row):
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
@@ -134,13 +125,6 @@ def outcome_line(config, place, replicate, row):
         f"type {name}, N = {vertices}, delta = {share:g}, replicate {replicate}: "
         f"{outcome}{reason}; {touch}end at {1e3 * row['t_end']:.4g} ms, {row['steps']} steps"
     )
-
-
-def overrides(args):
-    from flocsim.ensembles.config.overrides import nested, parse_setting
-
-    given = nested(map(parse_setting, args.settings))
-    return given if args.seed is None else given | {"seed": args.seed}
 
 
 def draw(args, encounter, arrays, row, title):
@@ -175,13 +159,20 @@ def save_all(figure, names):
 
 def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
-    config = load_config(args.config, overrides(args))
+    over = nested(map(parse_setting, args.settings))
+    config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
     take_scene(args)
     place = select(config, args)
     check_study(config)
     args.output = args.output or [f"trajectory-{args.replicate}.png"]
     figures = [*args.output, *args.distance, *args.forces]
-    check_outputs(args, figures)
+    # What could not be written is said now, not after the run.
+    for path in figures:
+        checked_format(path)
+    if args.animation and Path(args.animation).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {args.animation} must end in .gif")
+    for path in [*figures, *filter(None, (args.animation, args.save))]:
+        check_output(path, args.config)
     study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)

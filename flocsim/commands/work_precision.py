@@ -51,12 +51,6 @@ def methods(duration):
         yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
 
 
-def timed(system, duration):
-    """The faster of two runs: the first may have compiled."""
-    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
-    return min(runs, key=lambda found: found.wall_time)
-
-
 def reference(system, duration):
     """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
     found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
@@ -69,7 +63,10 @@ def reference(system, duration):
 
 def row(system, duration, exact, name, setting, integrator):
     """One line of the table; no error is shown for a run that failed."""
-    found = timed(attrs.evolve(system, integrator=integrator), duration)
+    system = attrs.evolve(system, integrator=integrator)
+    # The faster of two: the first may have compiled.
+    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
+    found = min(runs, key=lambda each: each.wall_time)
     error = "-"
     if found.status.name == "FINISHED":
         error = f"{end_distance(system.bodies, found.position[-1], exact):.1e}"

@@ -73,7 +73,6 @@ class Progress:
         self.began = self.printed = time.monotonic()
 
     def report(self, missing: int) -> None:
-        """Say how many are missing, if it is time to."""
         share = (self.todo - missing) / self.todo if self.todo else 1.0
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):

@@ -55,7 +55,6 @@ def cover(vertices, radius, shape):
 
 
 def add_edge(near, ax, ay, bx, by, radius):
-    """Count the edge a–b at every pixel within the radius of it."""
     rows, columns = near.shape
     for row in range(
         first_pixel(min(ay, by) - radius, rows), first_pixel(max(ay, by) + radius + 1.0, rows)

@@ -89,7 +89,6 @@ def inset(points: np.ndarray, mask: np.ndarray, depth: float) -> np.ndarray:
 
 
 def even_start(mask: np.ndarray, count: int, radius: float) -> np.ndarray:
-    """Points evenly spaced on the outline, drawn in by the radius."""
     return inset(even_points(trace_outline(mask), count), mask, radius)
 
 
@@ -171,21 +170,18 @@ def best_breaks(costs, count, start):
     return breaks
 
 
-def lines_through(points, breaks):
-    """Centres (N, 2) and unit directions (N, 2) of the lines through the runs from each break."""
-    after = np.roll(breaks, -1)
-    last = np.where(after > breaks, after, after + len(points))
-    x, y, xx, xy, yy = scatter(moment_sums(points), breaks, last)
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    return np.column_stack([x, y]), np.column_stack([np.cos(angle), np.sin(angle)])
-
-
 def corners(points, breaks):
     """The vertices (N, 2) where the lines of neighbouring runs cross.
 
     Where they cross too flatly, or far from the break, midway between its feet on both lines.
     """
-    centres, along = lines_through(points, breaks)
+    # The line of least squares through each run.
+    stops = np.roll(breaks, -1)
+    last = np.where(stops > breaks, stops, stops + len(points))
+    x, y, xx, xy, yy = scatter(moment_sums(points), breaks, last)
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    centres = np.column_stack([x, y])
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
     before, ahead = np.roll(centres, 1, axis=0), np.roll(along, 1, axis=0)
     places = points[breaks]
     sine = cross(ahead, along)
@@ -201,7 +197,6 @@ def corners(points, breaks):
 
 
 def foot(points, origins, directions):
-    """The nearest places (N, 2) to the points on the lines."""
     share = np.einsum("ij,ij->i", points - origins, directions)
     return origins + share[:, None] * directions
 

@@ -19,7 +19,6 @@ def closest_share(px, py, ax, ay, bx, by):
 
 
 def segment_distance2(px, py, ax, ay, bx, by):
-    """Squared distance [m²] from point p to segment a–b."""
     share = closest_share(px, py, ax, ay, bx, by)
     dx = px - (ax + share * (bx - ax))
     dy = py - (ay + share * (by - ay))
@@ -58,9 +57,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 def edge_count(points):
     """Edges of a core of that many points: none, one, or as many as points."""
-    if points < 3:
-        return points - 1
-    return points
+    return points - 1 if points < 3 else points
 
 
 def edge_end(first, points, start):
@@ -84,7 +81,6 @@ def edges_of(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unit_edges(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(starts, unit directions, lengths) of the core's edges."""
     starts, ends = edges_of(vertices)
     lengths = np.hypot(*(ends - starts).T)
     return starts, (ends - starts) / lengths[:, None], lengths
@@ -109,7 +105,6 @@ def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.n
 
 
 def distance_to_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Distances (k, edges) from points (k, 2) to each edge."""
     away = from_edges(points, starts, ends)
     return np.hypot(away[..., 0], away[..., 1])
 

@@ -159,7 +159,6 @@ def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
 
 
 def require_distinct(vertices):
-    """Raise ShapeError where two neighbouring vertices coincide."""
     extent = np.ptp(vertices, axis=0).max()
     steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
     repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)

@@ -14,5 +14,4 @@ class Sphere(Shape):
 
     @property
     def core(self) -> np.ndarray:
-        """The one core point (1, 2): the centre."""
         return np.zeros((1, 2))

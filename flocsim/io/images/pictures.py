@@ -40,7 +40,6 @@ class Segmentation:
 
     @property
     def foreground_share(self) -> float:
-        """Share of the picture's pixels that are foreground [-]."""
         return float(self.foreground.mean())
 
     def rejected_by_reason(self) -> dict[str, int]:

@@ -98,7 +98,6 @@ def sorted_out(masks, contrast, filters):
 
 
 def reason_to_reject(box, shape, radius, blur, filters):
-    """Why a region is no floc to measure, None if it is one."""
     if radius < filters.min_radius:
         return "too small"
     if radius > filters.max_radius:
@@ -113,7 +112,6 @@ def reason_to_reject(box, shape, radius, blur, filters):
 
 
 def centroid_of(mask, box):
-    """(x, y) [px] of a mask that lies in a box of the picture."""
     rows, columns = np.nonzero(mask)
     return float(columns.mean() + box[1].start), float(rows.mean() + box[0].start)
 

@@ -30,7 +30,6 @@ def journal_path(results: str | Path) -> Path:
 
 
 def lock(file, path):
-    """Keep other processes from writing; FileError where one does so already."""
     try:
         import fcntl
     except ImportError:
@@ -98,7 +97,6 @@ class Journal:
         return os.pread(self.file.fileno(), length, offset)
 
     def sync(self) -> None:
-        """Wait until the disk has all of it."""
         try:
             os.fsync(self.file.fileno())
         except OSError as error:
@@ -112,7 +110,6 @@ class Journal:
         self.file.close()
 
     def close(self) -> None:
-        """Let go of the file, as it is."""
         self.file.close()
 
     def drop_if_empty(self) -> None:

@@ -249,7 +249,6 @@ def time_unit(times):
 
 
 def draw_bodies(axes, frame):
-    """The outlines, filled lightly, one colour per body."""
     from matplotlib.patches import Polygon
 
     for number, body in enumerate(frame):

@@ -76,7 +76,8 @@ def probability_figure(results, name):
         for number, axes in enumerate(panels):
             draw_probability(axes, results, number, name)
             axes.set_title(type_title(number, results.types[number]))
-        label_outer(panels, LABELS[name])
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS[name])
         add_delta_legend(panels[:PANELS_PER_ROW][-1], results.delta)
         return figure
 
@@ -91,7 +92,8 @@ def figure_8(results: Results) -> Figure:
         for number, axes in enumerate(panels):
             draw_classes(axes, results, number)
             axes.set_title(type_title(number, results.types[number]))
-        label_outer(panels, LABELS["classes"])
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS["classes"])
         add_class_legend(panels[:PANELS_PER_ROW][-1])
         return figure
 
@@ -130,13 +132,7 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
     return figure, list(grid[:count])
 
 
-def label_outer(panels, label):
-    for axes in panels[::PANELS_PER_ROW]:
-        axes.set_ylabel(label)
-
-
 def draw_probability(axes, results, number, name):
-    """The lines of one type, one per delta; says so where there is nothing to show."""
     bands = [results.probabilities[name + end][number] for end in ("", "_low", "_high")]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)

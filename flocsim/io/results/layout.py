@@ -119,7 +119,13 @@ def frame_of(results: Results) -> Frame:
             write_coordinate(file.create_group("flocs"), "floc", list(results.flocs))
         frame.streams = reserve_replicates(file, study, results)
         # Last, so that its length moves no byte of the groups before it.
-        write_run(file.create_group("run"), results.run)
+        group = file.create_group("run")
+        for name, value in results.run.items():
+            value = value.item() if isinstance(value, np.generic) else value
+            if not isinstance(value, str | int | float):
+                raise UsageError(f"run/{name} must be text or a number, found {value!r}")
+            # A bool would become an HDF5 enumeration, which few readers know.
+            group[name] = int(value) if isinstance(value, bool) else value
     return frame
 
 
@@ -189,16 +195,6 @@ def write_coordinate(group, axis, values):
 def annotate_scale(scale, axis):
     unit, text = COORDINATES[axis]
     scale.attrs.update({"units": unit, "long_name": text})
-
-
-def write_run(group, run):
-    """Scalars: text, whole numbers and floats; anything else is refused."""
-    for name, value in run.items():
-        value = value.item() if isinstance(value, np.generic) else value
-        if not isinstance(value, str | int | float):
-            raise UsageError(f"run/{name} must be text or a number, found {value!r}")
-        # A bool would become an HDF5 enumeration, which few readers know.
-        group[name] = int(value) if isinstance(value, bool) else value
 
 
 def numbers(count: int) -> Iterator[bytes]:
