@@ -32,18 +32,12 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
-    parser.add_argument(
-        "--output-dir",
-        default=".",
-        metavar="DIR",
-        help="folder for the figures, made if it is missing (default: the current one)",
-    )
+    parser.add_argument("--output-dir", default=".", metavar="DIR",
+        help="folder for the figures, made if it is missing (default: the current "
+        "one)")  # fmt: skip
     parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
-    parser.add_argument(
-        "--figures",
-        metavar="LIST",
-        help="figures with commas between them (default: all that the file has)",
-    )
+    parser.add_argument("--figures", metavar="LIST",
+        help="figures with commas between them (default: all that the file has)")  # fmt: skip
     parser.set_defaults(run=run)
 
 

@@ -29,34 +29,24 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "trajectory", help="run one replicate of a config and draw it as a strip of frames"
     )
-    add_replicate(parser)
-    parser.add_argument(
-        "--scene", metavar="TYPE,N,F", help="collision type, vertices and displacement in one word"
-    )
-    parser.add_argument("--seed", type=int, help="seed, instead of the config's")
-    parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
-    parser.add_argument(
-        "-o",
-        "--output",
-        nargs="+",
-        default=[],
-        metavar="FILE",
-        help="strip of frames: .png, .pdf or .svg, or several of them",
-    )
-    parser.add_argument(
-        "--distance", nargs="+", default=[], metavar="FILE",
-        help="also draw the centre distance against time",
-    )  # fmt: skip
-    parser.add_argument(
-        "--forces", nargs="+", default=[], metavar="FILE", help="also draw the forces against time"
-    )
-    parser.add_argument("--animation", metavar="FILE.gif", help="also write an animation")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's, as in flocsim ensemble; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
+    add_replicate(parser)
+    add = parser.add_argument
+    add("--scene", metavar="TYPE,N,F",
+        help="collision type, vertices and displacement in one word")  # fmt: skip
+    add("--seed", type=int, help="seed, instead of the config's")
+    add("--frames", type=int, default=6, metavar="K", help="default: 6")
+    add("-o", "--output", nargs="+", default=[], metavar="FILE",
+        help="strip of frames: .png, .pdf or .svg, or several of them")  # fmt: skip
+    add("--distance", nargs="+", default=[], metavar="FILE",
+        help="also draw the centre distance against time")  # fmt: skip
+    add("--forces", nargs="+", default=[], metavar="FILE",
+        help="also draw the forces against time")  # fmt: skip
+    add("--animation", metavar="FILE.gif", help="also write an animation")
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's, as in flocsim ensemble; may be "
+        "repeated")  # fmt: skip
+    add("--save", metavar="FILE.h5", help="also write the motion to HDF5")
 
 
 def add_replicate(parser: ArgumentParser) -> None:

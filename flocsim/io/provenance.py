@@ -6,6 +6,7 @@ import platform
 import shlex
 import sys
 from importlib import metadata
+from typing import Any
 
 PACKAGES = ("flocsim", "numpy", "numba", "h5py")
 
@@ -56,7 +57,7 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def storable(value):
+def storable(value: Any) -> Any:
     """Text without the lone surrogates and zero characters that HDF5 cannot hold."""
     if not isinstance(value, str):
         return value
