@@ -33,7 +33,6 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.files import read_sealed, replace_file, seal
-from flocsim.io.images.regions import Region
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
@@ -95,13 +94,13 @@ class ShapeEntry:
 
 def make_entry(
     image: str,
-    region: Region,
+    region: Any,
     fits: "Mapping[int, Fit]",
     pixel_size: float,
     spheroradius: float,
     name_radius: bool = False,
 ) -> ShapeEntry:
-    """The ShapeEntry of a picture's region (flocsim.io.images.pictures) and its fits {N: Fit} [px].
+    """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
 
     name_radius: its id names the spheroradius, for libraries with several of one floc.
     """
