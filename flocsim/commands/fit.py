@@ -3,6 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from flocsim.commands.fit_pictures import Options, fit_pictures
 from flocsim.errors import UsageError
@@ -21,44 +22,15 @@ region, also those left out and why, goes to a table beside the library.
   flocsim plot shapes.h5          # sizes, and errors against N: the paper's Figs 2 and 3"""
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "fit",
         help="fit spheropolygons to the flocs of pictures",
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_options(parser.add_argument)
-    add_output(parser.add_argument)
-    add_segmentation(parser.add_argument_group("finding the flocs").add_argument)
     parser.set_defaults(run=run)
-    return parser
-
-
-def run(args):
-    """Fit, print what was found and write the library; returns the exit code."""
-    options = read_options(args)
-    summary = args.summary or Path(args.output).with_suffix(".csv")
-    for output in (args.output, summary):
-        check_writable(output)
-    if args.overlay is not None:
-        checked_format(args.overlay, "--overlay ")
-    try:
-        pictures, fits = fit_pictures(args.images, options)
-    except KeyboardInterrupt:
-        print("flocsim: interrupted; no shape library was written", file=sys.stderr)
-        return 130
-    entries = make_entries(pictures, fits, options)
-    if not entries:
-        write_summary(summary, pictures, fits, options)
-        print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
-        return 2
-    write(args, summary, pictures, fits, entries, options)
-    return 0
-
-
-def add_options(add):
-    """Declare the options by ``add``, argparse's add_argument."""
+    add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
     add("--pixel-size", metavar="METRES", help="length of a pixel's side in metres, e.g. 0.95e-6")
     add("--vertices", default="4,8,16,64", metavar="LIST",
@@ -73,10 +45,15 @@ def add_options(add):
     add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
     add("--masks", action="store_true",
         help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
-
-
-def add_segmentation(add):
-    """Declare the options of the segmentation by ``add``, argparse's add_argument."""
+    add("-o", "--output", default="shapes.h5", metavar="FILE",
+        help="shape library to write (default: %(default)s)")  # fmt: skip
+    add("--summary", metavar="FILE",
+        help="table of all regions, rejected ones with the reason (default: beside the library, "
+        "ending .csv)")  # fmt: skip
+    add("--overlay", metavar="FILE",
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
+        "pictures, one file each: FILE-picture.png")  # fmt: skip
+    add = parser.add_argument_group("finding the flocs").add_argument
     add("--flocs", default="auto", choices=("auto", "bright", "dark"),
         help="how flocs stand out from the background (default: %(default)s)")  # fmt: skip
     add("--background", default="surface", choices=("surface", "median"),
@@ -99,16 +76,41 @@ def add_segmentation(add):
     add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
 
 
-def add_output(add):
-    """Declare where results go by ``add``, argparse's add_argument."""
-    add("-o", "--output", default="shapes.h5", metavar="FILE",
-        help="shape library to write (default: %(default)s)")  # fmt: skip
-    add("--summary", metavar="FILE",
-        help="table of all regions, rejected ones with the reason (default: beside the library, "
-        "ending .csv)")  # fmt: skip
-    add("--overlay", metavar="FILE",
-        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
-        "pictures, one file each: FILE-picture.png")  # fmt: skip
+def run(args: argparse.Namespace) -> int:
+    """Fit, print what was found and write the library; returns the exit code."""
+    options = read_options(args)
+    summary = args.summary or Path(args.output).with_suffix(".csv")
+    for output in (args.output, summary):
+        check_writable(output)
+    if args.overlay is not None:
+        checked_format(args.overlay, "--overlay ")
+    try:
+        pictures, fits = fit_pictures(args.images, options)
+    except KeyboardInterrupt:
+        print("flocsim: interrupted; no shape library was written", file=sys.stderr)
+        return 130
+    flocs = [(picture, region) for picture in pictures for region in picture.regions]
+    several = len(options.radii) > 1
+    entries = [
+        make_entry(picture.name, region, fit[radius], options.pixel_size, radius, several)
+        for radius in options.radii
+        for (picture, region), fit in zip(flocs, fits, strict=True)
+    ]
+    table = summary_text(pictures, fits, options.pixel_size).encode()
+    if not entries:
+        replace_file(summary, table)
+        print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
+        return 2
+    settings = {"method": options.method, "preserve_area": options.preserve_area,
+                "inscribed": options.inscribed}  # fmt: skip
+    write_library(args.output, entries, settings)
+    replace_file(summary, table)
+    if args.overlay is not None:
+        draw(Path(args.overlay), pictures, fits, options)
+    print(format_errors(entries))
+    counts = ", ".join(map(str, options.vertices))
+    print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
+    return 0
 
 
 def read_options(args):
@@ -123,6 +125,17 @@ def read_options(args):
             "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
             "its floc has less than its area"
         )
+    limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
+    endless = args.max_blur.strip() == "inf"
+    segmentation = {
+        "flocs": args.flocs,
+        "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
+        "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
+        "min_radius": positive("--min-radius", args.min_radius),
+        "max_radius": limit,
+        "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
+        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+    }
     return Options(
         pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
         vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
@@ -134,27 +147,11 @@ def read_options(args):
         masks=args.masks,
         background=args.background,
         jobs=whole("--jobs", args.jobs),
-        segmentation=read_segmentation(args),
+        segmentation=segmentation,
     )
 
 
-def read_segmentation(args):
-    """The keywords of flocsim.io.images.pictures.segment."""
-    limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
-    endless = args.max_blur.strip() == "inf"
-    return {
-        "flocs": args.flocs,
-        "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
-        "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
-        "min_radius": positive("--min-radius", args.min_radius),
-        "max_radius": limit,
-        "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
-        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
-    }
-
-
 def number(option, text, meaning, least, most):
-    """A number from `least` to `most`."""
     try:
         value = float(text)
     except ValueError:
@@ -165,43 +162,13 @@ def number(option, text, meaning, least, most):
 
 
 def positive(option, text, meaning="pixels"):
-    """A finite number above 0."""
     return number(option, text, f"{meaning}, a number above 0", 5e-324, 1.7e308)
 
 
 def whole(option, text):
-    """A whole number from 1."""
     if not text.strip().isdecimal() or int(text) < 1:
         raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
     return int(text)
-
-
-def make_entries(pictures, fits, options):
-    """ShapeEntries of all flocs, for every spheroradius."""
-    flocs = [(picture, region) for picture in pictures for region in picture.regions]
-    several = len(options.radii) > 1
-    return [
-        make_entry(picture.name, region, fit[radius], options.pixel_size, radius, several)
-        for radius in options.radii
-        for (picture, region), fit in zip(flocs, fits, strict=True)
-    ]
-
-
-def write(args, summary, pictures, fits, entries, options):
-    """Write library, table and overlays; print the table of errors."""
-    settings = {"method": options.method, "preserve_area": options.preserve_area,
-                "inscribed": options.inscribed}  # fmt: skip
-    write_library(args.output, entries, settings)
-    write_summary(summary, pictures, fits, options)
-    if args.overlay is not None:
-        draw(args.overlay, pictures, fits, options)
-    print(format_errors(entries))
-    counts = ", ".join(map(str, options.vertices))
-    print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
-
-
-def write_summary(path, pictures, fits, options):
-    replace_file(path, summary_text(pictures, fits, options.pixel_size).encode())
 
 
 def draw(overlay, pictures, fits, options):
@@ -214,11 +181,10 @@ def draw(overlay, pictures, fits, options):
         title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
         grey = picture.found.foreground if options.masks else read_grey(picture.path)
         figure = draw_overlay(grey, flocs, title, picture.found.rejected)
-        save(figure, overlay_path(overlay, picture, several=len(pictures) > 1))
-
-
-def overlay_path(overlay, picture, several):
-    overlay = Path(overlay)
-    stem = Path(picture.name.replace(":", "-").replace("/", "-"))
-    stem = stem.stem if stem.suffix.lower() == picture.path.suffix.lower() else stem.name
-    return overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}") if several else overlay
+        path = overlay
+        if len(pictures) > 1:
+            name = Path(picture.name.replace(":", "-").replace("/", "-"))
+            same = name.suffix.lower() == picture.path.suffix.lower()
+            stem = name.stem if same else name.name
+            path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
+        save(figure, path)

@@ -2,7 +2,9 @@
 
 import contextlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -10,6 +12,10 @@ import numpy as np
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.io.shapes.fit_report import picture_line, warn_of_coarse
 from flocsim.io.terminal import Progress
+
+if TYPE_CHECKING:
+    from flocsim.geometry.fit.fit import Fit
+    from flocsim.io.images.pictures import Region, Segmentation
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
@@ -24,8 +30,8 @@ class Options:
     """
 
     pixel_size: float
-    vertices: tuple
-    radii: tuple
+    vertices: tuple[int, ...]
+    radii: tuple[float, ...]
     method: str
     preserve_area: bool
     inscribed: bool
@@ -33,20 +39,22 @@ class Options:
     masks: bool
     background: str
     jobs: int
-    segmentation: dict
+    segmentation: dict[str, Any]
 
 
 @attrs.frozen(eq=False)
 class Picture:
-    """One picture or mask and what was found in it: `found` is a Segmentation."""
+    """One picture or mask, what was found in it, and the regions of that to be fitted."""
 
     path: Path
     name: str
-    found: object
-    regions: tuple
+    found: "Segmentation"
+    regions: "tuple[Region, ...]"
 
 
-def fit_pictures(names, options):
+def fit_pictures(
+    names: Sequence[str], options: Options
+) -> "tuple[list[Picture], list[dict[float, dict[int, Fit]]]]":
     """Pictures, and for each of their regions {radius: {N: Fit}}."""
     paths = list_pictures(names, options.masks)
     background = find_background(paths, options)
@@ -55,7 +63,15 @@ def fit_pictures(names, options):
     titles = [p.name if repeated.count(p.name) == 1 else p.as_posix() for p in paths]
     tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
     with workers(options.jobs) as mapped:
-        pictures = list(found_pictures(mapped(find_flocs, tasks), options))
+        pictures = []
+        for result in mapped(find_flocs, tasks):
+            if isinstance(result, FlocsimError):
+                report(result)
+                continue
+            for picture in result:
+                print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
+                warn_of_coarse(picture.name, picture.regions, options.radii)
+                pictures.append(picture)
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
@@ -67,20 +83,7 @@ def fit_pictures(names, options):
     return pictures, fits
 
 
-def found_pictures(results, options):
-    """The pictures among the results, each with its line printed; errors are reported."""
-    for result in results:
-        if isinstance(result, FlocsimError):
-            report(result)
-            continue
-        for picture in result:
-            print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
-            warn_of_coarse(picture.name, picture.regions, options.radii)
-            yield picture
-
-
 def report(error):
-    """One line on stderr, for a picture that is skipped."""
     print(f"flocsim: {error}", file=sys.stderr, flush=True)
 
 
@@ -124,7 +127,6 @@ def find_flocs(task):
 
 
 def masked(path, name, options):
-    """[Picture] of the masks in a file."""
     from flocsim.io.images.masks import read_masks, segment_mask
 
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
@@ -146,28 +148,27 @@ def fit_region(task):
     """{radius: {N: Fit}} of (name, mask, Options); ShapeError, with the name, for none."""
     import warnings
 
+    from flocsim.geometry.fit.fit import fit_mask
+
     name, mask, options = task
+    fits = {}
     with warnings.catch_warnings():
         # Said once a picture, by warn_of_coarse, not once a floc and N.
         warnings.simplefilter("ignore", UserWarning)
         try:
-            return {
-                radius: {count: fit_one(mask, count, radius, options) for count in options.vertices}
-                for radius in options.radii
-            }
+            for radius in options.radii:
+                # A circle of a spheroradius above r_eq is larger than the floc already.
+                exact = options.preserve_area and np.pi * radius**2 < mask.sum()
+                fits[radius] = {
+                    count: fit_mask(
+                        mask, vertices=count, radius=radius, method=options.method,
+                        preserve_area=exact, inscribed=options.inscribed,
+                    )
+                    for count in options.vertices
+                }  # fmt: skip
         except ShapeError as error:
             raise ShapeError(f"{name}: {error}, or leave small flocs out by --min-radius") from None
-
-
-def fit_one(mask, count, radius, options):
-    from flocsim.geometry.fit.fit import fit_mask
-
-    # A circle of a spheroradius above r_eq is larger than the floc already.
-    is_fine = np.pi * radius**2 < mask.sum()
-    return fit_mask(
-        mask, vertices=count, radius=radius, method=options.method, inscribed=options.inscribed,
-        preserve_area=options.preserve_area and is_fine,
-    )  # fmt: skip
+    return fits
 
 
 def list_pictures(names, masks):

@@ -4,6 +4,8 @@ import json
 import math
 import sys
 import tomllib
+from argparse import Namespace
+from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.report import format_table
@@ -18,7 +20,7 @@ APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus
 MOST_FAILURES = 10
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
         help="describe a results file",
@@ -30,23 +32,23 @@ def add_parser(subparsers):
         "--config", action="store_true", help="print only the config that it was run with"
     )
     parser.set_defaults(run=run)
-    return parser
 
 
-def run(args):
+def run(args: Namespace) -> int:
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
     results = read_results(args.results, replicates=False)
-    if args.config:
-        sys.stdout.write(config_text(args.results, results))
-    else:
+    if not args.config:
         print(results_text(args.results, results, replicate_totals(args.results)))
+    elif results.run.get("config"):
+        sys.stdout.write(str(results.run["config"]))
+    else:
+        raise FileError(f"{args.results} holds no config: it was not written by flocsim ensemble")
     return 0
 
 
 def library_text(path):
-    """A shape library as text: its flocs, how they were fitted, their errors."""
     entries = read_library(path)
     images = sorted({entry.image for entry in entries})
     sizes = [1e6 * entry.equivalent_radius * entry.pixel_size for entry in entries]
@@ -59,50 +61,41 @@ def library_text(path):
     return "\n".join([f"{path}: a shape library", "", *lines, "", format_errors(entries)])
 
 
-def config_text(path, results):
-    """The config as it was given; FileError if the file has none."""
-    if not results.run.get("config"):
-        raise FileError(f"{path} holds no config: it was not written by flocsim ensemble")
-    return results.run["config"]
-
-
 def results_text(path, results, totals):
-    facts = conditions(results) + outcomes(results, totals) + origin(results)
+    facts = conditions(results) + outcomes(results, totals) + origin(results.run)
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
-    lines += failed_lines(results)
+    notes = json.loads(results.run.get("failed", "[]"))
+    if notes:
+        lines += ["", *(f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES])]
+    if len(notes) > MOST_FAILURES:
+        lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
     return "\n".join([*lines, "", table])
 
 
 def conditions(results):
-    """(name, value) of what was simulated."""
+    """[(name, value)] of what was simulated."""
     vertices = (f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)
-    return [
+    facts = [
         ("preset", preset(results.run)),
         ("types", ", ".join(results.types)),
         ("vertices", ", ".join(vertices)),
         ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
         ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
-        *overrides(results.run),
     ]
+    over = json.loads(results.run.get("overrides", "{}"))
+    return [*facts, ("over the config", json.dumps(over))] if over else facts
 
 
 def preset(run):
-    """The preset's name: stored by itself, or in the config."""
     if "preset" in run:
         return run["preset"] or "none named"
     try:
         return tomllib.loads(run.get("config", "")).get("preset", "none named")
     except tomllib.TOMLDecodeError:
         return "unknown, the config cannot be read"
-
-
-def overrides(run):
-    """(name, value) of what the command line laid over the config."""
-    given = json.loads(run.get("overrides", "{}"))
-    return [("over the config", json.dumps(given))] if given else []
 
 
 def outcomes(results, totals):
@@ -113,45 +106,23 @@ def outcomes(results, totals):
     if any(number for _, number in named):
         rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))
     if totals.count:
-        rows.append(
-            (
-                "steps",
-                f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
-                f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected",
-            )
-        )
+        steps = f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
+        steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
+        rows.append(("steps", steps))
     return rows
 
 
-def origin(results):
-    """(name, value) of all that the group ``run`` knows and a person wants to."""
-    return [
-        (name.replace("_", " "), readable(name, value))
-        for name, value in results.run.items()
-        if name not in APART and value != ""
-    ] + cpu_kinds(results.run)
-
-
-def cpu_kinds(run):
-    """(name, value) of the kinds of CPU that the rows were computed on."""
+def origin(run):
+    """[(name, value)] of all that the group ``run`` knows and a person wants to."""
     from flocsim.ensembles.storage.cpu_kind import describe_kind
 
+    facts = []
+    for name, value in run.items():
+        if name in APART or value == "":
+            continue
+        if isinstance(value, float):
+            value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
+        facts.append((name.replace("_", " "), str(value)))
     kinds = json.loads(run.get("cpus", "[]"))
     names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
-    return [("kind of CPU", "; ".join(names))] if names else []
-
-
-def readable(name, value):
-    """A value for a person: times with their unit."""
-    if isinstance(value, float):
-        return f"{value:.6g} s" if "time" in name else f"{value:.6g}"
-    return str(value)
-
-
-def failed_lines(results):
-    """The replicates that failed, each with the words that run it again."""
-    notes = json.loads(results.run.get("failed", "[]"))
-    lines = [f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES]]
-    if len(notes) > MOST_FAILURES:
-        lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
-    return ["", *lines] if lines else []
+    return [*facts, ("kind of CPU", "; ".join(names))] if names else facts

@@ -1,6 +1,8 @@
 """`flocsim init`: write a commented example of a config file."""
 
 import os
+from argparse import Namespace
+from typing import Any
 
 from flocsim.errors import UsageError
 from flocsim.io.files import replace_file
@@ -72,7 +74,7 @@ file = "results.h5"
 """
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "init",
         help="write an example config file",
@@ -83,10 +85,9 @@ def add_parser(subparsers):
     )
     parser.add_argument("--force", action="store_true", help="overwrite a file that exists")
     parser.set_defaults(run=run)
-    return parser
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
     if os.path.lexists(args.file) and not args.force:
         raise UsageError(f"{args.file} exists already: name another file, or add --force")

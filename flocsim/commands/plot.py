@@ -1,6 +1,8 @@
 """`flocsim plot`: the paper's figures from a results file or a shape library."""
 
+import argparse
 from pathlib import Path
+from typing import Any
 
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES
@@ -22,9 +24,7 @@ def listed(figures):
     return "\n".join(f"  {name:<8}  {text.removesuffix('.')}" for name, text in told.items())
 
 
-def add_parser(subparsers):
-    import argparse
-
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "plot",
         help="draw the figures of a results file or a shape library",
@@ -32,30 +32,30 @@ def add_parser(subparsers):
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
-    parser.add_argument(
-        "--output-dir",
-        default=".",
-        metavar="DIR",
-        help="folder for the figures, made if it is missing (default: the current one)",
-    )
+    parser.add_argument("--output-dir", default=".", metavar="DIR",
+        help="folder for the figures, made if it is missing (default: the current "
+        "one)")  # fmt: skip
     parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
-    parser.add_argument(
-        "--figures",
-        metavar="LIST",
-        help="figures with commas between them (default: all that the file has)",
-    )
+    parser.add_argument("--figures", metavar="LIST",
+        help="figures with commas between them (default: all that the file has)")  # fmt: skip
     parser.set_defaults(run=run)
-    return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
     content, figures = read_content(args.results)
     foreign = [name for name in names or () if name not in figures]
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
-    folder = made_folder(args.output_dir)
+    folder = Path(args.output_dir)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"--output-dir {args.output_dir} could not be made: {error.strerror}; "
+            "name another folder"
+        ) from error
     for name in names or figures:
         label = f"figure-{name}" if name.isdigit() else name
         path = folder / f"{Path(args.results).stem}-{label}.{args.format}"
@@ -83,14 +83,3 @@ def figure_names(text):
         found = ", ".join(map(repr, unknown)) or "none"
         raise UsageError(f"--figures: found {found}; choose from {', '.join(known)}")
     return names
-
-
-def made_folder(name):
-    folder = Path(name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"--output-dir {name} could not be made: {error.strerror}; name another folder"
-        ) from error
-    return folder

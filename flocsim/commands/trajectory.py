@@ -1,6 +1,8 @@
 """`flocsim trajectory cfg.toml --replicate 17`: one collision as a strip of frames (Fig. 7)."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -10,6 +12,8 @@ from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import check_output, check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -21,42 +25,31 @@ from flocsim.io.trajectory import centre_distance, write_trajectory
 ANIMATION_FRAMES = 60
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "trajectory", help="run one replicate of a config and draw it as a strip of frames"
     )
-    add_replicate(parser)
-    parser.add_argument(
-        "--scene", metavar="TYPE,N,F", help="collision type, vertices and displacement in one word"
-    )
-    parser.add_argument("--seed", type=int, help="seed, instead of the config's")
-    parser.add_argument("--frames", type=int, default=6, metavar="K", help="default: 6")
-    parser.add_argument(
-        "-o",
-        "--output",
-        nargs="+",
-        default=[],
-        metavar="FILE",
-        help="strip of frames: .png, .pdf or .svg, or several of them",
-    )
-    parser.add_argument(
-        "--distance", nargs="+", default=[], metavar="FILE",
-        help="also draw the centre distance against time",
-    )  # fmt: skip
-    parser.add_argument(
-        "--forces", nargs="+", default=[], metavar="FILE", help="also draw the forces against time"
-    )
-    parser.add_argument("--animation", metavar="FILE.gif", help="also write an animation")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's, as in flocsim ensemble; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     parser.set_defaults(run=run)
-    return parser
+    add_replicate(parser)
+    add = parser.add_argument
+    add("--scene", metavar="TYPE,N,F",
+        help="collision type, vertices and displacement in one word")  # fmt: skip
+    add("--seed", type=int, help="seed, instead of the config's")
+    add("--frames", type=int, default=6, metavar="K", help="default: 6")
+    add("-o", "--output", nargs="+", default=[], metavar="FILE",
+        help="strip of frames: .png, .pdf or .svg, or several of them")  # fmt: skip
+    add("--distance", nargs="+", default=[], metavar="FILE",
+        help="also draw the centre distance against time")  # fmt: skip
+    add("--forces", nargs="+", default=[], metavar="FILE",
+        help="also draw the forces against time")  # fmt: skip
+    add("--animation", metavar="FILE.gif", help="also write an animation")
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's, as in flocsim ensemble; may be "
+        "repeated")  # fmt: skip
+    add("--save", metavar="FILE.h5", help="also write the motion to HDF5")
 
 
-def add_replicate(parser):
+def add_replicate(parser: ArgumentParser) -> None:
     """The arguments that name a replicate of a config; `select` finds it."""
     parser.add_argument("config", help="config file (TOML)")
     parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
@@ -90,7 +83,7 @@ def take_scene(args):
         raise UsageError(f"--scene must be TYPE,N,F such as I,16,0.5, found {args.scene}") from None
 
 
-def select(config, args):
+def select(config: Config, args: Namespace) -> tuple[int, int, float]:
     """(place of the condition, N, share of δ_max) that the arguments choose."""
     if not args.replicate >= 0:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
@@ -104,23 +97,12 @@ def select(config, args):
     return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
 
 
-def with_one_count(config, vertex_count):
+def with_one_count(config: Config, vertex_count: int) -> Config:
     """The config with one number of vertices: the flocs need no fits at the others."""
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
 
-def check_outputs(args, figures):
-    """FlocsimError now, rather than after the run, for files that could not be written."""
-    for path in figures:
-        checked_format(path)
-    if args.animation and Path(args.animation).suffix.lower() != ".gif":
-        raise UsageError(f"--animation {args.animation} must end in .gif")
-    for path in [*figures, *filter(None, (args.animation, args.save))]:
-        check_output(path, args.config)
-
-
 def outcome_line(config, place, replicate, row):
-    """One line on what happened."""
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
     reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
@@ -133,14 +115,6 @@ def outcome_line(config, place, replicate, row):
         f"type {name}, N = {vertices}, delta = {share:g}, replicate {replicate}: "
         f"{outcome}{reason}; {touch}end at {1e3 * row['t_end']:.4g} ms, {row['steps']} steps"
     )
-
-
-def overrides(args):
-    """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.overrides import nested, parse_setting
-
-    given = nested(map(parse_setting, args.settings))
-    return given if args.seed is None else given | {"seed": args.seed}
 
 
 def draw(args, encounter, arrays, row, title):
@@ -167,22 +141,28 @@ def draw(args, encounter, arrays, row, title):
 
 
 def save_all(figure, names):
-    """Save a figure under every name; the paths."""
     paths = [Path(name) for name in names]
     for path in paths:
         save(figure, path)
     return paths
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
-    config = load_config(args.config, overrides(args))
+    over = nested(map(parse_setting, args.settings))
+    config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
     take_scene(args)
     place = select(config, args)
     check_study(config)
     args.output = args.output or [f"trajectory-{args.replicate}.png"]
     figures = [*args.output, *args.distance, *args.forces]
-    check_outputs(args, figures)
+    # What could not be written is said now, not after the run.
+    for path in figures:
+        checked_format(path)
+    if args.animation and Path(args.animation).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {args.animation} must end in .gif")
+    for path in [*figures, *filter(None, (args.animation, args.save))]:
+        check_output(path, args.config)
     study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)
@@ -195,6 +175,7 @@ def run(args):
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate}
         facts["zone_distance"] = encounter.zone_distance
-        write_trajectory(args.save, *arrays, encounter.shapes, facts)
+        times, position, velocity = arrays
+        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts)
         print(args.save)
     return 0

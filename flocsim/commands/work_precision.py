@@ -1,5 +1,8 @@
 """`flocsim work-precision cfg.toml --replicate 17`: error against run time of one collision."""
 
+from argparse import Namespace
+from typing import Any
+
 import attrs
 
 from flocsim.commands.trajectory import add_replicate, select, with_one_count
@@ -26,7 +29,7 @@ MOST_STEPS = 1_000_000
 HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'steps':>9}  end"
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "work-precision",
         help="error against run time of the integrators on one replicate of a config",
@@ -48,12 +51,6 @@ def methods(duration):
         yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
 
 
-def timed(system, duration):
-    """The faster of two runs: the first may have compiled."""
-    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
-    return min(runs, key=lambda found: found.wall_time)
-
-
 def reference(system, duration):
     """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
     found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
@@ -66,7 +63,10 @@ def reference(system, duration):
 
 def row(system, duration, exact, name, setting, integrator):
     """One line of the table; no error is shown for a run that failed."""
-    found = timed(attrs.evolve(system, integrator=integrator), duration)
+    system = attrs.evolve(system, integrator=integrator)
+    # The faster of two: the first may have compiled.
+    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
+    found = min(runs, key=lambda each: each.wall_time)
     error = "-"
     if found.status.name == "FINISHED":
         error = f"{end_distance(system.bodies, found.position[-1], exact):.1e}"
@@ -84,7 +84,7 @@ def replicate(config, place, number):
     return system, float(found["t_end"]), found
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the methods, print the table; the exit code."""
     config = load_config(args.config)
     place = select(config, args)

@@ -7,11 +7,14 @@ They live in this room because the figures need them for pooled counts and may n
 from statistics import NormalDist
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.errors import UsageError
 
 
-def wilson(successes, trials, confidence=0.95):
+def wilson(
+    successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95
+) -> tuple[np.ndarray, np.ndarray]:
     """Wilson's score interval (low, high) of a probability, from whole-number counts.
 
     With p = successes/trials and z the normal quantile at (1 + confidence)/2:
@@ -32,7 +35,9 @@ def wilson(successes, trials, confidence=0.95):
     return low, high
 
 
-def score_interval(share, trials, confidence=0.95):
+def score_interval(
+    share: np.ndarray, trials: np.ndarray, confidence: float = 0.95
+) -> tuple[np.ndarray, np.ndarray]:
     """Wilson's score interval (low, high) of a share among ``trials``, which need not be whole."""
     z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
     spread = z * np.sqrt(share * (1.0 - share) / trials + (z / (2.0 * trials)) ** 2)
@@ -41,7 +46,9 @@ def score_interval(share, trials, confidence=0.95):
     return (centre - spread) / scale, (centre + spread) / scale
 
 
-def proportion(successes, trials, confidence=0.95):
+def proportion(
+    successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(successes/trials, low, high) with Wilson's interval; all NaN where trials = 0."""
     low, high = wilson(successes, trials, confidence)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -49,7 +56,7 @@ def proportion(successes, trials, confidence=0.95):
     return share, low, high
 
 
-def checked_counts(successes, trials):
+def checked_counts(successes: ArrayLike, trials: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Both counts as float arrays, after a check that they can be counts."""
     try:
         successes, trials = np.broadcast_arrays(
@@ -64,28 +71,28 @@ def checked_counts(successes, trials):
     return successes, trials
 
 
-def clustered_proportion(s, m, ss, sm, mm, clusters):
-    """(Σ S/Σ M, low, high, n): Wilson's interval at the n independent events that it is worth.
+def clustered_proportion(
+    s: np.ndarray,
+    m: np.ndarray,
+    ss: np.ndarray,
+    sm: np.ndarray,
+    mm: np.ndarray,
+    clusters: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(p, low, high, n): p = Σ S/Σ M, and Wilson's interval at the n events that it is worth.
 
     S successes of M trials in each cluster; arguments: Σ S, Σ M, Σ S², Σ S M, Σ M² and the number
-    of clusters with trials, as floats (W. G. Cochran, Sampling Techniques, 1977, ch. 6).
-    """
-    share, effective = effective_number(s, m, ss, sm, mm, clusters)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        low, high = score_interval(share, effective)
-    # At the ends the formula gives 0 and 1, but only up to rounding.
-    return share, np.where(share == 0.0, 0.0, low), np.where(share == 1.0, 1.0, high), effective
-
-
-def effective_number(s, m, ss, sm, mm, clusters):
-    """(p, n): p = Σ S/Σ M, and the n at which p (1 − p)/n is the variance between replicates.
-
-    No more than the trials there were; the number of replicates where all agree.
+    of clusters with trials, as floats (W. G. Cochran, Sampling Techniques, 1977, ch. 6). At n
+    independent events p (1 − p)/n is the variance between clusters; n is no more than the trials
+    there were, and the number of clusters where all agree.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         p = s / m
         spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, 0.0)
         variance = clusters / (clusters - 1.0) * spread / (m * m)
         number = np.minimum(p * (1.0 - p) / variance, m)
-    number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
-    return p, np.where(m > 0, number, np.nan)
+        number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
+        number = np.where(m > 0, number, np.nan)
+        low, high = score_interval(p, number)
+    # At the ends the formula gives 0 and 1, but only up to rounding.
+    return p, np.where(p == 0.0, 0.0, low), np.where(p == 1.0, 1.0, high), number

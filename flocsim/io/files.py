@@ -9,7 +9,9 @@ import errno
 import hashlib
 import os
 import secrets
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from flocsim.errors import FileError
 
@@ -17,31 +19,22 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
 SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
 BLOCK = 2**20
-"""Bytes that are read or written at a time."""
+"""Bytes that are read at a time."""
 
 
-def replace_file(path, data):
-    """Put ``data`` (bytes) at ``path``: a reader meets the old file or the new one, never a part.
+def replace_file(path: str | Path, data: bytes) -> None:
+    """Put ``data`` at ``path``: a reader meets the old file or the new one, never a part.
 
-    Written to a temporary file in the same folder, synced, renamed, and the folder synced.
     Raises FileError if the folder is missing or unwritable, the disk is full, or the path names
     something that is not an ordinary file.
     """
     target = ordinary_target(path)
-    temporary = target.with_name(f".flocsim-{os.getpid()}-{secrets.token_hex(4)}.tmp")
-    try:
-        write_synced(temporary, data)
-        os.replace(temporary, target)
-        sync_folder(target.parent)
-    except (OSError, ValueError) as error:
-        raise unwritable(path, error) from error
-    finally:
-        with contextlib.suppress(OSError, ValueError):
-            temporary.unlink()
+    with successor(path, target, temporary_beside(target), "xb") as file:
+        file.write(data)
 
 
-def replace_by_blocks(path, size, blocks):
-    """Put ``blocks`` (bytes, in order, ``size`` in all) at ``path``, sealed; never a part of them.
+def replace_by_blocks(path: str | Path, size: int, blocks: Iterable[bytes]) -> None:
+    """Put ``blocks`` (in order, ``size`` bytes in all) at ``path``, sealed; never a part of them.
 
     For files larger than the memory. The space is taken before the first block, so that a full
     disk is found at once; an unfinished file of a run that was killed is written over.
@@ -49,17 +42,32 @@ def replace_by_blocks(path, size, blocks):
     """
     target = ordinary_target(path)
     temporary = target.with_name(f".{target.name}.unfinished")
+    with successor(path, target, temporary, "wb") as file:
+        reserve(file.fileno(), size + SEAL_LENGTH)
+        digest = hashlib.blake2b(digest_size=32)
+        for block in blocks:
+            digest.update(block)
+            file.write(block)
+        file.write(seal_of(digest))
+
+
+def temporary_beside(target):
+    return target.with_name(f".flocsim-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+
+
+@contextlib.contextmanager
+def successor(path, target, temporary, mode):
+    """An open temporary file in the target's folder that takes its place once it is synced."""
     try:
-        with open(temporary, "wb") as file:
-            reserve(file.fileno(), size + SEAL_LENGTH)
-            file.writelines(sealed(blocks))
+        with open(temporary, mode) as file:
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, target)
         sync_folder(target.parent)
+    except FileError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
         raise unwritable(path, error) from error
     finally:
         with contextlib.suppress(OSError, ValueError):
@@ -78,20 +86,11 @@ def reserve(descriptor, size):
             raise
 
 
-def sealed(blocks):
-    digest = hashlib.blake2b(digest_size=32)
-    for block in blocks:
-        digest.update(block)
-        yield block
-    yield seal_of(digest)
-
-
 def seal_of(digest):
-    """The seal of the data that a blake2b-256 has taken in."""
     return SEAL_MARK + digest.hexdigest().encode() + b"\n"
 
 
-def ordinary_target(path):
+def ordinary_target(path: str | Path) -> Path:
     """The file behind ``path``, links followed; renaming over a device or a folder is refused."""
     try:
         target = Path(os.path.realpath(path))
@@ -103,23 +102,14 @@ def ordinary_target(path):
     return target
 
 
-def unwritable(path, error):
-    """The FileError that says why ``path`` could not be written."""
+def unwritable(path: str | Path, error: Exception) -> FileError:
     reason = getattr(error, "strerror", None) or error
     return FileError(
         f"{path} could not be written: {reason}; check the folder, its permissions and free space"
     )
 
 
-def write_synced(path, data):
-    """Write a new file and wait until the disk has it."""
-    with open(path, "xb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def sync_folder(folder):
+def sync_folder(folder: Path) -> None:
     """Make a rename last through a power cut; Windows cannot and need not open a folder."""
     if os.name != "nt":
         descriptor = os.open(folder, os.O_RDONLY)
@@ -129,19 +119,19 @@ def sync_folder(folder):
             os.close(descriptor)
 
 
-def seal(data):
+def seal(data: bytes) -> bytes:
     """The bytes of an HDF5 file with their checksum appended."""
     return data + seal_of(hashlib.blake2b(data, digest_size=32))
 
 
-def read_sealed(path):
+def read_sealed(path: str | Path) -> bytes:
     """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
     with checked_sealed(path) as (file, size):
         return file.read(size)
 
 
 @contextlib.contextmanager
-def checked_sealed(path):
+def checked_sealed(path: str | Path) -> Iterator[tuple[BinaryIO, int]]:
     """(open file, size of its HDF5 data), once its checksum has been found right.
 
     Read a block at a time, so that files larger than the memory can be checked.
@@ -173,30 +163,22 @@ def check_seal(path, file):
             f"{path} does not end in flocsim's checksum: it is of another kind, was cut short or "
             "was changed by another program; use the original file"
         )
-    if seal_of(digest_of(file, size)) != tail:
+    digest, left = hashlib.blake2b(digest_size=32), size
+    file.seek(0)
+    while block := file.read(min(left, BLOCK)):
+        digest.update(block)
+        left -= len(block)
+    if seal_of(digest) != tail:
         raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
     return size
 
 
-def digest_of(file, size):
-    """The blake2b-256 of a file's first bytes."""
-    digest = hashlib.blake2b(digest_size=32)
-    file.seek(0)
-    while size > 0:
-        block = file.read(min(size, BLOCK))
-        if not block:
-            break
-        digest.update(block)
-        size -= len(block)
-    return digest
-
-
-def check_writable(path):
+def check_writable(path: str | Path) -> None:
     """FileError now, rather than after hours, if ``path`` could not be written later."""
-    target = ordinary_target(path)
-    probe = target.with_name(f".flocsim-{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    probe = temporary_beside(ordinary_target(path))
     try:
-        write_synced(probe, b"")
+        with open(probe, "xb") as file:
+            os.fsync(file.fileno())
     except (OSError, ValueError) as error:
         raise unwritable(path, error) from error
     finally:

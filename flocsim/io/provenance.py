@@ -6,11 +6,12 @@ import platform
 import shlex
 import sys
 from importlib import metadata
+from typing import Any
 
 PACKAGES = ("flocsim", "numpy", "numba", "h5py")
 
 
-def provenance(config_text, seed, kernel_fingerprint=""):
+def provenance(config_text: str, seed: int, kernel_fingerprint: str = "") -> dict[str, str | int]:
     """Scalars for the group ``run`` of a results file.
 
     ``config_text`` is the config file as the user wrote it, ``seed`` the whole number that keys
@@ -34,12 +35,12 @@ def provenance(config_text, seed, kernel_fingerprint=""):
     return {name: storable(value) for name, value in facts.items()}
 
 
-def now():
+def now() -> str:
     """Date and time [UTC, ISO 8601]."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def package_version(name):
+def package_version(name: str) -> str:
     """The installed version; for a package run from its folder, what it says of itself."""
     try:
         return metadata.version(name)
@@ -47,7 +48,7 @@ def package_version(name):
         return str(getattr(sys.modules.get(name), "__version__", "unknown"))
 
 
-def processor():
+def processor() -> str:
     """The processor's name, as far as the system gives it."""
     with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as file:
         for line in file:
@@ -56,7 +57,7 @@ def processor():
     return platform.processor() or platform.machine()
 
 
-def storable(value):
+def storable(value: Any) -> Any:
     """Text without the lone surrogates and zero characters that HDF5 cannot hold."""
     if not isinstance(value, str):
         return value

@@ -4,6 +4,7 @@ import os
 import sys
 import time
 import warnings
+from typing import TextIO
 
 LINE_SECONDS = 5.0
 """Seconds between two lines where the output is no terminal."""
@@ -12,7 +13,7 @@ BAR_SECONDS = 0.2
 """Seconds between two renewals on a terminal."""
 
 
-def duration(seconds):
+def duration(seconds: float) -> str:
     """Seconds in words: 42 s, 3 min 10 s, 2 h 05 min."""
     if seconds < 100:
         return f"{seconds:.0f} s"
@@ -21,7 +22,7 @@ def duration(seconds):
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
 
 
-def plain_warnings(silent=False):
+def plain_warnings(silent: bool = False) -> None:
     """From now on a warning is one line on stderr, without the place in the code; or none."""
 
     def show(message, category, filename, lineno, file=None, line=None):
@@ -31,7 +32,7 @@ def plain_warnings(silent=False):
     warnings.showwarning = show
 
 
-def tell(text, stream=None, end="\n"):
+def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
 
     What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
@@ -46,7 +47,9 @@ def tell(text, stream=None, end="\n"):
 class Progress:
     """How far a long work is: whole lines, or on a terminal one line that renews itself."""
 
-    def __init__(self, total, quiet, stream=None, noun="replicates"):
+    def __init__(
+        self, total: int, quiet: bool, stream: TextIO | None = None, noun: str = "replicates"
+    ) -> None:
         """``total`` replicates, or what the noun says; nothing is printed where ``quiet``."""
         self.total = self.todo = total
         self.quiet = quiet
@@ -56,21 +59,20 @@ class Progress:
         self.began = time.monotonic()
         self.printed = self.began
 
-    def say(self, text):
+    def say(self, text: str) -> None:
         if not self.quiet:
             tell(text, self.stream)
 
-    def warn(self, text):
+    def warn(self, text: str) -> None:
         """Print a line on stderr, quiet or not."""
         tell(f"flocsim: {text}", sys.stderr)
 
-    def start(self, todo):
+    def start(self, todo: int) -> None:
         """The work begins now, and is so much of the total."""
         self.todo = todo
         self.began = self.printed = time.monotonic()
 
-    def report(self, missing):
-        """Say how many are missing, if it is time to."""
+    def report(self, missing: int) -> None:
         share = (self.todo - missing) / self.todo if self.todo else 1.0
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
@@ -84,7 +86,7 @@ class Progress:
         else:
             tell(text, self.stream)
 
-    def finish(self):
+    def finish(self) -> float:
         """End the line that renews itself; the seconds since the start."""
         if self.tty and not self.quiet:
             tell("\r" + " " * 70 + "\r", self.stream, end="")

@@ -1,9 +1,12 @@
 """Trajectory files: one replicate's motion in HDF5."""
 
 import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import replace_file, seal
 
 SCHEMA_VERSION = 1
@@ -17,12 +20,19 @@ DATASETS = {
 """Units and meaning of the arrays of a trajectory file."""
 
 
-def centre_distance(position):
+def centre_distance(position: np.ndarray) -> np.ndarray:
     """Distance of the centroids of two bodies (k,) [m] from their places (k, 2, 3)."""
     return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
 
 
-def write_trajectory(path, times, position, velocity, shapes, facts):
+def write_trajectory(
+    path: str | Path,
+    times: np.ndarray,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    shapes: Sequence[Shape],
+    facts: Mapping[str, str | float],
+) -> None:
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
     Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],

@@ -7,7 +7,9 @@ counts are kept per pixel, so that a moved vertex needs only its two edges recou
 Kernels are plain Python on scalars and arrays; ``compiled`` makes them fast.
 """
 
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from flocsim.geometry.shapes.cores import is_near
 
 
 @cache
-def compiled(kernel):
+def compiled(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """A kernel of a fit, compiled on first use and kept on disk."""
     return compose(kernel, {}, allocates=True)
 
@@ -53,7 +55,6 @@ def cover(vertices, radius, shape):
 
 
 def add_edge(near, ax, ay, bx, by, radius):
-    """Count the edge a–b at every pixel within the radius of it."""
     rows, columns = near.shape
     for row in range(
         first_pixel(min(ay, by) - radius, rows), first_pixel(max(ay, by) + radius + 1.0, rows)
@@ -78,20 +79,19 @@ def count_wrong(mask, odd, near):
     return wrong, excess
 
 
-def covered(shape, vertices, radius):
+def covered(shape: tuple[int, int], vertices: np.ndarray, radius: float) -> np.ndarray:
     """The pixels (h, w) bool whose centres the swept polygon covers."""
     odd, near = compiled(cover)(np.array(vertices), radius, shape)
     return odd | (near > 0)
 
 
-def padded(mask, count, radius):
+def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int]:
     """The mask with room around it for the swept polygon, and the width of that margin [px]."""
     margin = int(np.ceil(radius)) + 6 + count // 100
     return np.pad(mask, margin), margin
 
 
 def neighbours(vertices, k):
-    """The places of vertex k − 1, k and k + 1."""
     after = (k + 1) % len(vertices)
     return (
         (vertices[k - 1, 0], vertices[k - 1, 1]),

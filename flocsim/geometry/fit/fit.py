@@ -4,6 +4,7 @@ import warnings
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
@@ -40,14 +41,22 @@ class Fit:
     wrong_pixels: int
     relative_error: float
 
-    def scaled(self, pixel_size):
+    def scaled(self, pixel_size: float) -> Shape:
         """The shape in metres, for pixels of `pixel_size` [m]; UsageError unless positive."""
         if not is_number(pixel_size) or pixel_size <= 0:
             raise UsageError(f"the pixel size must be a length above 0 m, found {pixel_size!r}")
         return self.shape.scaled(pixel_size)
 
 
-def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=False, inscribed=False):
+def fit_mask(
+    mask: ArrayLike,
+    *,
+    vertices: int,
+    radius: float = 1.0,
+    method: str = "pattern",
+    preserve_area: bool = False,
+    inscribed: bool = False,
+) -> Fit:
     """Fit a spheropolygon to a floc's mask: minimise the pixels where the two differ.
 
     A pixel belongs to the spheropolygon if its centre lies in the core polygon or within the
@@ -69,19 +78,31 @@ def fit_mask(mask, *, vertices, radius=1.0, method="pattern", preserve_area=Fals
     "condition r < r_eq should be satisfied").  Raises ShapeError for a mask that is not one region
     or too thin to inscribe a shape in, UsageError for a wrong option.
     """
-    mask = _require_one_region(mask)
+    floc = _require_one_region(mask)
     _check_options(vertices, radius, method)
     if vertices == 1:
-        return _equal_area_circle(mask)
-    if inscribed:
-        _require_pattern_alone(method, preserve_area)
-    elif preserve_area:
-        _require_room(mask, radius)
-    _warn_if_coarse(mask, radius)
-    return _fit_polygon(mask, int(vertices), float(radius), method, preserve_area, inscribed)
+        return _equal_area_circle(floc)
+    if inscribed and (method != "pattern" or preserve_area):
+        raise UsageError(
+            "an inscribed fit goes with the method 'pattern' and without preserving the area, "
+            f"found the method {method!r}, preserve_area {preserve_area}"
+        )
+    equivalent = np.sqrt(floc.sum() / np.pi)
+    if radius >= equivalent and preserve_area:
+        raise UsageError(
+            f"the area cannot be preserved: a spheroradius of {radius:g} px alone covers more than "
+            f"the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
+        )
+    if radius >= equivalent:
+        warnings.warn(
+            f"spheroradius {radius:g} px is not below the floc's r_eq = {equivalent:.2f} px: "
+            "the fit cannot follow its outline; use r < r_eq",
+            stacklevel=2,
+        )
+    return _fit_polygon(floc, int(vertices), float(radius), method, preserve_area, inscribed)
 
 
-def _require_one_region(mask):
+def _require_one_region(mask) -> np.ndarray:
     """The mask as a bool array; ShapeError unless it holds just one 8-connected region."""
     from scipy.ndimage import label
 
@@ -103,33 +124,6 @@ def _check_options(vertices, radius, method):
         raise UsageError(f"method must be {' or '.join(map(repr, METHODS))}, found {method!r}")
 
 
-def _require_pattern_alone(method, preserve_area):
-    if method != "pattern" or preserve_area:
-        raise UsageError(
-            "an inscribed fit goes with the method 'pattern' and without preserving the area, "
-            f"found the method {method!r}, preserve_area {preserve_area}"
-        )
-
-
-def _require_room(mask, radius):
-    equivalent = np.sqrt(mask.sum() / np.pi)
-    if radius >= equivalent:
-        raise UsageError(
-            f"the area cannot be preserved: a spheroradius of {radius:g} px alone covers more than "
-            f"the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
-        )
-
-
-def _warn_if_coarse(mask, radius):
-    equivalent = np.sqrt(mask.sum() / np.pi)
-    if radius >= equivalent:
-        warnings.warn(
-            f"spheroradius {radius:g} px is not below the floc's r_eq = {equivalent:.2f} px: "
-            "the fit cannot follow its outline; use r < r_eq",
-            stacklevel=3,
-        )
-
-
 def _equal_area_circle(mask):
     rows, columns = np.nonzero(mask)
     x, y = columns.mean(), rows.mean()
@@ -140,14 +134,29 @@ def _equal_area_circle(mask):
     row, column = np.ogrid[: padded.shape[0], : padded.shape[1]]
     inside = (column - margin - x) ** 2 + (row - margin - y) ** 2 <= radius**2
     wrong = int(np.count_nonzero(inside != padded))
-    return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, _percent(wrong, mask))
+    error = 100.0 * wrong / float(mask.sum())
+    return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, error)
 
 
 def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
-    points = _find(mask, count, radius, method, preserve_area, inscribed)
+    room, margin = padded(mask, count, radius)
+    # Points are x and y-down here [px], as the pixels are.
+    if method == "pattern":
+        weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
+        points = pattern_fit(room, count, radius, weights) - margin
+    else:
+        start = even_start(room, count, radius)
+        points = (paper_fit(room, start, radius) if method == "paper" else start) - margin
     shape = SpheroPolygon(points * (1.0, -1.0), radius)
     if inscribed:
-        _require_inside(mask, points, radius)
+        edge = _margin(mask, points, radius)
+        around = np.pad(mask, edge)
+        outside = np.count_nonzero(covered(around.shape, points + edge, radius) & ~around)
+        if outside:
+            raise ShapeError(
+                f"no shape of {len(points)} vertices and spheroradius {radius:g} px was found that "
+                f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
+            )
     elif preserve_area:
         factor = core_factor(shape.vertices, radius, float(mask.sum()))
         points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
@@ -155,7 +164,8 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
         points = _settled(mask, points, radius, shape.area)
     vertices = points * (1.0, -1.0)
     wrong = _wrong_pixels(mask, points, radius)
-    return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, _percent(wrong, mask))
+    error = 100.0 * wrong / float(mask.sum())
+    return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, error)
 
 
 def _settled(mask, points, radius, area):
@@ -173,16 +183,6 @@ def _settled(mask, points, radius, area):
     return points
 
 
-def _find(mask, count, radius, method, preserve_area, inscribed):
-    """The vertices (N, 2) as x, y-down [px] that a method leads to."""
-    room, margin = padded(mask, count, radius)
-    if method == "pattern":
-        weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
-        return pattern_fit(room, count, radius, weights) - margin
-    start = even_start(room, count, radius)
-    return (paper_fit(room, start, radius) if method == "paper" else start) - margin
-
-
 def _wrong_pixels(mask, points, radius):
     """V, counted on an array that the whole shape fits in."""
     margin = _margin(mask, points, radius)
@@ -192,19 +192,3 @@ def _wrong_pixels(mask, points, radius):
 def _margin(mask, points, radius):
     beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
     return max(0, int(np.ceil(beyond.max() + radius))) + 2
-
-
-def _require_inside(mask, points, radius):
-    """ShapeError if the shape covers pixels that are not the mask's."""
-    margin = _margin(mask, points, radius)
-    cover = covered(np.pad(mask, margin).shape, points + margin, radius)
-    outside = np.count_nonzero(cover & ~np.pad(mask, margin))
-    if outside:
-        raise ShapeError(
-            f"no shape of {len(points)} vertices and spheroradius {radius:g} px was found that "
-            f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
-        )
-
-
-def _percent(wrong, mask):
-    return 100.0 * wrong / float(mask.sum())

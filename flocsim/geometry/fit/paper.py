@@ -75,7 +75,7 @@ def damped_descent(mask, vertices, radius, force, damping, spacing, step, patien
     return best, steps
 
 
-def paper_fit(mask, start, radius):
+def paper_fit(mask: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
     """The vertices (N, 2) that the paper's motion leads to from a start, which it leaves alone."""
     descend = compiled(damped_descent)
     return descend(mask, np.array(start), radius, FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE)[0]

@@ -76,13 +76,11 @@ INSIDE = (0, 10**6)
 
 
 def weighed(wrong, excess, weights):
-    """The objective of a fit."""
     balance, outside = weights
     return wrong + balance * abs(excess) + outside * (wrong + excess)
 
 
 def stepped(vertices, k, directions, direction, step):
-    """Where vertex k comes to by a step in a direction."""
     x, y = vertices[k]
     across, down = directions[direction]
     return x + step * across, y + step * down
@@ -95,10 +93,10 @@ def leaves_room(shape, new, margin):
     return min(x, y) >= margin and x <= width - 1 - margin and y <= height - 1 - margin
 
 
-def best_step(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
-    """The direction in which a step of vertex k lowers the objective the most.
+def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
+    """Take the step of vertex k that lowers the objective the most, if any does.
 
-    Returns (direction or −1, change of the objective, growth of the cover).
+    Returns (change of the objective, growth of the cover).
     """
     before, here, after = neighbours(vertices, k)
     best, least, grown = -1, 0, 0
@@ -111,20 +109,11 @@ def best_step(mask, odd, near, vertices, k, radius, directions, step, excess, we
         x, y = new
         if change < least and stays_simple(vertices, k, x, y):
             best, least, grown = direction, change, growth
-    return best, least, grown
-
-
-def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
-    """Take the best step of vertex k, if any: (change of the objective, growth of the cover)."""
-    direction, change, growth = best_step(
-        mask, odd, near, vertices, k, radius, directions, step, excess, weights
-    )
-    if direction >= 0:
-        new = stepped(vertices, k, directions, direction, step)
-        before, here, after = neighbours(vertices, k)
+    if best >= 0:
+        new = stepped(vertices, k, directions, best, step)
         move_vertex(mask, odd, near, before, here, after, new, radius, True)
         vertices[k, 0], vertices[k, 1] = new
-    return change, growth
+    return least, grown
 
 
 def pattern_search(mask, vertices, radius, directions, steps, active, weights):
@@ -160,7 +149,14 @@ def pattern_search(mask, vertices, radius, directions, steps, active, weights):
     return objective
 
 
-def searched(mask, start, radius, steps, weights=PLAIN, active=None):
+def searched(
+    mask: np.ndarray,
+    start: np.ndarray,
+    radius: float,
+    steps: np.ndarray,
+    weights: tuple[int, int] = PLAIN,
+    active: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
     """pattern_search of a start, which is left as it is: (vertices, objective)."""
     vertices = np.array(start)
     active = np.ones(len(vertices), bool) if active is None else active
@@ -168,16 +164,9 @@ def searched(mask, start, radius, steps, weights=PLAIN, active=None):
     return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active, weights))
 
 
-def count_errors(mask, vertices, radius):
+def count_errors(mask: np.ndarray, vertices: np.ndarray, radius: float) -> int:
     """V of the swept polygon against the mask: a search without steps."""
     return searched(mask, vertices, radius, NO_STEPS)[1]
-
-
-def removal_cost(mask, odd, near, vertices, k, radius):
-    """Growth of V when vertex k is left out."""
-    before, here, after = neighbours(vertices, k)
-    cost, _ = move_vertex(mask, odd, near, before, here, after, before, radius, False)
-    return cost
 
 
 def insertion_gain(mask, odd, near, vertices, k, radius, steps):
@@ -197,11 +186,13 @@ def insertion_gain(mask, odd, near, vertices, k, radius, steps):
 
 
 def estimates(mask, vertices, radius, steps):
-    """(N, 2): removal_cost of every vertex, insertion_gain of the edge after it [px]."""
+    """(N, 2): growth of V when a vertex is left out; insertion_gain of the edge after it [px]."""
     odd, near = cover(vertices, radius, mask.shape)
     found = np.empty((len(vertices), 2))
     for k in range(len(vertices)):
-        found[k, 0] = removal_cost(mask, odd, near, vertices, k, radius)
+        before, here, after = neighbours(vertices, k)
+        cost, _ = move_vertex(mask, odd, near, before, here, after, before, radius, False)
+        found[k, 0] = cost
         found[k, 1] = insertion_gain(mask, odd, near, vertices, k, radius, steps)
     return found
 
@@ -225,29 +216,26 @@ def moved(vertices, removed, edge):
     return trial, nearby
 
 
-def improvement(mask, vertices, objective, radius, weights):
-    """The first promising move that lowers the objective: (vertices, objective), or None."""
-    costs, gains = compiled(estimates)(mask, vertices, radius, MOVE_STEPS).T
-    for removed, edge in promising_pairs(costs, gains):
-        start, nearby = moved(vertices, removed, edge)
-        if is_simple(start):
+def relocate(mask, vertices, objective, radius, weights):
+    """Take the first promising move of a vertex that lowers the objective, again and again."""
+    while len(vertices) > 2 and objective > 0:
+        costs, gains = compiled(estimates)(mask, vertices, radius, MOVE_STEPS).T
+        for removed, edge in promising_pairs(costs, gains):
+            start, nearby = moved(vertices, removed, edge)
+            if not is_simple(start):
+                continue
             trial, found = searched(mask, start, radius, MOVE_STEPS, weights, nearby)
             if found < objective:
-                return trial, found
-    return None
-
-
-def relocate(mask, vertices, objective, radius, weights):
-    """Move vertices to where that lowers the objective of the search, as long as it does."""
-    while len(vertices) > 2 and objective > 0:
-        better = improvement(mask, vertices, objective, radius, weights)
-        if better is None:
+                vertices, objective = trial, found
+                break
+        else:
             break
-        vertices, objective = better
     return vertices
 
 
-def pattern_fit(mask, count, radius, weights=PLAIN):
+def pattern_fit(
+    mask: np.ndarray, count: int, radius: float, weights: tuple[int, int] = PLAIN
+) -> np.ndarray:
     """The best of several pattern searches, refined: (N, 2) as x, y-down [px].
 
     mask: with room around it (coverage.padded); weights: what counts beside V.

@@ -38,7 +38,6 @@ def edge_is_clear(vertices, start, stop, moved, x, y):
 
 
 def stays_simple(vertices, k, x, y):
-    """Whether a simple polygon stays simple when its vertex k goes to (x, y)."""
     count = len(vertices)
     before, after = (k - 1) % count, (k + 1) % count
     return edge_is_clear(vertices, before, k, k, x, y) and edge_is_clear(
@@ -55,7 +54,6 @@ def all_clear(vertices):
 
 
 def reverse(vertices, first, last):
-    """Reverse the order of the vertices first … last, in place."""
     while first < last:
         for axis in range(2):
             kept = vertices[first, axis]
@@ -127,7 +125,7 @@ def simple_inset(vertices, depth):
     return True
 
 
-def is_simple(vertices):
+def is_simple(vertices: np.ndarray) -> bool:
     """Whether no edges cross or nearly touch: simple_inset leaves such a polygon as it is."""
     drawn = np.array(vertices)
     return bool(compiled(simple_inset)(drawn, 0.0)) and np.array_equal(drawn, vertices)

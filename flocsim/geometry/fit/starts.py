@@ -24,7 +24,7 @@ FLATTEST = 0.17
 """Sine of the angle, about 10°, below which neighbouring lines do not tell where they cross."""
 
 
-def trace_outline(mask):
+def trace_outline(mask: np.ndarray) -> np.ndarray:
     """The outer outline of a mask's first region, (M, 2) as x = column, y = row.
 
     The points are the middles of the pixel edges between the region and its outside, in order
@@ -46,23 +46,17 @@ def trace_outline(mask):
 def _turn(inside, row, column, heading):
     """The heading after the upper left corner of pixel (row, column), the region on the right."""
     down, right = HEADINGS[heading]
-    left_row, left_column = _ahead(row, column, down, right, -1)
-    right_row, right_column = _ahead(row, column, down, right, 1)
-    if inside[left_row][left_column]:
+
+    def ahead(hand):
+        """Whether the pixel ahead, to the left (−1) or the right (1), is the region's."""
+        return inside[row + (down + hand * right - 1) // 2][column + (right - hand * down - 1) // 2]
+
+    if ahead(-1):
         return (heading - 1) % 4
-    return heading if inside[right_row][right_column] else (heading + 1) % 4
+    return heading if ahead(1) else (heading + 1) % 4
 
 
-def _ahead(row, column, down, right, hand):
-    """The pixel ahead of a corner, to the left (hand −1) or the right (hand 1) of the heading."""
-    beside_down, beside_right = hand * right, -hand * down
-    return (
-        row + (down + beside_down - 1) // 2,
-        column + (right + beside_right - 1) // 2,
-    )
-
-
-def even_points(outline, count, shift=0.0):
+def even_points(outline: np.ndarray, count: int, shift: float = 0.0) -> np.ndarray:
     """`count` points evenly spaced along the closed outline; `shift` in spacings moves them on."""
     closed = np.vstack([outline, outline[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
@@ -70,7 +64,7 @@ def even_points(outline, count, shift=0.0):
     return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
 
 
-def ring_inside(mask, count):
+def ring_inside(mask: np.ndarray, count: int) -> np.ndarray:
     """A regular polygon around the deepest pixel of the mask: a start that is always simple."""
     from scipy.ndimage import distance_transform_edt
 
@@ -81,7 +75,7 @@ def ring_inside(mask, count):
     return np.column_stack([column + radius * np.cos(angles), row + radius * np.sin(angles)])
 
 
-def inset(points, mask, depth):
+def inset(points: np.ndarray, mask: np.ndarray, depth: float) -> np.ndarray:
     """A simple polygon through the points, drawn in by `depth` [px] or less where it must.
 
     Points whose polygon is not simple are reordered, or a ring inside the mask takes their place.
@@ -94,8 +88,7 @@ def inset(points, mask, depth):
     return drawn
 
 
-def even_start(mask, count, radius):
-    """Points evenly spaced on the outline, drawn in by the radius."""
+def even_start(mask: np.ndarray, count: int, radius: float) -> np.ndarray:
     return inset(even_points(trace_outline(mask), count), mask, radius)
 
 
@@ -177,21 +170,18 @@ def best_breaks(costs, count, start):
     return breaks
 
 
-def lines_through(points, breaks):
-    """Centres (N, 2) and unit directions (N, 2) of the lines through the runs from each break."""
-    after = np.roll(breaks, -1)
-    last = np.where(after > breaks, after, after + len(points))
-    x, y, xx, xy, yy = scatter(moment_sums(points), breaks, last)
-    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-    return np.column_stack([x, y]), np.column_stack([np.cos(angle), np.sin(angle)])
-
-
 def corners(points, breaks):
     """The vertices (N, 2) where the lines of neighbouring runs cross.
 
     Where they cross too flatly, or far from the break, midway between its feet on both lines.
     """
-    centres, along = lines_through(points, breaks)
+    # The line of least squares through each run.
+    stops = np.roll(breaks, -1)
+    last = np.where(stops > breaks, stops, stops + len(points))
+    x, y, xx, xy, yy = scatter(moment_sums(points), breaks, last)
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    centres = np.column_stack([x, y])
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
     before, ahead = np.roll(centres, 1, axis=0), np.roll(along, 1, axis=0)
     places = points[breaks]
     sine = cross(ahead, along)
@@ -207,12 +197,11 @@ def corners(points, breaks):
 
 
 def foot(points, origins, directions):
-    """The nearest places (N, 2) to the points on the lines."""
     share = np.einsum("ij,ij->i", points - origins, directions)
     return origins + share[:, None] * directions
 
 
-def split_corners(points, count, start, rounds):
+def split_corners(points: np.ndarray, count: int, start: int, rounds: int) -> np.ndarray:
     """The `count` corners of the best split of the outline `points` (M, 2), M ≥ 2 `count`.
 
     The split has a break at `start`; every round takes the break across as the start of a

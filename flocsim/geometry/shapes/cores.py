@@ -19,7 +19,6 @@ def closest_share(px, py, ax, ay, bx, by):
 
 
 def segment_distance2(px, py, ax, ay, bx, by):
-    """Squared distance [m²] from point p to segment a–b."""
     share = closest_share(px, py, ax, ay, bx, by)
     dx = px - (ax + share * (bx - ax))
     dy = py - (ay + share * (by - ay))
@@ -58,9 +57,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 def edge_count(points):
     """Edges of a core of that many points: none, one, or as many as points."""
-    if points < 3:
-        return points - 1
-    return points
+    return points - 1 if points < 3 else points
 
 
 def edge_end(first, points, start):
@@ -74,7 +71,7 @@ def edge_end(first, points, start):
     return following
 
 
-def edges_of(vertices):
+def edges_of(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(starts, ends) of the core's edges: none for a point, one for a segment, N for a polygon."""
     if len(vertices) == 2:
         return vertices[:1], vertices[1:]
@@ -83,24 +80,23 @@ def edges_of(vertices):
     return vertices, np.roll(vertices, -1, axis=0)
 
 
-def unit_edges(vertices):
-    """(starts, unit directions, lengths) of the core's edges."""
+def unit_edges(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     starts, ends = edges_of(vertices)
     lengths = np.hypot(*(ends - starts).T)
     return starts, (ends - starts) / lengths[:, None], lengths
 
 
-def cross(a, b):
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The z component of the cross product of plane vectors, elementwise."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def signed_area(vertices):
+def signed_area(vertices: np.ndarray) -> float:
     """Area of the core polygon [m²], positive when its vertices run counter-clockwise."""
     return 0.5 * np.sum(cross(vertices, np.roll(vertices, -1, axis=0)))
 
 
-def from_edges(points, starts, ends):
+def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Vectors (k, edges, 2) from the nearest place of each edge to each of the points (k, 2)."""
     along = ends - starts
     relative = points[:, None, :] - starts[None]
@@ -108,13 +104,12 @@ def from_edges(points, starts, ends):
     return relative - np.clip(share, 0.0, 1.0)[..., None] * along[None]
 
 
-def distance_to_edges(points, starts, ends):
-    """Distances (k, edges) from points (k, 2) to each edge."""
+def distance_to_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     away = from_edges(points, starts, ends)
     return np.hypot(away[..., 0], away[..., 1])
 
 
-def inside_polygon(points, vertices):
+def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Which of the points (k, 2) lie inside the core polygon (crossing number)."""
     if len(vertices) < 3:
         return np.zeros(len(points), dtype=bool)
@@ -126,7 +121,7 @@ def inside_polygon(points, vertices):
     return np.count_nonzero(straddles & (x < crossing), axis=1) % 2 == 1
 
 
-def cores_cross(a, b):
+def cores_cross(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether any edge of core a properly crosses any edge of core b."""
     (p, q), (r, s) = edges_of(a), edges_of(b)
     p, q = p[:, None], q[:, None]

@@ -3,8 +3,6 @@
 The outline of core ⊕ disk is made of offset edges and of arcs around vertices. Each such piece is
 cut wherever another piece crosses it; what lies nearer than the radius to some other part of the
 core is dropped; Green's theorem over what remains gives the moments, holes included.
-
-Where the pieces of a swept outline (offsets of edges, arcs around vertices) cross each other.
 """
 
 import numpy as np
@@ -161,10 +159,11 @@ def chord_nodes(vertices, radius):
     at_start, at_end = trims_of(bends_of(units), lengths, radius)
     origins = starts + radius * np.column_stack([units[:, 1], -units[:, 0]])
     origins = origins + at_start[:, None] * units
-    by_circles = circle_cuts(origins, units, vertices, radius)
-    by_offsets = offset_cuts(origins, units, vertices, radius)
+    cuts = joined(
+        circle_cuts(origins, units, vertices, radius), offset_cuts(origins, units, vertices, radius)
+    )
     whole = np.maximum(lengths - at_start - at_end, 0.0)
-    rows, low, high = pieces(*joined(by_circles, by_offsets), whole)
+    rows, low, high = pieces(*cuts, whole)
     seen = exposed(origins[rows] + (0.5 * (low + high))[:, None] * units[rows], vertices, radius)
     rows = rows[seen]
     place, weights = nodes_on(low[seen], high[seen])
@@ -182,9 +181,7 @@ def arc_nodes(vertices, radius):
     _, units, _ = sides_of(vertices)
     before = np.roll(units, 1, axis=0)
     first = np.arctan2(-before[:, 0], before[:, 1])
-    by_circles = arc_circle_cuts(vertices, radius)
-    by_offsets = arc_offset_cuts(vertices, radius)
-    rows, angles = joined(by_circles, by_offsets)
+    rows, angles = joined(arc_circle_cuts(vertices, radius), arc_offset_cuts(vertices, radius))
     turns = np.mod(angles - first[rows], 2.0 * np.pi)
     rows, low, high = pieces(rows, turns, np.maximum(bends_of(units), 0.0))
     middle = first[rows] + 0.5 * (low + high)
@@ -198,12 +195,7 @@ def arc_nodes(vertices, radius):
     return points.reshape(-1, 2), tangents.reshape(-1, 2), radius * weights.ravel()
 
 
-def outline_nodes(vertices, radius):
-    """Quadrature points, unit tangents and weights of the whole outline of a core with edges."""
-    return joined(chord_nodes(vertices, radius), arc_nodes(vertices, radius))
-
-
-def swept_moments(vertices, radius):
+def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarray, float]:
     """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴].
 
     ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
@@ -211,7 +203,8 @@ def swept_moments(vertices, radius):
     if len(vertices) == 1:
         return np.pi * radius**2, vertices[0].copy(), 0.5 * np.pi * radius**4
     origin = vertices.mean(axis=0)
-    points, tangents, weights = outline_nodes(vertices - origin, radius)
+    core = vertices - origin
+    points, tangents, weights = joined(chord_nodes(core, radius), arc_nodes(core, radius))
     x, y = points.T
     dx, dy = (tangents * weights[:, None]).T
     area = 0.5 * np.sum(x * dy - y * dx)

@@ -5,17 +5,15 @@ import numpy as np
 from flocsim.errors import ShapeError
 
 
-def simplicity_fault(vertices):
+def simplicity_fault(vertices: np.ndarray) -> str | None:
     """None where the closed polygon (N ≥ 3, 2) is simple, else where it fails, in words."""
     import shapely
 
     polygon = shapely.Polygon(vertices)
-    if not polygon.is_valid:
-        return shapely.is_valid_reason(polygon)
-    return None
+    return None if polygon.is_valid else shapely.is_valid_reason(polygon)
 
 
-def require_simple(vertices):
+def require_simple(vertices: np.ndarray) -> None:
     """Raise ShapeError where edges of the closed polygon cross or touch."""
     fault = simplicity_fault(vertices)
     if fault is not None:
@@ -25,7 +23,9 @@ def require_simple(vertices):
         )
 
 
-def swept_rings(vertices, radius, points_per_quadrant=16):
+def swept_rings(
+    vertices: np.ndarray, radius: float, points_per_quadrant: int = 16
+) -> list[np.ndarray]:
     """The outline of core ⊕ disk as closed rings [(k, 2), …] in metres, the outer one first."""
     import shapely
 

@@ -4,18 +4,18 @@ import numpy as np
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.moments import swept_moments
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 
 ACCURACY = 1e-10
 """Relative accuracy of the area before the last, uniform correction."""
 
 
-def area_of_scaled(vertices, factor, radius):
-    """Area [m²] of the core scaled by ``factor``, swept by ``radius``."""
+def area_of_scaled(vertices: np.ndarray, factor: float, radius: float) -> float:
     return swept_moments(vertices * factor, radius)[0]
 
 
-def core_factor(vertices, radius, area):
+def core_factor(vertices: np.ndarray, radius: float, area: float) -> float:
     """The factor by which the core must be scaled for the swept outline to have an area.
 
     While the outline keeps its form, the area is π r² + b·factor + c·factor²: each trial fits b
@@ -37,7 +37,7 @@ def core_factor(vertices, radius, area):
     return trials[-1][0]
 
 
-def resized(shape, equivalent_radius, radius):
+def resized(shape: SpheroPolygon, equivalent_radius: float, radius: float) -> Shape:
     """The SpheroPolygon's core scaled so that, swept by ``radius`` [m], r_eq is exact [m].
 
     Raises ShapeError where the disk alone is already as large as the wanted body.

@@ -2,9 +2,10 @@
 
 from functools import cached_property
 from inspect import getattr_static
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError
 from flocsim.fields import is_number
@@ -46,64 +47,70 @@ class Shape:
     ``area`` and ``second_moment``. ShapeError where the core is no such polygon.
     """
 
-    core: np.ndarray
-    radius: float
+    if TYPE_CHECKING:
+
+        @property
+        def core(self) -> np.ndarray: ...
+
+        @property
+        def radius(self) -> float: ...
 
     @cached_property
-    def swept(self):
-        """The Swept of this core and radius."""
+    def swept(self) -> Swept:
         for name in ("core", "radius"):
             if getattr_static(self, name, None) is None:
                 raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
         return swept_by(read_points("core", self.core), positive_radius(self.radius))
 
     @property
-    def vertices(self):
+    def vertices(self) -> np.ndarray:
         """Core points (N, 2) [m] around the centroid, counter-clockwise, read-only."""
         return self.swept.vertices
 
     @property
-    def centroid(self):
+    def centroid(self) -> np.ndarray:
         """Where the centroid of the swept area lies in the frame of the core given (2,) [m]."""
         return self.swept.centroid
 
     @property
-    def area(self):
+    def area(self) -> float:
         """Area A of the swept outline [m²]."""
         return self.swept.area
 
     @property
-    def second_moment(self):
+    def second_moment(self) -> float:
         """Second moment of area J = ∫ρ² dA about the centroid [m⁴]."""
         return self.swept.second_moment
 
     @property
-    def equivalent_radius(self):
+    def equivalent_radius(self) -> float:
         """r_eq = √(A/π) [m]."""
         return float(np.sqrt(self.area / np.pi))
 
     @property
-    def bounding_radius(self):
+    def bounding_radius(self) -> float:
         """R, the largest distance from the centroid to the outline [m]."""
         return float(np.hypot(*self.vertices.T).max() + self.radius)
 
-    def scaled(self, factor):
+    def scaled(self, factor: float) -> "Shape":
         """The same outline, ``factor`` times as large: a Sphere or a SpheroPolygon."""
         from flocsim.geometry.shapes.spheropolygon import scaled_outline
 
         return scaled_outline(self, factor)
 
-    def placed_vertices(self, x=0.0, y=0.0, angle=0.0):
+    def placed_vertices(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
         """Core points (N, 2) [m] of the body at (x, y), turned by ``angle`` [rad]."""
         c, s = np.cos(angle), np.sin(angle)
         return self.vertices @ np.array([[c, s], [-s, c]]) + (x, y)
 
-    def outline(self, x=0.0, y=0.0, angle=0.0, points_per_quadrant=16):
+    def outline(
+        self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
+    ) -> list[np.ndarray]:
         """Closed rings [(k, 2), …] of the placed outline, for drawing; the outer one first."""
         return swept_rings(self.placed_vertices(x, y, angle), self.radius, points_per_quadrant)
 
 
-def swept_by(core, radius):
+def swept_by(core: np.ndarray, radius: float) -> Swept:
     """The Swept of core points (N, 2) and a radius [m]; ShapeError where they make no body."""
     if len(core) > 1:
         require_distinct(core)
@@ -120,13 +127,12 @@ def swept_by(core, radius):
     return Swept(vertices, centroid, float(area * extent**2), float(moment * extent**4))
 
 
-def read_only(array):
-    """The array, which must not be written to any more."""
+def read_only(array: np.ndarray) -> np.ndarray:
     array.flags.writeable = False
     return array
 
 
-def positive_radius(radius):
+def positive_radius(radius: Any) -> float:
     """``radius`` as a float; ShapeError unless it is a finite number above 0."""
     if isinstance(radius, np.generic):
         radius = radius.item()
@@ -135,7 +141,7 @@ def positive_radius(radius):
     return float(radius)
 
 
-def read_points(name, points, fewest=1):
+def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
     """``points`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
     try:
         array = np.array(points, dtype=float)
@@ -153,7 +159,6 @@ def read_points(name, points, fewest=1):
 
 
 def require_distinct(vertices):
-    """Raise ShapeError where two neighbouring vertices coincide."""
     extent = np.ptp(vertices, axis=0).max()
     steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
     repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)

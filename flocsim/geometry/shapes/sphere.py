@@ -13,6 +13,5 @@ class Sphere(Shape):
     radius: float = attrs.field(converter=positive_radius)
 
     @property
-    def core(self):
-        """The one core point (1, 2): the centre."""
+    def core(self) -> np.ndarray:
         return np.zeros((1, 2))

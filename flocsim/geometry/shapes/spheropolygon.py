@@ -2,6 +2,7 @@
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.shape import (
@@ -15,8 +16,7 @@ from flocsim.geometry.shapes.shape import (
 from flocsim.geometry.shapes.sphere import Sphere
 
 
-def read_vertices(vertices):
-    """``vertices`` as a fresh (N, 2) float array, N ≥ 2; ShapeError for another form."""
+def read_vertices(vertices: ArrayLike) -> np.ndarray:
     return read_points("vertices", vertices, fewest=2)
 
 
@@ -40,7 +40,7 @@ class SpheroPolygon(Shape):
         self.__dict__["swept"] = swept_by(self.core, self.radius)
 
 
-def scaled_outline(shape, factor):
+def scaled_outline(shape: Shape, factor: float) -> Shape:
     """A Sphere or SpheroPolygon ``factor`` times as large; ShapeError unless finite, above 0."""
     if not np.isfinite(factor) or factor <= 0.0:
         raise ShapeError(f"a shape can be scaled by a finite factor above 0, found {factor!r}")

@@ -1,6 +1,7 @@
 """Synthetic flocs: clusters of primary particles with a given fractal dimension in the plane."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -87,7 +88,9 @@ def draw_discs(centres, pixels_per_radius):
     return mask
 
 
-def synthetic_floc(seed, particles=60, dimension=1.8):
+def synthetic_floc(
+    seed: int | Sequence[int], particles: int = 60, dimension: float = 1.8
+) -> np.ndarray:
     """Picture (boolean mask, rows down) of one synthetic floc; the seed decides all.
 
     Parameters: ``seed``, an integer or a tuple of integers; ``particles`` n ≥ 2;

@@ -1,5 +1,7 @@
 """Noise, uneven light, and the threshold: what parts a picture's flocs from their background."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 SURFACE_ROUNDS = 15
@@ -27,7 +29,7 @@ STEEPER = 1.25
 """A lower level is taken if edges are steeper there by this factor."""
 
 
-def low_pass(grey, scale):
+def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
     """`grey` with detail finer than `scale` [px] removed: exp(−½ (k·scale)²) in Fourier space.
 
     The cosine transform is the Fourier transform of the picture mirrored at its edges, so that
@@ -43,32 +45,30 @@ def low_pass(grey, scale):
     return fft.idctn(spectrum, norm="ortho")
 
 
-def median_frame(frames):
+def median_frame(frames: Sequence[np.ndarray]) -> np.ndarray:
     """The light of a fixed camera: per pixel the median of frames (h, w) of one shape."""
     return np.median(np.stack(frames), axis=0)
 
 
-def robust_deviation(values):
+def robust_deviation(values: np.ndarray) -> float:
     """The standard deviation of a normal bulk, blind to outliers: 1.4826 × median |v − median|."""
-    return 1.4826 * np.median(np.abs(values - np.median(values)))
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def noise_deviation(fine):
+def noise_deviation(fine: np.ndarray) -> float:
     """robust_deviation of a sample of the detail that the low pass took out."""
-    return robust_deviation(fine[:: _stride(fine), :: _stride(fine)])
+    stride = max(1, max(fine.shape) // NOISE_SAMPLES)
+    return robust_deviation(fine[::stride, ::stride])
 
 
-def _stride(grey):
-    return max(1, max(grey.shape) // NOISE_SAMPLES)
-
-
-def smooth_surface(grey, degree):
+def smooth_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`.
 
     Least squares over products of Legendre polynomials of total degree ≤ `degree`, reweighted
     w = 1/(1 + (residual/1.5σ)²)² so that pixels of flocs lose their say; σ is the robust deviation.
     """
-    rows, columns = (_legendre(size, degree) for size in grey.shape)
+    places = (np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in grey.shape)
+    rows, columns = (np.polynomial.legendre.legvander(along, degree) for along in places)
     step = max(1, -(-max(grey.shape) // SURFACE_SAMPLES))
     sample = grey[::step, ::step]
     basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
@@ -80,14 +80,9 @@ def smooth_surface(grey, degree):
     return rows @ coefficients @ columns.T
 
 
-def light_surface(grey, degree):
+def light_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     """As smooth_surface, for light that falls off by a factor: fitted to the logarithm of grey."""
     return np.exp(smooth_surface(np.log(np.maximum(grey, 0.0) + DARKEST), degree)) - DARKEST
-
-
-def _legendre(size, degree):
-    places = np.linspace(-1.0, 1.0, size) if size > 1 else np.zeros(1)
-    return np.polynomial.legendre.legvander(places, degree)
 
 
 def _reweighted_fit(basis, values):
@@ -102,7 +97,7 @@ def _reweighted_fit(basis, values):
     return solution
 
 
-def find_threshold(contrast, noise, saturated):
+def find_threshold(contrast: np.ndarray, noise: float, saturated: float) -> float:
     """Otsu's level of the contrast stretched between two thresholds, or the steepest below it.
 
     The thresholds are the median and the top `saturated` share (paper, section 2.1: imadjust, then

@@ -14,7 +14,7 @@ MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)
 """Endings that are taken for masks when a folder is given."""
 
 
-def read_masks(path):
+def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     """The masks of a file: [(name, (h, w) integer array)], 0 outside.
 
     Two values are a mask of any number of flocs, the greater one inside; integers of more values
@@ -34,6 +34,7 @@ def read_masks(path):
 
 
 def _arrays(path):
+    """[(key, array)] of an .npy or .npz file."""
     if not path.is_file():
         raise ImageError(f"{path}: no such file of masks; check the path")
     try:
@@ -44,10 +45,8 @@ def _arrays(path):
     except Exception as problem:
         reason = " ".join(str(problem).split())[:120]
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
-    return _unpacked(arrays) if "shapes" in arrays else list(arrays.items())
-
-
-def _unpacked(arrays):
+    if "shapes" not in arrays:
+        return list(arrays.items())
     shapes = arrays.pop("shapes")
     return [
         (key, np.unpackbits(bits)[: int(shape.prod())].reshape(shape))
@@ -71,7 +70,9 @@ def _mask(array, name):
     return array.astype(np.int64)
 
 
-def segment_mask(mask, *, min_radius=4.0, max_radius=np.inf):
+def segment_mask(
+    mask: np.ndarray, *, min_radius: float = 4.0, max_radius: float = np.inf
+) -> Segmentation:
     """The flocs of a mask or label image as a Segmentation: holes filled, by size only.
 
     What touches the border stays, and nothing is parted: who gives a mask has decided that.

@@ -33,35 +33,34 @@ class Segmentation:
     """
 
     foreground: np.ndarray
-    regions: tuple
-    rejected: tuple
+    regions: tuple[Region, ...]
+    rejected: tuple[Rejection, ...]
     flocs: str
     threshold: float
 
     @property
-    def foreground_share(self):
-        """Share of the picture's pixels that are foreground [-]."""
+    def foreground_share(self) -> float:
         return float(self.foreground.mean())
 
-    def rejected_by_reason(self):
+    def rejected_by_reason(self) -> dict[str, int]:
         """{reason: number of regions}, reasons in alphabetical order."""
         reasons = [rejection.reason for rejection in self.rejected]
         return {reason: reasons.count(reason) for reason in sorted(set(reasons))}
 
 
 def segment(
-    grey,
+    grey: np.ndarray,
     *,
-    flocs="auto",
-    noise_scale=1.0,
-    background_degree=6,
-    background=None,
-    saturated=0.001,
-    min_radius=4.0,
-    max_radius=np.inf,
-    max_blur=0.4,
-    neck=0.5,
-):
+    flocs: str = "auto",
+    noise_scale: float = 1.0,
+    background_degree: int = 6,
+    background: np.ndarray | None = None,
+    saturated: float = 0.001,
+    min_radius: float = 4.0,
+    max_radius: float = np.inf,
+    max_blur: float = 0.4,
+    neck: float = 0.5,
+) -> Segmentation:
     """Separate the flocs of a grey picture from its background.
 
     In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
@@ -84,7 +83,15 @@ def segment(
     filters = Filters(min_radius, max_radius, max_blur, neck)
     _check_options(flocs, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
-    light = None if background is None else low_pass(_matching(background, grey), noise_scale)
+    light = None
+    if background is not None:
+        background = _checked(background)
+        if background.shape != grey.shape:
+            raise ImageError(
+                f"the background's shape {background.shape} is not the picture's {grey.shape}; "
+                "make it from frames of the same size"
+            )
+        light = low_pass(background, noise_scale)
     if flocs == "auto":
         flocs = _guess_polarity(smooth, light)
     contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
@@ -101,16 +108,6 @@ def _checked(grey):
             f"a picture is a filled (h, w) array of finite numbers, found shape {grey.shape}"
         )
     return grey
-
-
-def _matching(background, grey):
-    background = _checked(background)
-    if background.shape != grey.shape:
-        raise ImageError(
-            f"the background's shape {background.shape} is not the picture's {grey.shape}; "
-            "make it from frames of the same size"
-        )
-    return background
 
 
 def _check_options(flocs, noise_scale, background_degree, saturated, filters):

@@ -14,7 +14,7 @@ LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
 
 
-def read_grey(path):
+def read_grey(path: str | Path) -> np.ndarray:
     """The luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float64 in [0, 1].
 
     The full range of the file's number type maps to [0, 1]; floating-point files must already lie
@@ -26,7 +26,7 @@ def read_grey(path):
     return _luminance(_to_unit_range(pixels, path), path)
 
 
-def read_pixels(path):
+def read_pixels(path: str | Path) -> np.ndarray:
     """The pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
     path = Path(path)
     if not path.is_file():
@@ -114,10 +114,9 @@ def _luminance(pixels, path):
     has_alpha = pixels.shape[2] in (2, 4)
     colours = pixels[..., :-1] if has_alpha else pixels
     grey = colours[..., 0] if colours.shape[2] == 1 else colours @ LUMINANCE
-    return _fill_transparent(grey, pixels[..., -1]) if has_alpha else grey
-
-
-def _fill_transparent(grey, alpha):
+    if not has_alpha:
+        return grey
+    alpha = pixels[..., -1]
     opaque = grey[alpha > 0.5]
     backdrop = np.median(opaque) if opaque.size else 0.0
     return alpha * grey + (1.0 - alpha) * backdrop

@@ -25,8 +25,8 @@ class Region:
     """
 
     label: int
-    centroid: tuple
-    bbox: tuple
+    centroid: tuple[float, float]
+    bbox: tuple[int, int, int, int]
     area: int
     equivalent_radius: float
     mask: np.ndarray
@@ -37,7 +37,7 @@ class Region:
 class Rejection:
     """A region left out: centroid (x, y) [px, y down], area [px], radius [px], reason, blur."""
 
-    centroid: tuple
+    centroid: tuple[float, float]
     area: int
     equivalent_radius: float
     reason: str
@@ -98,25 +98,20 @@ def sorted_out(masks, contrast, filters):
 
 
 def reason_to_reject(box, shape, radius, blur, filters):
-    """Why a region is no floc to measure, None if it is one."""
     if radius < filters.min_radius:
         return "too small"
     if radius > filters.max_radius:
         return "too large"
-    if filters.clear_of_border and touches_border(box, shape):
-        return "at the border"
+    if filters.clear_of_border:
+        sides = zip(box, shape, strict=True)
+        if any(side.start == 0 or side.stop == size for side, size in sides):
+            return "at the border"
     if blur > max(SHARP, filters.max_blur * radius):
         return "out of focus"
     return None
 
 
-def touches_border(box, shape):
-    """Whether a box reaches the rim of a picture of this shape."""
-    return any(side.start == 0 or side.stop == size for side, size in zip(box, shape, strict=True))
-
-
 def centroid_of(mask, box):
-    """(x, y) [px] of a mask that lies in a box of the picture."""
     rows, columns = np.nonzero(mask)
     return float(columns.mean() + box[1].start), float(rows.mean() + box[0].start)
 

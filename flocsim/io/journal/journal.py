@@ -8,10 +8,11 @@ import contextlib
 import io
 import os
 import time
+from pathlib import Path
 
 from flocsim.errors import FileError
 from flocsim.io.files import ordinary_target, sync_folder, unwritable
-from flocsim.io.journal.records import MARK, Damage, scan
+from flocsim.io.journal.records import MARK, Damage, Record, scan
 
 SUFFIX = ".journal"
 
@@ -22,14 +23,13 @@ SYNC_SECONDS = 5.0
 """Seconds between two syncs to the disk: what a power cut may cost. A kill costs nothing."""
 
 
-def journal_path(results):
+def journal_path(results: str | Path) -> Path:
     """Where the journal of a results file lies: beside it."""
     target = ordinary_target(results)
     return target.with_name(target.name + SUFFIX)
 
 
 def lock(file, path):
-    """Keep other processes from writing; FileError where one does so already."""
     try:
         import fcntl
     except ImportError:
@@ -52,7 +52,7 @@ def lock(file, path):
 class Journal:
     """An open journal. ``records`` and ``damage`` are what was found in it."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         """Open, lock and read the journal at ``path``, or start one; FileError if impossible."""
         self.path = path
         try:
@@ -70,10 +70,10 @@ class Journal:
         self.synced = time.monotonic()
         sync_folder(path.parent)
 
-    def size(self):
+    def size(self) -> int:
         return self.file.seek(0, os.SEEK_END)
 
-    def append(self, record):
+    def append(self, record: bytes) -> int:
         """Append a record's bytes; the place at which they begin. FileError where that fails,
         and then the journal is what it was before."""
         start = self.end
@@ -93,29 +93,26 @@ class Journal:
             raise unwritable(self.path, error) from error
         return start
 
-    def read(self, offset, length):
-        """Bytes of the file."""
+    def read(self, offset: int, length: int) -> bytes:
         return os.pread(self.file.fileno(), length, offset)
 
-    def sync(self):
-        """Wait until the disk has all of it."""
+    def sync(self) -> None:
         try:
             os.fsync(self.file.fileno())
         except OSError as error:
             raise unwritable(self.path, error) from error
         self.synced = time.monotonic()
 
-    def remove(self):
+    def remove(self) -> None:
         """Delete the file: what was in it is in the results."""
         with contextlib.suppress(OSError):
             os.unlink(self.path)
         self.file.close()
 
-    def close(self):
-        """Let go of the file, as it is."""
+    def close(self) -> None:
         self.file.close()
 
-    def drop_if_empty(self):
+    def drop_if_empty(self) -> None:
         """Let go of the file, and leave none behind in which there is nothing."""
         if self.size() == 0:
             self.remove()
@@ -125,21 +122,23 @@ class Journal:
 class MemoryJournal:
     """The same in memory, for a study that is run from Python."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.file = io.BytesIO()
-        self.records, self.damage, self.path = [], [], "memory"
+        self.records: list[Record] = []
+        self.damage: list[Damage] = []
+        self.path = "memory"
 
-    def append(self, record):
+    def append(self, record: bytes) -> int:
         start = self.file.seek(0, os.SEEK_END)
         self.file.write(record)
         return start
 
-    def read(self, offset, length):
+    def read(self, offset: int, length: int) -> bytes:
         with self.file.getbuffer() as view:
             return bytes(view[offset : offset + length])
 
-    def sync(self):
+    def sync(self) -> None:
         """Nothing to wait for."""
 
-    def remove(self):
+    def remove(self) -> None:
         """Nothing to delete."""

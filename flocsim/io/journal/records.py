@@ -12,6 +12,8 @@ the next record is looked for by its mark.
 import hashlib
 import json
 import struct
+from collections.abc import Iterator
+from typing import Any, BinaryIO
 
 import attrs
 
@@ -31,7 +33,7 @@ class Record:
     """One whole record: its kind, its description, and where its data lie in the file."""
 
     kind: int
-    description: dict
+    description: dict[str, Any]
     offset: int
     length: int
 
@@ -42,15 +44,14 @@ class Damage:
 
     start: int
     stop: int
-    description: dict | None = None
+    description: dict[str, Any] | None = None
 
 
 def digest(data, size):
     return hashlib.blake2b(data, digest_size=size).digest()
 
 
-def encode(kind, description, data=b""):
-    """The bytes of a record."""
+def encode(kind: int, description: dict[str, Any], data: bytes = b"") -> bytes:
     words = json.dumps(description, sort_keys=True, ensure_ascii=False).encode("utf-8", "replace")
     head = HEAD.pack(MARK, kind, len(words), len(data), digest(data, 16), b"")[:CHECKED]
     return b"".join([head, digest(head + words, 8), words, data])
@@ -86,7 +87,7 @@ def next_mark(file, start):
     return None
 
 
-def scan(file):
+def scan(file: BinaryIO) -> Iterator[Record | Damage]:
     """Every Record and Damage of an open journal, in order; each byte is in one of them."""
     end = file.seek(0, 2)
     place = 0

@@ -2,12 +2,15 @@
 
 import io
 import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.io.files import replace_file
-from flocsim.io.plots.style import BODY_COLOURS, CONTACT_COLOUR, house_style, new_figure
+from flocsim.io.plots.style import BODY_COLOURS, CONTACT_COLOUR, Figure, house_style, new_figure
 
 MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
@@ -25,15 +28,15 @@ LAST = 1500
 
 
 def draw_strip(
-    outlines_per_frame,
-    times,
-    paths,
-    title="",
+    outlines_per_frame: Sequence[Sequence[Sequence[np.ndarray]]],
+    times: Sequence[float],
+    paths: Sequence[np.ndarray],
+    title: str = "",
     *,
-    centre_distance=None,
-    zone_distance=None,
-    contacts=None,
-):
+    centre_distance: Sequence[float] | None = None,
+    zone_distance: float | None = None,
+    contacts: Sequence[np.ndarray] | None = None,
+) -> Figure:
     """A row of frames of a trajectory; returns the matplotlib Figure.
 
     ``outlines_per_frame``: per frame, per body, a list of (k, 2) outline polygons [m];
@@ -43,7 +46,7 @@ def draw_strip(
     marked in red. All frames have one scale and are centred on their bodies, in whatever frame of
     reference the outlines and paths are given. Raises UsageError if the lengths disagree.
     """
-    contacts = [()] * len(times) if contacts is None else contacts
+    contacts = [np.empty((0, 2))] * len(times) if contacts is None else contacts
     labels = frame_labels(len(times), centre_distance, zone_distance)
     check_lengths(len(times), outlines_per_frame, contacts, labels)
     centres, half = windows(outlines_per_frame)
@@ -63,7 +66,12 @@ def draw_strip(
         return figure
 
 
-def draw_distance(times, centre_distance, zone_distance=None, title=""):
+def draw_distance(
+    times: Sequence[float],
+    centre_distance: Sequence[float],
+    zone_distance: float | None = None,
+    title: str = "",
+) -> Figure:
     """The centre distance d_c against time, with D_0 where there is a zone; returns the Figure.
 
     ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], None or NaN for none.
@@ -83,7 +91,12 @@ def draw_distance(times, centre_distance, zone_distance=None, title=""):
         return figure
 
 
-def draw_forces(times, forces, collision=None, title=""):
+def draw_forces(
+    times: Sequence[float],
+    forces: Mapping[str, Sequence[float]],
+    collision: float | None = None,
+    title: str = "",
+) -> Figure:
     """Magnitudes of forces [N] against time [s], solid where they push apart; returns the Figure.
 
     ``forces``: {name: (k,)}, above 0 where a force pushes the bodies apart; ``collision``: the
@@ -92,14 +105,24 @@ def draw_forces(times, forces, collision=None, title=""):
     if any(len(force) != len(times) for force in forces.values()):
         raise UsageError("a figure of forces needs one force per time")
     unit, factor = time_unit(times)
+    time = np.asarray(times) * factor
+    curves = {name: np.asarray(force) * NANO for name, force in forces.items()}
+    sizes = np.abs(np.concatenate([np.asarray(force) for force in forces.values()])) * NANO
+    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
     with house_style():
         figure = new_figure(5.4, 2.6)
         axes = figure.subplots()
-        for colour, (name, force) in zip(FORCE_COLOURS, forces.items(), strict=False):
-            draw_signed(axes, np.asarray(times) * factor, np.asarray(force) * NANO, colour, name)
+        for colour, (name, force) in zip(FORCE_COLOURS, curves.items(), strict=False):
+            push = np.where(force > 0.0, force, np.nan)
+            pull = np.where(force < 0.0, -force, np.nan)
+            axes.plot(time, push, color=colour, linewidth=1.1, label=name)
+            axes.plot(time, pull, color=colour, linewidth=1.1, linestyle=(0, (3, 1.5)))
         if collision is not None and np.isfinite(collision):
             axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":")
-        set_force_axis(axes, forces)
+        if largest > 0.0:
+            axes.set_yscale("log")
+            axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
+        axes.set_ylabel("force on the line of centres [nN]")
         axes.set_xlabel(f"time [{unit}]")
         axes.set_title(title)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
@@ -107,24 +130,13 @@ def draw_forces(times, forces, collision=None, title=""):
         return figure
 
 
-def draw_signed(axes, times, force, colour, name):
-    """One force: solid where it pushes apart, dashed where it pulls together."""
-    push, pull = np.where(force > 0.0, force, np.nan), np.where(force < 0.0, -force, np.nan)
-    axes.plot(times, push, color=colour, linewidth=1.1, label=name)
-    axes.plot(times, pull, color=colour, linewidth=1.1, linestyle=(0, (3, 1.5)))
-
-
-def set_force_axis(axes, forces):
-    """Powers of ten down to what can still matter."""
-    sizes = np.abs(np.concatenate([np.asarray(force) for force in forces.values()])) * NANO
-    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
-    if largest > 0.0:
-        axes.set_yscale("log")
-        axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
-    axes.set_ylabel("force on the line of centres [nN]")
-
-
-def write_animation(path, frames, motion, zone_distance=None, title=""):
+def write_animation(
+    path: str | Path,
+    frames: Any,
+    motion: tuple[Sequence[float], Sequence[float]],
+    zone_distance: float | None = None,
+    title: str = "",
+) -> None:
     """Write Frames (times, outlines, paths, contacts, centre_distance) as a GIF that loops.
 
     ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
@@ -141,35 +153,30 @@ def write_animation(path, frames, motion, zone_distance=None, title=""):
 
 
 def picture_of(frames, place, motion, zone_distance, title):
-    """One frame as a Pillow image of 64 colours."""
+    """One frame, beside the centre distance, as a Pillow image of 64 colours."""
     from PIL import Image
 
+    unit, factor = time_unit(motion[0])
+    centres, half = windows(frames.outlines)
     with house_style():
-        figure = draw_frame(frames, place, motion, zone_distance, title)
+        figure = new_figure(6.4, 3.0)
+        bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
+        draw_paths(bodies, frames.paths)
+        draw_bodies(bodies, frames.outlines[place])
+        draw_contacts(bodies, frames.contacts[place])
+        frame_axes(bodies, centres[place], half)
+        draw_scale_bar(bodies, centres[place], half)
+        bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
+        graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
+        now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
+        graph.plot(*now, "o", color=BODY_COLOURS[0])
+        graph.set_xlabel(f"time [{unit}]")
+        graph.set_ylabel("centre distance $d_c$ [µm]")
+        draw_zone(graph, zone_distance)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
     return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
-
-
-def draw_frame(frames, place, motion, zone_distance, title):
-    unit, factor = time_unit(motion[0])
-    figure = new_figure(6.4, 3.0)
-    bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-    centres, half = windows(frames.outlines)
-    draw_paths(bodies, frames.paths)
-    draw_bodies(bodies, frames.outlines[place])
-    draw_contacts(bodies, frames.contacts[place])
-    frame_axes(bodies, centres[place], half)
-    draw_scale_bar(bodies, centres[place], half)
-    bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
-    graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
-    now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
-    graph.plot(*now, "o", color=BODY_COLOURS[0])
-    graph.set_xlabel(f"time [{unit}]")
-    graph.set_ylabel("centre distance $d_c$ [µm]")
-    draw_zone(graph, zone_distance)
-    figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-    return figure
 
 
 def draw_zone(axes, zone_distance):
@@ -242,7 +249,6 @@ def time_unit(times):
 
 
 def draw_bodies(axes, frame):
-    """The outlines, filled lightly, one colour per body."""
     from matplotlib.patches import Polygon
 
     for number, body in enumerate(frame):
@@ -259,7 +265,6 @@ def draw_paths(axes, paths):
 
 
 def draw_contacts(axes, points):
-    """A red ring around every contact point."""
     points = np.asarray(points, dtype=float).reshape(-1, 2)
     ring = {"markerfacecolor": "none", "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.2}
     axes.plot(points[:, 0], points[:, 1], "o", markersize=6, zorder=5, **ring)

@@ -5,6 +5,8 @@ FIGURES at the end, under the name that `flocsim plot` gives it; the first line 
 the command's help.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from flocsim.io.confidence import clustered_proportion, proportion
@@ -12,6 +14,7 @@ from flocsim.io.plots.style import (
     CLASS_COLOURS,
     CROWDED,
     MARKERS,
+    Figure,
     dodge,
     graded_colours,
     house_style,
@@ -22,7 +25,7 @@ from flocsim.io.plots.style import (
     type_title,
     vertex_positions,
 )
-from flocsim.io.results.file import CLASSES
+from flocsim.io.results.file import CLASSES, Results
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
@@ -51,17 +54,17 @@ NO_EVENTS = {
 }
 
 
-def figure_4(results):
+def figure_4(results: Results) -> Figure:
     """Pr[C inside]: probability that a collision happens inside the attraction zone."""
     return probability_figure(results, "pr_inside")
 
 
-def figure_5(results):
+def figure_5(results: Results) -> Figure:
     """Pr[A | inside]: probability of aggregation after a collision inside the zone."""
     return probability_figure(results, "pr_a_given_inside")
 
 
-def figure_6(results):
+def figure_6(results: Results) -> Figure:
     """Pr[A | outside]: probability of aggregation after a collision outside the zone."""
     return probability_figure(results, "pr_a_given_outside")
 
@@ -73,12 +76,13 @@ def probability_figure(results, name):
         for number, axes in enumerate(panels):
             draw_probability(axes, results, number, name)
             axes.set_title(type_title(number, results.types[number]))
-        label_outer(panels, LABELS[name])
-        add_delta_legend(row_end(panels), results.delta)
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS[name])
+        add_delta_legend(panels[:PANELS_PER_ROW][-1], results.delta)
         return figure
 
 
-def figure_8(results):
+def figure_8(results: Results) -> Figure:
     """Probability of the classes A, B, C, D, all displacements pooled.
 
     A replicate has the same flocs and orientations at all delta: a cluster, for the intervals.
@@ -88,12 +92,13 @@ def figure_8(results):
         for number, axes in enumerate(panels):
             draw_classes(axes, results, number)
             axes.set_title(type_title(number, results.types[number]))
-        label_outer(panels, LABELS["classes"])
-        add_class_legend(row_end(panels))
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS["classes"])
+        add_class_legend(panels[:PANELS_PER_ROW][-1])
         return figure
 
 
-def overview(results):
+def overview(results: Results) -> Figure:
     """Pr[C inside], Pr[A] and the classes in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", "classes")
     with house_style():
@@ -127,26 +132,14 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
     return figure, list(grid[:count])
 
 
-def row_end(panels):
-    return panels[:PANELS_PER_ROW][-1]
-
-
-def label_outer(panels, label):
-    """The quantity's name at the first panel of every row."""
-    for axes in panels[::PANELS_PER_ROW]:
-        axes.set_ylabel(label)
-
-
 def draw_probability(axes, results, number, name):
-    """The lines of one type, one per delta; says so where there is nothing to show."""
     bands = [results.probabilities[name + end][number] for end in ("", "_low", "_high")]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
-    colours = graded_colours(results.delta.size)
-    for index, colour in enumerate(colours[: results.delta.size]):
-        shift = dodge(index, results.delta.size)
-        style = line_style(colour, index, bands[0].size)
-        draw_line(axes, results.vertices, [band[:, index] for band in bands], shift, style)
+    count = results.delta.size
+    for index, colour in enumerate(graded_colours(count)[:count]):
+        line = [band[:, index] for band in bands]
+        draw_line(axes, results.vertices, line, index, count, colour)
     note_if_empty(axes, bands[0], NO_EVENTS[name])
 
 
@@ -156,9 +149,8 @@ def draw_classes(axes, results, number):
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     for index, name in enumerate(CLASSES):
-        style = line_style(CLASS_COLOURS[name], index, bands[0].size)
-        shift = dodge(index, len(CLASSES))
-        draw_line(axes, results.vertices, [band[:, index] for band in bands], shift, style)
+        line = [band[:, index] for band in bands]
+        draw_line(axes, results.vertices, line, index, len(CLASSES), CLASS_COLOURS[name])
     note_if_empty(axes, bands[0], NO_EVENTS["classes"])
 
 
@@ -174,20 +166,16 @@ def class_bands(results, number):
     return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
 
 
-def line_style(colour, index, points):
-    """Colour and marker of a line, finer in a panel of many points."""
-    size, width = (2.2, 0.8) if points > CROWDED else (4.0, 1.2)
-    marker = MARKERS[index % len(MARKERS)]
-    return {"color": colour, "marker": marker, "ms": size, "lw": width, "elinewidth": 0.6 * width}
-
-
-def draw_line(axes, vertices, bands, shift, style):
-    """Points with interval bars, joined in the order of N."""
+def draw_line(axes, vertices, bands, index, count, colour):
+    """Line ``index`` of ``count``: points with interval bars, joined in the order of N."""
     order = np.argsort(vertices)
-    places = vertex_positions(vertices)[order] + shift
+    places = vertex_positions(vertices)[order] + dodge(index, count)
     value, low, high = (np.asarray(band)[order] for band in bands)
     reach = np.clip([value - low, high - value], 0.0, None)
-    axes.errorbar(places, value, reach, capsize=0, clip_on=False, **style)
+    size, width = (2.2, 0.8) if len(order) > CROWDED else (4.0, 1.2)
+    axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
+                  marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
+                  elinewidth=0.6 * width)  # fmt: skip
 
 
 def note_if_empty(axes, values, text):
@@ -197,7 +185,6 @@ def note_if_empty(axes, values, text):
 
 
 def add_delta_legend(axes, delta):
-    """The displacements, beside the panels they belong to."""
     from matplotlib.lines import Line2D
 
     handles = [
@@ -210,7 +197,6 @@ def add_delta_legend(axes, delta):
 
 
 def add_class_legend(axes):
-    """What the four classes mean, beside the panels they belong to."""
     from matplotlib.lines import Line2D
 
     handles = [
@@ -221,7 +207,6 @@ def add_class_legend(axes):
 
 
 def place_legend(axes, handles, title):
-    """A legend outside, to the right of ``axes``."""
     axes.legend(
         handles=handles,
         title=title,
@@ -233,4 +218,10 @@ def place_legend(axes, handles, title):
     )
 
 
-FIGURES = {"4": figure_4, "5": figure_5, "6": figure_6, "8": figure_8, "overview": overview}
+FIGURES: dict[str, Callable[[Results], Figure]] = {
+    "4": figure_4,
+    "5": figure_5,
+    "6": figure_6,
+    "8": figure_8,
+    "overview": overview,
+}

@@ -4,11 +4,25 @@ A figure of a shape library is a function of its entries that stands in POPULATI
 the name that `flocsim plot` gives it; the first line of its docstring is the command's help.
 """
 
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
-from flocsim.io.plots.style import house_style, new_figure, set_vertex_axis, vertex_positions
+from flocsim.io.images.regions import Region, Rejection
+from flocsim.io.plots.style import (
+    Figure,
+    house_style,
+    new_figure,
+    set_vertex_axis,
+    vertex_positions,
+)
 from flocsim.io.shapes.fit_report import CLASS_LIMIT
+from flocsim.io.shapes.library import ShapeEntry
+
+if TYPE_CHECKING:
+    from flocsim.geometry.fit.fit import Fit
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
@@ -27,19 +41,22 @@ LONGEST_SIDE = 12.0
 """Longer side of the drawing [inch]."""
 
 
-def distinct_flocs(entries):
-    """One entry per floc, where a library holds several spheroradii of each."""
+def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
+    """Histogram of the equivalent radii of ShapeEntries [µm], median and mean marked.
+
+    Equal bins from 0, their width by Freedman and Diaconis, at least five of them.
+    """
+    # A library may hold a floc at several spheroradii.
     first = min(entry.spheroradius for entry in entries)
-    return [entry for entry in entries if entry.spheroradius == first]
-
-
-def figure_2(entries):
-    """Histogram of the equivalent radii of ShapeEntries [µm], median and mean marked."""
-    sizes = np.array([1e6 * e.equivalent_radius * e.pixel_size for e in distinct_flocs(entries)])
+    flocs = [entry for entry in entries if entry.spheroradius == first]
+    sizes = np.array([1e6 * entry.equivalent_radius * entry.pixel_size for entry in flocs])
+    width = 2.0 * np.subtract(*np.percentile(sizes, [75, 25])) / len(sizes) ** (1 / 3)
+    count = int(np.clip(np.ceil(sizes.max() / width) if width > 0 else 5, 5, 60))
+    bins = np.linspace(0.0, 1.001 * sizes.max(), count + 1)
     with house_style():
         figure = new_figure(4.2, 2.8)
         axes = figure.subplots()
-        axes.hist(sizes, bins=bin_edges(sizes), color=BAR_COLOUR, edgecolor="white", linewidth=0.5)
+        axes.hist(sizes, bins=bins, color=BAR_COLOUR, edgecolor="white", linewidth=0.5)
         marks = ((np.median(sizes), "median", "--"), (sizes.mean(), "mean", ":"))
         for value, name, dashes in marks:
             axes.axvline(value, color="0.25", linestyle=dashes, label=f"{name} {value:.3g} µm")
@@ -51,15 +68,7 @@ def figure_2(entries):
         return figure
 
 
-def bin_edges(sizes):
-    """Edges of equal bins from 0, their width by Freedman and Diaconis, at least five of them."""
-    spread = np.subtract(*np.percentile(sizes, [75, 25]))
-    width = 2.0 * spread / len(sizes) ** (1 / 3)
-    count = int(np.clip(np.ceil(sizes.max() / width) if width > 0 else 5, 5, 60))
-    return np.linspace(0.0, 1.001 * sizes.max(), count + 1)
-
-
-def figure_3(entries):
+def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
     """Relative error of the fits against N by size class, for every spheroradius.
 
     Mean and standard deviation of RE [%], a panel for each r. Dashed: the equivalent spheres
@@ -99,49 +108,43 @@ def draw_errors(axes, entries):
     set_vertex_axis(axes, counts)
 
 
-POPULATION_FIGURES = {"2": figure_2, "3": figure_3}
+POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
+    "2": figure_2,
+    "3": figure_3,
+}
 
 
-def picture_rings(region, fit):
-    """Closed rings [(k, 2), …] of a region's Fit, in picture pixels, x right and y down."""
-    top, left = region.bbox[:2]
-    # The mask has a margin of one pixel, and the fit's y counts upwards.
-    rings = swept_rings(fit.vertices, fit.radius)
-    return [ring * (1.0, -1.0) + (left - 1, top - 1) for ring in rings]
-
-
-def draw_overlay(grey, flocs, title, rejected=()):
+def draw_overlay(
+    grey: np.ndarray,
+    flocs: "Iterable[tuple[Region, Fit]]",
+    title: str,
+    rejected: Iterable[Rejection] = (),
+) -> Figure:
     """A figure of the picture with the outline of every floc, and why others are left out.
 
-    grey: (h, w) in [0, 1]; flocs: pairs (Region, Fit); title: one line; rejected: Rejections.
-    Returns the figure, for flocsim.io.plots.style.save.
+    grey: (h, w) in [0, 1]; title: one line. Returns the figure, for flocsim.io.plots.style.save.
     """
+    from matplotlib import figure as matplotlib_figure
+
+    # The picture fills the figure, but for a strip for the title.
+    height, width = (size * LONGEST_SIDE / max(grey.shape) for size in grey.shape)
+    strip = 0.3
     with house_style():
-        axes = _picture_axes(grey.shape)
+        figure = matplotlib_figure.Figure(figsize=(max(width, 4.0), max(height, 2.0) + strip))
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
         axes.imshow(grey, cmap="gray", interpolation="nearest")
         axes.set_axis_off()
         axes.set_title(title)
         for region, fit in flocs:
-            _draw_floc(axes, region, fit)
-        for region in rejected:
-            axes.annotate(REASONS.get(region.reason, region.reason), region.centroid,
+            top, left = region.bbox[:2]
+            # The mask has a margin of one pixel, and the fit's y counts upwards.
+            rings = [ring * (1.0, -1.0) + (left - 1, top - 1)
+                     for ring in swept_rings(fit.vertices, fit.radius)]  # fmt: skip
+            for ring in rings:
+                axes.plot(*ring.T, color=OUTLINE_COLOUR, linewidth=0.8)
+            corner = np.max(rings[0][:, 0]), np.min(rings[0][:, 1])
+            axes.annotate(str(region.label), corner, color=OUTLINE_COLOUR, fontsize=7)
+        for each in rejected:
+            axes.annotate(REASONS.get(each.reason, each.reason), each.centroid,
                           color=REJECTED_COLOUR, fontsize=6, ha="center", va="center")  # fmt: skip
-    return axes.figure
-
-
-def _picture_axes(shape):
-    """Axes that a picture of this shape fills, with a strip for the title."""
-    from matplotlib.figure import Figure
-
-    height, width = (size * LONGEST_SIDE / max(shape) for size in shape)
-    strip = 0.3
-    figure = Figure(figsize=(max(width, 4.0), max(height, 2.0) + strip))
-    return figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
-
-
-def _draw_floc(axes, region, fit):
-    rings = picture_rings(region, fit)
-    for ring in rings:
-        axes.plot(*ring.T, color=OUTLINE_COLOUR, linewidth=0.8)
-    right, top = np.max(rings[0][:, 0]), np.min(rings[0][:, 1])
-    axes.annotate(str(region.label), (right, top), color=OUTLINE_COLOUR, fontsize=7)
+    return figure

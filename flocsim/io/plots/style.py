@@ -3,14 +3,19 @@
 import contextlib
 import io
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.io.files import replace_file
 
-STYLE = {
+Figure = Any
+"""A matplotlib Figure: no hint may load matplotlib."""
+
+STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "axes.titlesize": 9.0,
@@ -45,7 +50,7 @@ CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
 # A date or a version would make equal figures differ in bytes.
-METADATA = {
+METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Creator": "flocsim", "Producer": None},
     "svg": {"Date": None, "Creator": "flocsim"},
@@ -54,7 +59,7 @@ FORMATS = tuple(METADATA)
 
 
 @contextlib.contextmanager
-def house_style():
+def house_style() -> Iterator[None]:
     """Draw or save with the same settings whatever the user's matplotlibrc says."""
     import matplotlib.style
 
@@ -62,12 +67,12 @@ def house_style():
         yield
 
 
-def new_figure(width, height):
+def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inches] on its own canvas: no window, no global state."""
+    from matplotlib import figure as matplotlib_figure
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = matplotlib_figure.Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -97,25 +102,22 @@ def vertex_positions(vertices):
 
 
 def set_vertex_axis(axes, vertices):
-    """Ticks at the vertex counts, N = 1 called "sphere", labels thinned until they fit."""
+    """Ticks at the vertex counts, N = 1 called "sphere".
+
+    Labels are thinned until none touch; the first and last always show.
+    """
     counts = np.unique(vertices)
-    axes.set_xlim(-0.5, len(counts) - 0.5)
-    axes.set_xticks(np.arange(len(counts)), labels=thinned_labels(counts))
-    axes.tick_params(axis="x", length=2.5)
-
-
-def thinned_labels(counts):
-    """Labels of the ticks, some left empty so that none touch; the first and last always show."""
     words = ["sphere" if count == 1 else str(count) for count in counts]
     every = -(-len(words) // MOST_LABELS)
     for index in range(1, len(words)):
         if (len(words) - 1 - index) % every or index < every:
             words[index] = ""
-    return words
+    axes.set_xlim(-0.5, len(counts) - 0.5)
+    axes.set_xticks(np.arange(len(counts)), labels=words)
+    axes.tick_params(axis="x", length=2.5)
 
 
 def set_probability_axis(axes):
-    """From 0 to 1 with quiet lines at the quarters."""
     axes.set_ylim(-0.03, 1.03)
     axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", ".25", ".5", ".75", "1"])
     axes.grid(axis="y", color="0.9", linewidth=0.6)
@@ -127,7 +129,7 @@ def dodge(number, count):
     return (number - 0.5 * (count - 1)) * step
 
 
-def checked_format(path, option=""):
+def checked_format(path: str | Path, option: str = "") -> str:
     """The format that a figure's name asks for; UsageError, which names the option, for another."""
     suffix = Path(path).suffix.lower().removeprefix(".")
     if suffix not in FORMATS:
@@ -136,7 +138,7 @@ def checked_format(path, option=""):
     return suffix
 
 
-def save(figure, path):
+def save(figure: Figure, path: str | Path) -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
     The same figure gives the same bytes. Raises UsageError for another suffix, FileError if the

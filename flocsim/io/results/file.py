@@ -16,6 +16,9 @@ checked before HDF5 parses it, and is written a block at a time (see `flocsim.io
 """
 
 import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -51,14 +54,21 @@ BLOCK = 262_144
 """Replicates of a condition that are read together."""
 
 
-def write_results(path, results, columns=None):
+def write_results(
+    path: str | Path, results: Results, columns: Callable[[str], Iterable[bytes]] | None = None
+) -> None:
     """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
 
     ``columns(name)`` gives the values of a column of the table of replicates as an iterator of
     bytes, in the order of the file: for tables larger than the memory. Without it, they are taken
     from ``results.replicates``.
     """
-    columns = columns or (lambda name: [little_endian(results.replicates[name])])
+
+    def in_memory(name):
+        array = results.replicates[name]
+        return [np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()]
+
+    columns = columns or in_memory
     frame = frame_of(results)
     streams = [
         (offset, length, numbers(results.count) if name == "replicate" else columns(name))
@@ -67,12 +77,7 @@ def write_results(path, results, columns=None):
     replace_by_blocks(path, frame.image.length, frame.image.blocks(streams))
 
 
-def little_endian(array):
-    """The bytes of an array as they stand in the file."""
-    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
-
-
-def read_results(path, replicates=True):
+def read_results(path: str | Path, replicates: bool = True) -> Results:
     """The Results in a file; FileError if it is absent, damaged, of another kind or version.
 
     With ``replicates=False`` the table of replicates, which may be larger than the memory, stays
@@ -115,7 +120,9 @@ class Totals:
     most_steps: int = 0
     rejected: int = 0
 
-    def add(self, outcome, failure, steps, rejected):
+    def add(
+        self, outcome: np.ndarray, failure: np.ndarray, steps: np.ndarray, rejected: np.ndarray
+    ) -> None:
         self.outcomes += np.bincount(outcome, minlength=len(self.outcomes))
         self.failures += np.bincount(failure, minlength=len(self.failures))
         self.count += outcome.size
@@ -124,7 +131,7 @@ class Totals:
         self.rejected += int(rejected.sum())
 
 
-def replicate_totals(path):
+def replicate_totals(path: str | Path) -> Totals:
     """The Totals of a file, which may be larger than the memory; FileError as `read_results`."""
     with opened(path) as file:
         rows = file["replicates"]
@@ -140,48 +147,44 @@ def replicate_totals(path):
 
 
 @contextlib.contextmanager
-def opened(path):
+def opened(path: str | Path) -> Iterator[Any]:
     """An open h5py file of a known schema, once the checksum over all of it was found right."""
     import h5py
 
     with checked_sealed(path) as (data, _):
         try:
             with h5py.File(data, "r") as file:
-                check_schema(path, file.attrs)
+                if file.attrs.get("format") != FORMAT:
+                    raise FileError(
+                        f"{path} is not a results file: name one that flocsim ensemble wrote"
+                    )
+                version = file.attrs.get("schema_version")
+                if version != SCHEMA_VERSION:
+                    raise FileError(
+                        f"{path} has results of schema version {version}, this flocsim reads "
+                        f"{SCHEMA_VERSION}: read it with the version that wrote it"
+                    )
                 yield file
+        except FileError:
+            raise
         except (OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError) as error:
-            if isinstance(error, FileError):
-                raise
             raise FileError(f"{path} holds no readable results: {error}; run it again") from error
 
 
-def check_schema(path, attributes):
-    """FileError unless the file is a results file of the version that this code knows."""
-    if attributes.get("format") != FORMAT:
-        raise FileError(f"{path} is not a results file: name one that flocsim ensemble wrote")
-    version = attributes.get("schema_version")
-    if version != SCHEMA_VERSION:
-        raise FileError(
-            f"{path} has results of schema version {version}, this flocsim reads "
-            f"{SCHEMA_VERSION}: read it with the version that wrote it"
-        )
-
-
-def same_data(path_a, path_b):
-    """Names of the datasets outside ``run`` whose bytes differ.
+def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
+    """Names of the datasets outside ``run`` whose shapes, types or bytes differ.
 
     Coordinates included; a dataset that only one file has differs. Empty when all agree.
     """
+
+    def content(dataset):
+        values = dataset[()]
+        stored = values.tolist() if values.dtype.kind == "O" else values.tobytes()
+        return values.shape, str(values.dtype), stored
+
     with opened(path_a) as a, opened(path_b) as b:
         names = {f"{group}/{name}" for file in (a, b) for group in file if group != "run"
                  for name in file[group]}  # fmt: skip
         return sorted(
             n for n in names if n not in a or n not in b or content(a[n]) != content(b[n])
         )
-
-
-def content(dataset):
-    """What must agree for two datasets to be the same: shape, type and bytes."""
-    values = dataset[()]
-    stored = values.tolist() if values.dtype.kind == "O" else values.tobytes()
-    return values.shape, str(values.dtype), stored

@@ -6,6 +6,7 @@ met inside HDF5, where it can end the process.
 """
 
 import io
+from collections.abc import Iterable, Iterator
 
 import attrs
 import numpy as np
@@ -21,6 +22,7 @@ from flocsim.io.results.schema import (
     POOLED,
     REPLICATES,
     TABLE,
+    Results,
 )
 
 FORMAT = "flocsim results"
@@ -39,11 +41,7 @@ class SparseImage(io.RawIOBase):
     def readable(self):
         return True
 
-    def writable(self):
-        return True
-
-    def seekable(self):
-        return True
+    writable = seekable = readable
 
     def seek(self, offset, whence=io.SEEK_SET):
         self.place = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self.place}.get(whence, self.length)
@@ -80,7 +78,7 @@ class SparseImage(io.RawIOBase):
                 found[low - start : high - start] = data[low - place : high - place]
         return bytes(found)
 
-    def blocks(self, streams):
+    def blocks(self, streams: Iterable[tuple[int, int, Iterable[bytes]]]) -> Iterator[bytes]:
         """All bytes in order; ``streams`` are (offset, length, iterator of bytes) of the values."""
         place = 0
         for offset, length, values in sorted(streams, key=lambda stream: stream[0]):
@@ -98,10 +96,10 @@ class Frame:
     """
 
     image: SparseImage = attrs.Factory(SparseImage)
-    streams: list = attrs.Factory(list)
+    streams: list[tuple[int, int, str]] = attrs.Factory(list)
 
 
-def frame_of(results):
+def frame_of(results: Results) -> Frame:
     """The Frame of Results, the same bytes whenever the results are."""
     import h5py
 
@@ -109,8 +107,7 @@ def frame_of(results):
     with h5py.File(frame.image, "w") as file:
         file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
         study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
-        axes = (*AXES, "class")
-        write_group(file, "probabilities", results.probabilities, TABLE, axes,
+        write_group(file, "probabilities", results.probabilities, TABLE, (*AXES, "class"),
                     study | {"class": list(CLASSES)})  # fmt: skip
         if results.pooled:
             write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)
@@ -122,12 +119,17 @@ def frame_of(results):
             write_coordinate(file.create_group("flocs"), "floc", list(results.flocs))
         frame.streams = reserve_replicates(file, study, results)
         # Last, so that its length moves no byte of the groups before it.
-        write_run(file.create_group("run"), results.run)
+        group = file.create_group("run")
+        for name, value in results.run.items():
+            value = value.item() if isinstance(value, np.generic) else value
+            if not isinstance(value, str | int | float):
+                raise UsageError(f"run/{name} must be text or a number, found {value!r}")
+            # A bool would become an HDF5 enumeration, which few readers know.
+            group[name] = int(value) if isinstance(value, bool) else value
     return frame
 
 
 def write_group(file, name, arrays, schema, axes, coordinates):
-    """One group: its coordinates, then every array of its schema attached to them."""
     group = file.create_group(name)
     for axis in axes:
         write_coordinate(group, axis, coordinates[axis])
@@ -136,7 +138,6 @@ def write_group(file, name, arrays, schema, axes, coordinates):
 
 
 def annotate(dataset, about, group, axes):
-    """Unit, meaning and coordinates of a dataset."""
     _, unit, text = about
     dataset.attrs.update({"units": unit, "long_name": text})
     for number, axis in zip(range(dataset.ndim), axes, strict=False):
@@ -196,17 +197,7 @@ def annotate_scale(scale, axis):
     scale.attrs.update({"units": unit, "long_name": text})
 
 
-def write_run(group, run):
-    """Scalars: text, whole numbers and floats; anything else is refused."""
-    for name, value in run.items():
-        value = value.item() if isinstance(value, np.generic) else value
-        if not isinstance(value, str | int | float):
-            raise UsageError(f"run/{name} must be text or a number, found {value!r}")
-        # A bool would become an HDF5 enumeration, which few readers know.
-        group[name] = int(value) if isinstance(value, bool) else value
-
-
-def numbers(count):
+def numbers(count: int) -> Iterator[bytes]:
     """The bytes of 0, 1, … as they stand in the file, a block at a time."""
     for first in range(0, count, BLOCK_ROWS):
         yield np.arange(first, min(first + BLOCK_ROWS, count), dtype="<i8").tobytes()

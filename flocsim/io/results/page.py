@@ -66,7 +66,7 @@ with reasons).
 """
 
 
-def results_page():
+def results_page() -> str:
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
@@ -85,7 +85,6 @@ def table(schema):
 
 
 def codes(name):
-    """What the codes of a dataset mean."""
     if name not in FLAGS:
         return ""
     return ": " + ", ".join(f"{value} {word}" for value, word in zip(*FLAGS[name], strict=True))

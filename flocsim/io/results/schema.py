@@ -112,19 +112,19 @@ class Results:
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
 
-    types: tuple = attrs.field(converter=lambda names: tuple(str(name) for name in names))
+    types: tuple[str, ...] = attrs.field(converter=lambda names: tuple(str(name) for name in names))
     vertices: np.ndarray = attrs.field(converter=lambda counts: exact(counts, "i8", "vertices"))
     delta: np.ndarray = attrs.field(converter=lambda shares: exact(shares, "f8", "delta"))
-    replicates: dict | None
-    probabilities: dict
-    run: dict = attrs.field(factory=dict)
-    failures: tuple = attrs.field(
+    replicates: dict[str, np.ndarray] | None
+    probabilities: dict[str, np.ndarray]
+    run: dict[str, str | int | float] = attrs.field(factory=dict)
+    failures: tuple[str, ...] = attrs.field(
         default=("none",), converter=lambda words: tuple("_".join(str(w).split()) for w in words)
     )
-    flocs: tuple = attrs.field(default=(), converter=tuple)
-    pooled: dict = attrs.field(factory=dict)
-    differences: dict = attrs.field(factory=dict)
-    count: int | None = None
+    flocs: tuple[str, ...] = attrs.field(default=(), converter=tuple)
+    pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
+    differences: dict[str, np.ndarray] = attrs.field(factory=dict)
+    count: int = 0
 
     def __attrs_post_init__(self):
         shape = self.shape
@@ -137,23 +137,26 @@ class Results:
             wanted = (len(AXES), len(EVENTS), *shape)
             self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
         if self.replicates is not None:
-            self.check_replicates()
+            count = np.shape(self.replicates.get("outcome", ()))[3:4]
+            self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, shape + count))
+            object.__setattr__(self, "count", count[0])
+            if np.any(self.replicates["failure"] >= len(self.failures)):
+                raise UsageError("replicates/failure holds a code without a word in failures")
 
     def check(self, group, schema, shapes):
         """Replace a group's arrays by themselves in the schema's order and types."""
-        checked = checked_arrays(group, getattr(self, group), schema, shapes)
+        arrays = getattr(self, group)
+        if set(arrays) != set(schema):
+            strange = ", ".join(sorted(set(arrays) ^ set(schema)))
+            raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
+        checked = {name: exact(arrays[name], schema[name][0], f"{group}/{name}") for name in schema}
+        for name, array in checked.items():
+            if array.shape != shapes[name]:
+                raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shapes[name]}")
         object.__setattr__(self, group, checked)
 
-    def check_replicates(self):
-        """The table of replicates fits the rest."""
-        tail = np.shape(self.replicates.get("outcome", ()))[3:4]
-        self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, self.shape + tail))
-        object.__setattr__(self, "count", tail[0])
-        if np.any(self.replicates["failure"] >= len(self.failures)):
-            raise UsageError("replicates/failure holds a code without a word in failures")
-
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, int, int]:
         """Numbers of types, vertex counts and displacements."""
         return len(self.types), self.vertices.size, self.delta.size
 
@@ -170,15 +173,3 @@ def exact(values, dtype, name):
     if not same:
         raise UsageError(f"{name} holds values that do not fit the type {dtype}")
     return converted
-
-
-def checked_arrays(group, arrays, schema, shapes):
-    """The arrays of a group in the schema's order and types."""
-    if set(arrays) != set(schema):
-        strange = ", ".join(sorted(set(arrays) ^ set(schema)))
-        raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
-    checked = {name: exact(arrays[name], schema[name][0], f"{group}/{name}") for name in schema}
-    for name, array in checked.items():
-        if array.shape != shapes[name]:
-            raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shapes[name]}")
-    return checked

@@ -3,17 +3,22 @@
 import csv
 import io
 import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from flocsim.io.images.pictures import Segmentation
+from flocsim.io.images.regions import Region
+from flocsim.io.shapes.library import ShapeEntry
 
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
 
 
-def plural(count, noun):
-    """ "1 floc", "2 flocs"."""
+def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def picture_line(name, found, fitted):
+def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     """One line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
     if fitted < len(found.regions):
@@ -24,7 +29,7 @@ def picture_line(name, found, fitted):
     return f"{name}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
 
 
-def warn_of_coarse(name, regions, radii):
+def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
     """A line on stderr for every spheroradius not below r_eq of some flocs (paper, section 3.2)."""
     for radius in radii:
         coarse = sum(region.equivalent_radius <= radius for region in regions)
@@ -36,37 +41,33 @@ def warn_of_coarse(name, regions, radii):
             )
 
 
-def format_errors(entries):
+def format_errors(entries: Sequence[ShapeEntry]) -> str:
     """A table of the mean relative error [%] of ShapeEntries by N and size class, for each r."""
-    radii = sorted({entry.spheroradius for entry in entries})
-    return "\n".join(
-        format_radius(radius, [e for e in entries if e.spheroradius == radius]) for radius in radii
-    )
-
-
-def format_radius(radius, entries):
-    """The table for one spheroradius [px]."""
-    classes = {
-        f"r_eq <= {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius <= CLASS_LIMIT],
-        f"r_eq > {CLASS_LIMIT:g} px": [e for e in entries if e.equivalent_radius > CLASS_LIMIT],
-        "all": entries,
-    }
-    heads = [f"{name} ({len(members)})" for name, members in classes.items()]
-    lines = [
-        f"mean relative error [%] by vertices and size class (number of flocs), r = {radius:g} px",
-        "  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]),
-    ]
-    for count in entries[0].fits:
-        means = [mean_error(members, count) for members in classes.values()]
-        label = "1 (circle)" if count == 1 else str(count)
-        lines.append("  ".join([f"{label:>10}", *(f"{mean:>18}" for mean in means)]))
+    lines = []
+    for radius in sorted({entry.spheroradius for entry in entries}):
+        members = [entry for entry in entries if entry.spheroradius == radius]
+        classes = {
+            f"r_eq <= {CLASS_LIMIT:g} px": [
+                e for e in members if e.equivalent_radius <= CLASS_LIMIT
+            ],
+            f"r_eq > {CLASS_LIMIT:g} px": [e for e in members if e.equivalent_radius > CLASS_LIMIT],
+            "all": members,
+        }
+        heads = [f"{name} ({len(flocs)})" for name, flocs in classes.items()]
+        lines += [
+            "mean relative error [%] by vertices and size class (number of flocs), "
+            f"r = {radius:g} px",
+            "  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]),
+        ]
+        for count in members[0].fits:
+            label = "1 (circle)" if count == 1 else str(count)
+            cells = [f"{label:>10}"]
+            for flocs in classes.values():
+                errors = [entry.fits[count].relative_error for entry in flocs]
+                mean = f"{sum(errors) / len(errors):.2f}" if errors else "-"
+                cells.append(f"{mean:>18}")
+            lines.append("  ".join(cells))
     return "\n".join(lines)
-
-
-def mean_error(entries, count):
-    """The mean relative error at N = `count`, "-" without flocs."""
-    errors = [entry.fits[count].relative_error for entry in entries]
-    return f"{sum(errors) / len(errors):.2f}" if errors else "-"
 
 
 COLUMNS = (
@@ -74,7 +75,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def summary_text(pictures, fits, pixel_size):
+def summary_text(
+    pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]], pixel_size: float
+) -> str:
     """The table of all regions as CSV: flocs with RE [%] for every r [px] and N, others with why.
 
     pictures: with name, found (Segmentation) and regions, the fitted ones of found.regions;

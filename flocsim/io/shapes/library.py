@@ -21,14 +21,21 @@ for every N, so that between conditions nothing changes but N.  Every dataset ha
 """
 
 import io
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.files import read_sealed, replace_file, seal
+
+if TYPE_CHECKING:
+    from flocsim.geometry.fit.fit import Fit
 
 KIND = "flocsim shape library"
 SCHEMA_VERSION = 1
@@ -60,7 +67,7 @@ class StoredFit:
     relative_error: float
 
     @property
-    def shape(self):
+    def shape(self) -> Shape:
         """The Sphere (N = 1) or SpheroPolygon [m], around its own centroid."""
         if len(self.vertices) == 1:
             return Sphere(self.radius)
@@ -78,15 +85,22 @@ class ShapeEntry:
     floc_id: str
     image: str
     pixel_size: float
-    centroid: tuple
+    centroid: tuple[float, float]
     area: int
     equivalent_radius: float
     spheroradius: float
-    fits: dict
+    fits: dict[int, StoredFit]
 
 
-def make_entry(image, region, fits, pixel_size, spheroradius, name_radius=False):
-    """The ShapeEntry of a picture's region (flocsim.io.images.pictures) and its fits {N: Fit} [px].
+def make_entry(
+    image: str,
+    region: Any,
+    fits: "Mapping[int, Fit]",
+    pixel_size: float,
+    spheroradius: float,
+    name_radius: bool = False,
+) -> ShapeEntry:
+    """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
 
     name_radius: its id names the spheroradius, for libraries with several of one floc.
     """
@@ -106,20 +120,19 @@ def make_entry(image, region, fits, pixel_size, spheroradius, name_radius=False)
     )  # fmt: skip
 
 
-def write_library(path, entries, settings=None):
-    """Write entries (ShapeEntry, all with fits at the same N) to `path`, whole or not at all.
+def write_library(
+    path: str | Path, entries: Iterable[ShapeEntry], settings: Mapping[str, Any] | None = None
+) -> None:
+    """Write entries, all with fits at the same N, to `path`, whole or not at all.
 
     settings: {name: text or number}, what the fits were made with.
 
     Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
     written.
     """
+    import h5py
+
     entries = list(entries)
-    _check_entries(entries)
-    replace_file(path, seal(_encode(entries, settings or {})))
-
-
-def _check_entries(entries):
     if not entries:
         raise UsageError("a shape library needs at least one floc, found none")
     ids = [entry.floc_id for entry in entries]
@@ -129,44 +142,32 @@ def _check_entries(entries):
     if len({tuple(sorted(entry.fits)) for entry in entries}) > 1 or not entries[0].fits:
         raise UsageError("every floc of a library needs fits at the same numbers of vertices")
 
-
-def _encode(entries, settings):
-    import h5py
-
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=False) as file:
         file.attrs["kind"] = KIND
         file.attrs["schema_version"] = SCHEMA_VERSION
-        file.attrs.update(settings)
-        _write_flocs(file.create_group("flocs"), entries)
+        file.attrs.update(settings or {})
+        group = file.create_group("flocs")
+        for name, (attribute, kind, units, long_name) in FLOC_COLUMNS.items():
+            values = [getattr(entry, attribute) for entry in entries]
+            dtype = h5py.string_dtype() if kind is str else kind
+            _write_column(group, name, np.array(values, dtype=dtype), units, long_name)
         for count in sorted(entries[0].fits):
+            group = file.create_group(f"fits/{count}")
             fits = [entry.fits[count] for entry in entries]
-            _write_fits(file.create_group(f"fits/{count}"), fits)
-    return image.getvalue()
+            for name, (units, long_name) in FIT_COLUMNS.items():
+                column = np.array([getattr(fit, name) for fit in fits], dtype=float)
+                _write_column(group, name, column, units, long_name)
+    replace_file(path, seal(image.getvalue()))
 
 
-def _write_flocs(group, entries):
-    import h5py
-
-    for name, (attribute, kind, units, long_name) in FLOC_COLUMNS.items():
-        values = [getattr(entry, attribute) for entry in entries]
-        kind = h5py.string_dtype() if kind is str else kind
-        _write(group, name, np.array(values, dtype=kind), units, long_name)
-
-
-def _write_fits(group, fits):
-    for name, (units, long_name) in FIT_COLUMNS.items():
-        values = np.array([getattr(fit, name) for fit in fits], dtype=float)
-        _write(group, name, values, units, long_name)
-
-
-def _write(group, name, values, units, long_name):
+def _write_column(group, name, values, units, long_name):
     dataset = group.create_dataset(name, data=values, track_times=False)
     dataset.attrs["units"] = units
     dataset.attrs["long_name"] = long_name
 
 
-def is_library(path):
+def is_library(path: str | Path) -> bool:
     """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
     import h5py
 
@@ -177,7 +178,7 @@ def is_library(path):
         return False
 
 
-def read_settings(path):
+def read_settings(path: str | Path) -> dict[str, Any]:
     """{name: value} of what the fits of a shape library were made with."""
     import h5py
 
@@ -185,8 +186,8 @@ def read_settings(path):
         return {k: v for k, v in file.attrs.items() if k not in ("kind", "schema_version")}
 
 
-def read_library(path):
-    """The flocs of a shape library, a list of ShapeEntry in the order of writing.
+def read_library(path: str | Path) -> list[ShapeEntry]:
+    """The flocs of a shape library, in the order of writing.
 
     Raises FileError for a file that is missing, damaged, of another kind or another version.
     """
@@ -195,8 +196,15 @@ def read_library(path):
     content = read_sealed(path)
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            _check_kind(path, file.attrs)
-            return _decode(file)
+            kind, version = file.attrs.get("kind"), file.attrs.get("schema_version")
+            if kind != KIND:
+                raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
+            if version != SCHEMA_VERSION:
+                raise FileError(
+                    f"{path} has schema version {version}, this flocsim reads {SCHEMA_VERSION}: "
+                    "make it again with flocsim fit"
+                )
+            return _entries(file)
     except FileError:
         raise
     except (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError) as problem:
@@ -206,42 +214,30 @@ def read_library(path):
         ) from problem
 
 
-def _check_kind(path, attributes):
-    kind, version = attributes.get("kind"), attributes.get("schema_version")
-    if kind != KIND:
-        raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
-    if version != SCHEMA_VERSION:
-        raise FileError(
-            f"{path} has schema version {version}, this flocsim reads {SCHEMA_VERSION}: "
-            "make it again with flocsim fit"
-        )
-
-
-def _decode(file):
-    flocs = {name: _read_column(file["flocs"][name], kind) for name, (_, kind, *_)
-             in FLOC_COLUMNS.items()}  # fmt: skip
+def _entries(file):
+    """The ShapeEntries of an open library; ValueError for vertices that cannot be."""
+    flocs = {}
+    for name, (attribute, kind, *_) in FLOC_COLUMNS.items():
+        dataset = file["flocs"][name]
+        if kind is str:
+            flocs[attribute] = [str(text) for text in dataset.asstr()[()]]
+        else:
+            flocs[attribute] = dataset[()].tolist()
+    flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     fits = {
         int(count): {name: group[name][()] for name in FIT_COLUMNS}
         for count, group in file["fits"].items()
     }
-    return [_entry(flocs, fits, row) for row in range(len(flocs["id"]))]
-
-
-def _read_column(dataset, kind):
-    if kind is str:
-        return [str(text) for text in dataset.asstr()[()]]
-    return dataset[()].tolist()
-
-
-def _entry(flocs, fits, row):
-    values = {attribute: flocs[name][row] for name, (attribute, *_) in FLOC_COLUMNS.items()}
-    values["centroid"] = tuple(values["centroid"])
-    stored = {count: _stored(columns, row, count) for count, columns in sorted(fits.items())}
-    return ShapeEntry(**values, fits=stored)
-
-
-def _stored(columns, row, count):
-    vertices = columns["vertices"][row]
-    if vertices.shape != (count, 2) or not np.isfinite(vertices).all():
-        raise ValueError(f"vertices of floc {row} at N = {count} have shape {vertices.shape}")
-    return StoredFit(vertices, float(columns["radius"][row]), float(columns["relative_error"][row]))
+    entries = []
+    for row in range(len(flocs["floc_id"])):
+        stored = {}
+        for count, columns in sorted(fits.items()):
+            vertices, radius, error = (columns[name][row] for name in FIT_COLUMNS)
+            if vertices.shape != (count, 2) or not np.isfinite(vertices).all():
+                raise ValueError(
+                    f"vertices of floc {row} at N = {count} have shape {vertices.shape}"
+                )
+            stored[count] = StoredFit(vertices, float(radius), float(error))
+        values = {attribute: column[row] for attribute, column in flocs.items()}
+        entries.append(ShapeEntry(**values, fits=stored))
+    return entries
