@@ -43,7 +43,7 @@ class MpiCommunicator(Communicator):
         INTERRUPTION.speaks = self.rank == 0
         if self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE:
             # Where one rank just goes, the launcher kills the others, and says so by its code.
-            INTERRUPTION.leave = self.world.Abort
+            INTERRUPTION.leave = self.abort
         end_with_parent()
 
     @property
