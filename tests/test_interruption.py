@@ -51,7 +51,7 @@ def test_a_process_that_does_not_answer_is_ended_in_time():
 
 def test_a_process_that_another_speaks_for_is_silent_and_goes_after_it():
     speaker = started(DEAF)
-    silent = started(DEAF.replace("install()", "install(); interruption.INTERRUPTION.speaks = False"))
+    silent = started(f"import flocsim.interruption as i\ni.INTERRUPTION.speaks = False\n{DEAF}")
     for process in (silent, speaker):
         process.send_signal(signal.SIGUSR1)
     assert speaker.wait(timeout=20) == 75

@@ -9,7 +9,7 @@ from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.encounter import OBSERVER, make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import NO_FLOC
 from flocsim.ensembles.collision.flocs import FlocPool, load_flocs
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
 
 

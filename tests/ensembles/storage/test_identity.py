@@ -14,12 +14,12 @@ ENTRIES = ("ensembles/study.py", "ensembles/collision/encounter.py")
 
 NOT_PHYSICS = {
     "errors.py": "messages; a row is what comes without an error",
-    "explain/": "text for people",
-    "fingerprint.py": "names what is compiled, and is part of the identity itself",
+    "explain.py": "text for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/files.py": "how files are written",
     "io/journal/records.py": "how rows are stored, sealed by checksums",
+    "ensembles/config/": "reads values, and these are compared themselves",
     "ensembles/chunks.py": "how rows are stored; the columns are compared on their own",
 }
 """What a replicate imports without its rows depending on it, and why."""
