@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections.abc import Iterable, Mapping
 
 import attrs
 
@@ -15,17 +16,17 @@ BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 class Misfit(ValueError):
     """A value that does not fit; ``findings`` are pairs (place such as "[2]", what is wrong)."""
 
-    def __init__(self, *findings):
+    def __init__(self, *findings: tuple[str, str]) -> None:
         self.findings = findings
         super().__init__("; ".join(f"{place} {text}".strip() for place, text in findings))
 
 
-def misfit(allowed, value, hint=""):
+def misfit(allowed: str, value: object, hint: str = "") -> Misfit:
     """The Misfit "must be ALLOWED, found VALUE"."""
     return Misfit(("", f"must be {allowed}, found {show(value)}{hint}"))
 
 
-def show(value):
+def show(value: object) -> str:
     """A value as a config file writes it, on one short line."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -39,13 +40,13 @@ def show(value):
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "…"
 
 
-def suggestion(word, words):
+def suggestion(word: str, words: Iterable[str]) -> str:
     """ " (did you mean …?)", or "" where nothing is close."""
     close = difflib.get_close_matches(word, words, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
-def dotted(place):
+def dotted(place: Iterable[str]) -> str:
     """The keys as TOML writes them, "forces.contact.k_n"."""
     return ".".join(key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
 
@@ -56,28 +57,28 @@ class Problems:
 
     file: str
     text: str
-    overrides: dict
-    found: list = attrs.Factory(list)
+    overrides: Mapping
+    found: list[tuple[tuple[str, ...], str]] = attrs.Factory(list)
 
-    def misfit(self, place, error):
+    def misfit(self, place: tuple[str, ...], error: Misfit) -> None:
         """Note the findings of a Misfit of the value at ``place``."""
         for index, text in error.findings:
             self.found.append((place, f"{dotted(place)}{index} {text}"))
 
-    def note(self, place, text):
+    def note(self, place: tuple[str, ...], text: str) -> None:
         """Note anything else that is wrong at ``place``, () being the whole file."""
         self.found.append((place, f"{dotted(place)}: {text}" if place else text))
 
-    def unknown(self, place, known):
+    def unknown(self, place: tuple[str, ...], known: Iterable[str]) -> None:
         """Note the last key of ``place``, which is none of those known."""
         words = f"known: {', '.join(known)}" if known else "there are none here"
         self.note(place, f"unknown key{suggestion(place[-1], known)}; {words}")
 
-    def at(self, *tables):
+    def at(self, *tables: str) -> bool:
         """Whether anything within one of the top-level tables was found wrong."""
         return any(place[:1] == (table,) for place, _ in self.found for table in tables)
 
-    def raise_if_any(self):
+    def raise_if_any(self) -> None:
         """ConfigError with one line per problem, in the order of the file."""
         if self.found:
             lines = key_lines(self.text)
