@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 
 import attrs
+import numpy as np
 
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError
@@ -94,7 +95,9 @@ class FlocPool:
     pool: int
     made: dict[tuple, Shape] = attrs.Factory(dict)
 
-    def choose(self, numbers: Sequence[float], radius_i: float, radius_j: float) -> tuple[int, int]:
+    def choose(
+        self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
+    ) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers; two, where possible."""
         pool_i, pool_j = (
             nearest_in_ratio(self.flocs, radius / self.radius, self.pool)

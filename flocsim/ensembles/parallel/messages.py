@@ -33,7 +33,7 @@ class ChunkResult:
     record: bytes
     data_start: int
     failed: int = 0
-    notes: tuple = ()
+    notes: tuple[dict, ...] = ()
 
 
 @attrs.frozen
