@@ -130,7 +130,6 @@ def report(ended, output):
 
 
 def run_rank(comm, arguments):
-    """The whole command on one rank; its exit code."""
     config, code = agree(comm, arguments)
     if config is None:
         return code
@@ -190,13 +189,11 @@ def join_ranks(arguments):
 
 
 def on_process(comm, arguments):
-    """What a process that --jobs started does; its exit code."""
     plain_warnings(silent=True)
     return guarded(comm, arguments)
 
 
 def run_command(arguments: argparse.Namespace) -> int:
-    """Find the ranks of the job and do the work; the exit code."""
     try:
         comm = join_ranks(arguments)
     except FlocsimError as error:

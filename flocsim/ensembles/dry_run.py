@@ -31,7 +31,6 @@ def code_lines(config):
 
 
 def dry_run(config: Config, ranks: int) -> str:
-    """The report of --dry-run as text, for so many ranks."""
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
     flocs += f", spheroradius {1e6 * shapes.radius:.4g} um" if shapes.own is None else ""

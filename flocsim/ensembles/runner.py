@@ -212,6 +212,7 @@ def make_results(
     config = study.config
     reader = Reader(start.store, (*study.shape[:3], count))
     probabilities, pooled, differences = summarize(reader)
+    names: tuple = tuple(floc.name for floc in study.flocs)
     results = Results(
         types=tuple(name for name, _, _ in config.scene.conditions),
         vertices=np.array(config.shapes.vertices),
@@ -220,7 +221,7 @@ def make_results(
         probabilities=probabilities,
         run=facts(study, start, state.notes, ended, ranks),
         failures=FAILURES,
-        flocs=tuple(floc.name for floc in study.flocs),
+        flocs=names,
         pooled=pooled,
         differences=differences,
         count=count,
@@ -231,7 +232,6 @@ def make_results(
 
 
 def facts(study, start, notes, ended, ranks):
-    """The scalars of the group ``run``."""
     config, identity = study.config, start.identity
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
@@ -251,7 +251,6 @@ def facts(study, start, notes, ended, ranks):
 
 
 def announcement(study: Study, ranks: int, existing: int = 0) -> str:
-    """One line: what is about to be run."""
     types, vertices, delta, replicates = study.shape
     line = (
         f"{study.size} replicates: {types} types x {vertices} numbers of vertices x {delta} "

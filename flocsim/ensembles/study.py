@@ -74,7 +74,6 @@ class Study:
     def encounter(
         self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
     ) -> Encounter:
-        """The Encounter that a replicate's random numbers choose."""
         name, *radii = self.config.scene.conditions[condition]
         flocs = self.choose_flocs(condition, vertices, numbers)
         key = (name, vertices, *flocs)

@@ -56,7 +56,6 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
 
 
 def collided(observed: np.ndarray) -> bool:
-    """Whether the outlines touched."""
     return bool(observed[COLLIDED] == 1.0)
 
 

@@ -72,7 +72,6 @@ def outline_gap(scene, work):
 
 
 def note_collision(work, observed, time, distance):
-    """Write down the instant of the first touch."""
     observed[COLLIDED] = 1.0
     observed[INSIDE] = 1.0 if distance < observed[ZONE] else 0.0
     observed[D_COLLISION] = distance

@@ -69,7 +69,6 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
 
 @cache
 def compiled_height():
-    """`start_height` as machine code."""
     return compose(start_height, {})
 
 

@@ -66,7 +66,6 @@ takes strings with a unit and checks the dimension; a plain `attrs.field()` take
 
 
 def schema_page() -> str:
-    """The whole page as Markdown text."""
     parts = [INTRODUCTION, "## At the top\n", key_table(STUDY_KEYS)]
     tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
     for name, table_class in tables.items():
@@ -99,7 +98,6 @@ def takes(field):
 
 
 def default_of(field):
-    """The default as TOML writes it."""
     shown = field.metadata.get("shown") or as_toml(field.default)
     return shown if shown == "none" else f"`{shown}`"
 

@@ -58,9 +58,5 @@ SI: dict[str, Any] = {
     "zone": {"distance": 1e-8},
 }
 
-PRESETS = {
-    "tang2014": TANG2014,
-    "tang2014-literal": TANG2014_LITERAL,
-    "si": SI,
-}
+PRESETS = {"tang2014": TANG2014, "tang2014-literal": TANG2014_LITERAL, "si": SI}
 """Name → values, nested like the config file."""

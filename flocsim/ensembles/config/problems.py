@@ -61,7 +61,6 @@ class Problems:
     found: list[tuple[tuple[str, ...], str]] = attrs.Factory(list)
 
     def misfit(self, place: tuple[str, ...], error: Misfit) -> None:
-        """Note the findings of a Misfit of the value at ``place``."""
         for index, text in error.findings:
             self.found.append((place, f"{dotted(place)}{index} {text}"))
 
@@ -70,7 +69,6 @@ class Problems:
         self.found.append((place, f"{dotted(place)}: {text}" if place else text))
 
     def unknown(self, place: tuple[str, ...], known: Iterable[str]) -> None:
-        """Note the last key of ``place``, which is none of those known."""
         words = f"known: {', '.join(known)}" if known else "there are none here"
         self.note(place, f"unknown key{suggestion(place[-1], known)}; {words}")
 
@@ -84,7 +82,12 @@ class Problems:
             lines = key_lines(self.text)
             located = [(self.line_of(place, lines), text) for place, text in self.found]
             located.sort(key=lambda item: item[0])
-            raise ConfigError("\n".join(f"{self.label(line)}: {text}" for line, text in located))
+            places = {-1: f"given over {self.file}", 0: self.file}
+            raise ConfigError(
+                "\n".join(
+                    f"{places.get(line, f'{self.file}:{line}')}: {text}" for line, text in located
+                )
+            )
 
     def line_of(self, place, lines):
         """The line of the key or of the nearest table around it; else 0, and −1 if overridden."""
@@ -95,9 +98,3 @@ class Problems:
             return -1
         around = (lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in lines)
         return next(around, 0)
-
-    def label(self, line):
-        """Where a problem is, for the front of its line."""
-        if line < 0:
-            return f"given over {self.file}"
-        return f"{self.file}:{line}" if line else self.file

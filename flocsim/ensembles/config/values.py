@@ -21,7 +21,6 @@ Reader = Callable[[Any], Any]
 
 
 def reader_of(attribute: attrs.Attribute) -> Reader:
-    """The reader of an attrs field, of flocsim's or of a user's class."""
     metadata = attribute.metadata
     if "read" in metadata:
         return metadata["read"]
@@ -67,7 +66,6 @@ def read_by(read: Reader, allowed: str, *, default: Any = attrs.NOTHING, **metad
 
 
 def whole_field(at_least: int, at_most: int, **more: Any) -> Any:
-    """A field that takes an integer within the limits."""
     allowed = f"an integer from {at_least} to {at_most}"
     return read_by(whole(at_least, at_most), allowed, **more)
 
@@ -86,8 +84,6 @@ def read_text(value: object) -> str:
 
 
 def one_of(choices: Collection[str]) -> Reader:
-    """A reader of one of the words."""
-
     def read(value):
         if not isinstance(value, str) or value not in choices:
             hint = suggestion(value, choices) if isinstance(value, str) else ""

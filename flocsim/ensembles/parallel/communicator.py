@@ -94,7 +94,6 @@ class Communicator:
         return self.broadcast(self.gather(value))
 
     def barrier(self) -> None:
-        """Wait until all ranks are here."""
         self.all_gather(None)
 
     def close(self) -> None:

@@ -44,7 +44,6 @@ class Coordinator:
         self.present = self.comm.size - 1
 
     def start(self) -> None:
-        """Begin to serve the other ranks."""
         self.state.look_at_stages()
         if self.comm.size > 1 and self.comm.threads:
             self.thread = threading.Thread(target=self.serve_on, daemon=True)
@@ -84,7 +83,6 @@ class Coordinator:
         return not self.state.is_running or stop_requested()
 
     def wait_a_little(self):
-        """Look at what others want, or let the thread do so."""
         if self.error is not None:
             raise self.error
         if self.thread is not None or not self.serve():

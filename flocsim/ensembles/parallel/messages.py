@@ -49,8 +49,6 @@ class Request:
 
 @attrs.frozen
 class Assignment:
-    """The next chunk of a rank."""
-
     chunk: Chunk
 
 
@@ -66,6 +64,4 @@ class Dismissal:
 
 @attrs.frozen
 class ExitCode:
-    """How the run has ended, on all ranks."""
-
     code: int

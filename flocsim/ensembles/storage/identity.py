@@ -101,14 +101,11 @@ def floc_facts(study):
             parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
             if study.config.shapes.own is not None:
                 # Its class computes what is known of others, and how it grows.
-                parts += [numbers_of(each) for each in (*shapes, *(s.scaled(2.0) for s in shapes))]
+                for each in (*shapes, *(shape.scaled(2.0) for shape in shapes)):
+                    numbers = [each.radius, each.area, each.second_moment]
+                    parts.append(np.append(np.ravel(each.vertices), numbers))
             facts[f"flocs.{n}"] = digest(np.concatenate(parts))
     return facts
-
-
-def numbers_of(shape):
-    """All numbers that a shape hands to the kernels."""
-    return np.append(np.ravel(shape.vertices), [shape.radius, shape.area, shape.second_moment])
 
 
 def kernel_facts(config):
@@ -178,7 +175,6 @@ def digest(array):
 
 
 def short(identity: dict) -> str:
-    """An identity in 16 letters."""
     text = json.dumps(identity, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 

@@ -11,14 +11,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.chunks import (
-    Condition,
-    Interval,
-    condition_of,
-    fits,
-    layout,
-    named,
-)
+from flocsim.ensembles.chunks import Condition, Interval, condition_of, fits, layout, named
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore
@@ -183,7 +176,13 @@ def take_results(start, output):
         start.remarks.append(f"not used: {error}")
         return
     rows = file["replicates"]
-    places = old_places(rows)
+    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
+    places = {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for t, name in enumerate(axes[0])
+        for v, n in enumerate(axes[1])
+        for d, share in enumerate(axes[2])
+    }
     count = len(rows["replicate"])
     for place, condition in enumerate(start.store.conditions):
         if condition in places and count:
@@ -200,14 +199,3 @@ def take_results(start, output):
 def stored(file, name, default):
     """What a results file holds as JSON."""
     return json.loads(file[f"run/{name}"].asstr()[()]) if name in file["run"] else default
-
-
-def old_places(rows):
-    """Condition → its place in the arrays of a results file."""
-    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
-    return {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
