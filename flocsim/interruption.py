@@ -27,6 +27,9 @@ PATIENCE = 1.2
 SHORTEST_PATIENCE = 0.3
 """Seconds that it has at least, from when it has joined the other ranks."""
 
+HEAD_START = 0.7
+"""Seconds that a process has more where another speaks for it, whom its end might cut short."""
+
 LAUNCHER_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "PMIX_RANK")
 """Environment variables that only a process started by an MPI launcher has."""
 
@@ -113,6 +116,7 @@ def end_in_time() -> None:
     while INTERRUPTION.held:
         time.sleep(0.05)
     time.sleep(max(INTERRUPTION.since + PATIENCE - time.monotonic(), SHORTEST_PATIENCE))
+    time.sleep(0.0 if INTERRUPTION.speaks else HEAD_START)
     # Whatever the main thread may be writing is made to be cut off; what is in a buffer is not.
     with contextlib.suppress(Exception):
         sys.stdout.flush()

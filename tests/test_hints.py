@@ -11,7 +11,9 @@ import pytest
 from flocsim.forces import Force
 from flocsim.integrators import Integrator
 
-PACKAGES = ["flocsim.forces", "flocsim.integrators"]
+PACKAGES = [
+    "flocsim", "flocsim.forces", "flocsim.integrators", "flocsim.geometry.fit", "flocsim.ensembles",
+]  # fmt: skip
 
 
 def public_functions(name, exported):

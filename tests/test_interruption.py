@@ -49,6 +49,18 @@ def test_a_process_that_does_not_answer_is_ended_in_time():
     assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")
 
 
+def test_a_process_that_another_speaks_for_is_silent_and_goes_after_it():
+    speaker = started(DEAF)
+    silent = started(f"import flocsim.interruption as i\ni.INTERRUPTION.speaks = False\n{DEAF}")
+    for process in (silent, speaker):
+        process.send_signal(signal.SIGUSR1)
+    assert speaker.wait(timeout=20) == 75
+    assert silent.poll() is None
+    assert silent.communicate(timeout=20)[1] == ""
+    assert silent.returncode == 75
+    speaker.communicate()
+
+
 def test_a_second_signal_ends_it_at_once():
     process = started(DEAF)
     process.send_signal(signal.SIGINT)

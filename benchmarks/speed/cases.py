@@ -8,7 +8,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter
 from flocsim.ensembles.collision.failures import outcome_of
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.integrators.base import Status
 
 VERTICES = 64

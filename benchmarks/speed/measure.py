@@ -9,7 +9,7 @@ from flocsim.arrays import (
     NOW,
     work_of,
 )
-from flocsim.ensembles.collision.precision import end_distance
+from flocsim.ensembles.collision.encounter import end_distance
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Status
 from flocsim.run import Run

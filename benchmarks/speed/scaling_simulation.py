@@ -74,7 +74,7 @@ def measure_costs(count):
 
 def timed(study, place, replicate):
     """Seconds of a replicate, its shapes made beforehand."""
-    from flocsim.ensembles.collision.sampling import draws
+    from flocsim.ensembles.collision.start import draws
 
     study.encounter(*place[:2], draws(study.config.seed, replicate))
     began = time.perf_counter()

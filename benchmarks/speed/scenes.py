@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
-from flocsim.ensembles.collision.precision import replicate_system
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.encounter import replicate_system
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals

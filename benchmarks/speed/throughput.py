@@ -15,7 +15,7 @@ from benchmarks.reporting import Table, parse_arguments, print_heading
 from benchmarks.speed.evaluations import costs
 from benchmarks.speed.scenes import collisions
 from flocsim.ensembles.collision.encounter import run_encounter
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.study import Study
 from flocsim.io.results.schema import OUTCOMES
 

@@ -9,8 +9,8 @@ import attrs
 from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.forces_between import forces_between
-from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import frames_of
+from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config

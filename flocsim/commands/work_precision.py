@@ -6,8 +6,8 @@ from typing import Any
 import attrs
 
 from flocsim.commands.trajectory import add_replicate, select, with_one_count
-from flocsim.ensembles.collision.precision import end_distance, replicate_system
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.encounter import end_distance, replicate_system
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study

@@ -4,6 +4,7 @@ Replicates of one condition are kept as intervals: sorted, disjoint pairs [first
 """
 
 import json
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +18,12 @@ MOST_ROWS = 16_384
 ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()])
 """One replicate: its row of the results file."""
 
-SIZES = [ROW[name].itemsize for name in ROW.names]
-STARTS = {name: sum(SIZES[:place]) for place, name in enumerate(ROW.names)}
+COLUMNS = tuple(REPLICATES)
+SIZES = [ROW[name].itemsize for name in COLUMNS]
+STARTS = {name: sum(SIZES[:place]) for place, name in enumerate(COLUMNS)}
 """Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
+
+Interval = tuple[int, int]
 
 
 class Condition(NamedTuple):
@@ -38,7 +42,9 @@ class Chunk(NamedTuple):
     stop: int
 
 
-def chunk_record(condition, first, rows, identity, notes=()):
+def chunk_record(
+    condition: Condition, first: int, rows: np.ndarray, identity: str, notes: Iterable[dict] = ()
+) -> bytes:
     """The record of finished rows, for the journal: column by column.
 
     ``identity`` is the digest of all that the rows follow from; ``notes`` tell of failed ones.
@@ -46,15 +52,14 @@ def chunk_record(condition, first, rows, identity, notes=()):
     description = {**condition._asdict(), "first": first, "count": len(rows), "identity": identity}
     if notes:
         description["notes"] = list(notes)
-    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in ROW.names))
+    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in COLUMNS))
 
 
-def condition_of(description):
-    """The Condition that a chunk's description names."""
+def condition_of(description: dict) -> Condition:
     return Condition(description["type"], description["vertices"], description["delta"])
 
 
-def named(description):
+def named(description: dict | None) -> str:
     """A chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
     if description is None or "first" not in description:
         return "what it held is unknown"
@@ -65,29 +70,19 @@ def named(description):
     )
 
 
-def column_place(description, offset, name, first, stop):
-    """(offset, length) of a part of a column in a journal; ``offset`` is that of the chunk's data.
-
-    ``first`` and ``stop`` are numbers of replicates.
-    """
-    size = ROW[name].itemsize
-    place = offset + description["count"] * STARTS[name]
-    return place + size * (first - description["first"]), size * (stop - first)
-
-
-def fits(description, length):
+def fits(description: dict, length: int) -> bool:
     """Whether a chunk's data are as long as its description says."""
     return length == description["count"] * ROW_SIZE
 
 
-def layout():
+def layout() -> str:
     """The columns of a chunk as text, to tell another version's."""
-    return json.dumps([[name, ROW[name].str] for name in ROW.names])
+    return json.dumps([[name, ROW[name].str] for name in COLUMNS])
 
 
-def merged(intervals):
+def merged(intervals: Iterable[Interval]) -> list[Interval]:
     """The union of intervals [first, stop), sorted and disjoint."""
-    union = []
+    union: list[Interval] = []
     for first, stop in sorted(intervals):
         if union and first <= union[-1][1]:
             union[-1] = (union[-1][0], max(stop, union[-1][1]))
@@ -96,7 +91,7 @@ def merged(intervals):
     return union
 
 
-def missing(intervals, first, stop):
+def missing(intervals: Iterable[Interval], first: int, stop: int) -> list[Interval]:
     """What a union leaves out of [first, stop)."""
     gaps, place = [], first
     for start, end in intervals:
@@ -110,5 +105,5 @@ def missing(intervals, first, stop):
     return gaps
 
 
-def total(intervals):
+def total(intervals: Iterable[Interval]) -> int:
     return sum(stop - first for first, stop in intervals)

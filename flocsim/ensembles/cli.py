@@ -5,8 +5,10 @@ import contextlib
 import io
 import sys
 import traceback
+from collections.abc import Sequence
 
 from flocsim.ensembles.parallel.communicator import (
+    Communicator,
     SerialCommunicator,
     StopRequested,
     find_communicator,
@@ -19,7 +21,7 @@ from flocsim.io.terminal import plain_warnings, tell
 INTERNAL = 70
 
 
-def add_arguments(parser):
+def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument("config", help="config file (TOML); `flocsim init` writes an example")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -48,7 +50,7 @@ def add_arguments(parser):
     return parser
 
 
-def overrides(arguments):
+def overrides(arguments: argparse.Namespace) -> dict:
     """The command line's values as a nested dict over the config's."""
     from flocsim.ensembles.config.overrides import nested, parse_setting
 
@@ -104,19 +106,16 @@ def study(config, comm, arguments):
         return error.args[0].exit_code
     if ended.code == STOPPED:
         if comm.rank == 0:
-            tell(f"flocsim: {stopped_text(ended, output)}", sys.stderr)
+            who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
+            tell(
+                f"flocsim: stopped by {who}: {ended.kept} finished replicates are in "
+                f"{output}.journal; go on with --resume",
+                sys.stderr,
+            )
         return STOPPED
     if comm.rank == 0 and not arguments.quiet:
         report(ended, output)
     return 0
-
-
-def stopped_text(ended, output):
-    who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
-    return (
-        f"stopped by {who}: {ended.kept} finished replicates are in {output}.journal; go on with "
-        "--resume"
-    )
 
 
 def report(ended, output):
@@ -131,7 +130,6 @@ def report(ended, output):
 
 
 def run_rank(comm, arguments):
-    """The whole command on one rank; its exit code."""
     config, code = agree(comm, arguments)
     if config is None:
         return code
@@ -144,7 +142,7 @@ def run_rank(comm, arguments):
     return study(config, comm, arguments)
 
 
-def end_all(comm, text, code):
+def end_all(comm: Communicator, text: str, code: int) -> int:
     """Print why, and end every rank; returns the exit code where this process is alone."""
     who = f"rank {comm.rank}: " if comm.size > 1 else ""
     tell(f"flocsim: {who}{text}", sys.stderr)
@@ -191,13 +189,11 @@ def join_ranks(arguments):
 
 
 def on_process(comm, arguments):
-    """What a process that --jobs started does; its exit code."""
     plain_warnings(silent=True)
     return guarded(comm, arguments)
 
 
-def run_command(arguments):
-    """Find the ranks of the job and do the work; the exit code."""
+def run_command(arguments: argparse.Namespace) -> int:
     try:
         comm = join_ranks(arguments)
     except FlocsimError as error:
@@ -217,7 +213,7 @@ def silent_unless_first():
         yield
 
 
-def main(argv=None):
+def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `python -m flocsim.ensemble`; the exit code."""
     parser = argparse.ArgumentParser(
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"

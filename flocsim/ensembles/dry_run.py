@@ -2,6 +2,7 @@
 
 from math import inf
 
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 
@@ -29,22 +30,7 @@ def code_lines(config):
     return [f"  {line}" for line in lines]
 
 
-def left_out_lines(ranks):
-    """What an ensemble leaves out besides."""
-    yield "  out: trajectories: an ensemble records none (see `flocsim trajectory`)"
-    yield "  out: plots: none is drawn (see `flocsim plot`)"
-    if ranks == 1:
-        yield "  out: MPI: one rank needs none"
-
-
-def stiffness_lines(config):
-    """The time scales of every collision type, by its equivalent spheres."""
-    for name, pair in sphere_pairs(config):
-        yield from (f"  {name}: {line}" for line in scale_lines(pair.system))
-
-
-def dry_run(config, ranks):
-    """The report of --dry-run as text, for so many ranks."""
+def dry_run(config: Config, ranks: int) -> str:
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
     flocs += f", spheroradius {1e6 * shapes.radius:.4g} um" if shapes.own is None else ""
@@ -61,9 +47,15 @@ def dry_run(config, ranks):
         *condition_lines(config),
         "forces and code:",
         *code_lines(config),
-        *left_out_lines(ranks),
+        "  out: trajectories: an ensemble records none (see `flocsim trajectory`)",
+        "  out: plots: none is drawn (see `flocsim plot`)",
+        *(["  out: MPI: one rank needs none"] if ranks == 1 else []),
         "stiffness:",
-        *stiffness_lines(config),
+        *(
+            f"  {name}: {line}"
+            for name, pair in sphere_pairs(config)
+            for line in scale_lines(pair.system)
+        ),
         "nothing was run (--dry-run)",
     ]
     return "\n".join(lines)

@@ -1,48 +1,38 @@
 """What is wrong with a study can mostly be known before anything is compiled or run."""
 
 import os
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.config.schema import Config
 from flocsim.errors import ConfigError
 from flocsim.forces import ContactForce
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.files import check_writable
+from flocsim.system import System
 
 
-def sphere_pairs(config):
+def sphere_pairs(config: Config) -> Iterator[tuple[str, Encounter]]:
     """(name, Encounter) of the equivalent spheres of every collision type."""
     for name, radius_i, radius_j in config.scene.conditions:
         zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
         yield name, make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
 
 
-def check_study(config):
+def check_study(config: Config) -> None:
     """Raise the FlocsimError that the study would meet: zone, method, settling, sizes, library."""
-    check_contact(config)
-    check_spheroradius(config)
-    for name, pair in sphere_pairs(config):
-        check_approach(config, name, pair)
-    if config.shapes.source == "library":
-        read_flocs(config.shapes)
-
-
-def check_contact(config):
-    """ConfigError without a contact force: nothing would notice that two bodies touch."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
             "a collision needs a contact force, found none among "
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
-
-
-def check_spheroradius(config):
-    """ConfigError where the spheroradius leaves no room for a core in the smallest body."""
     least = min(min(radii) for _, *radii in config.scene.conditions)
     polygons = max(config.shapes.vertices) > 1 and config.shapes.own is None
     if polygons and config.shapes.radius >= least:
@@ -50,6 +40,10 @@ def check_spheroradius(config):
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
         )
+    for name, pair in sphere_pairs(config):
+        check_approach(config, name, pair)
+    if config.shapes.source == "library":
+        read_flocs(config.shapes)
 
 
 def check_approach(config, name, pair):
@@ -63,7 +57,7 @@ def check_approach(config, name, pair):
         )
 
 
-def check_output(path, *inputs):
+def check_output(path: str | os.PathLike, *inputs: str | os.PathLike) -> None:
     """FileError for a file that could not be written, ConfigError for one that the study reads."""
     for source in inputs:
         if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
@@ -81,7 +75,7 @@ def stand_in(shape, options):
     return SpheroPolygon((shape.radius - radius) * hexagon, radius)
 
 
-def placed_system(config, system, shapes):
+def placed_system(config: Config, system: System, shapes: Sequence[Shape]) -> System:
     """The system with these shapes, the start gap apart."""
     reach = sum(shape.bounding_radius for shape in shapes) + config.scene.start_gap
     places = ((0.0, 0.0), (0.0, reach))
@@ -92,7 +86,7 @@ def placed_system(config, system, shapes):
     return attrs.evolve(system, bodies=bodies)
 
 
-def kinds(config, spheres):
+def kinds(config: Config, spheres: Sequence[Shape]) -> Iterator[Sequence[Shape]]:
     """Shapes of i and j for polygons, if the study has any, and for spheres, if it has any."""
     if max(config.shapes.vertices) > 1:
         yield [stand_in(shape, config.shapes) for shape in spheres]

@@ -1,5 +1,7 @@
 """The table of a study for the terminal."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from flocsim.io.results.file import CLASSES
@@ -23,7 +25,10 @@ WIDTH = 110
 """Columns of a wide terminal; the table is set more openly where this leaves room."""
 
 
-def format_table(types, vertices, delta, table):
+def format_table(
+    types: Sequence[str], vertices: Sequence[int] | np.ndarray,
+    delta: Sequence[float] | np.ndarray, table: Mapping[str, np.ndarray],
+) -> str:  # fmt: skip
     """Counts and probabilities with their intervals, one row per condition, a block per type.
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
@@ -75,5 +80,4 @@ def share(value):
 
 
 def align(cells, widths):
-    """Right-aligned cells; nothing trails."""
     return " ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()

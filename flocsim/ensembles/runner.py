@@ -7,15 +7,18 @@ others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks 
 import contextlib
 import json
 import time
+from collections.abc import Iterator
+from pathlib import Path
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, total
+from flocsim.ensembles.chunks import COLUMNS, total
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, summarize
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator, SerialCommunicator
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
 from flocsim.ensembles.parallel.schedule import Schedule
@@ -40,7 +43,7 @@ class Ended:
     """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well."""
 
     code: int = 0
-    results: Results = None
+    results: Results | None = None
     computed: int = 0
     kept: int = 0
     wall_time: float = 0.0
@@ -54,7 +57,7 @@ class RankZeroFailed(Exception):
     """What the other ranks have of it: rank 0 says why; the argument is the exit code."""
 
 
-def run(config, comm=None, quiet=True):
+def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Results | None:
     """Run a config's study in memory; the Results on rank 0, None on the others.
 
     ``comm`` has the ranks of the job (default: this process alone). The arrays of the Results are
@@ -72,7 +75,9 @@ def run(config, comm=None, quiet=True):
         raise error.args[0] from None
 
 
-def run_to_file(config, comm, output, mode, quiet=True):
+def run_to_file(
+    config: Config, comm: Communicator, output: str | Path, mode: str, quiet: bool = True
+) -> Ended:
     """Run a config's study into the results file ``output``: how it Ended.
 
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
@@ -93,7 +98,7 @@ def run_to_file(config, comm, output, mode, quiet=True):
     return ended
 
 
-def make_study(config, comm):
+def make_study(config: Config, comm: Communicator) -> tuple[Study, list[dict]]:
     """(Study, kinds of CPU) of a job: the Study on every rank, the kinds of all ranks on rank 0.
 
     Rank 0 grows or reads the flocs for all.
@@ -103,7 +108,7 @@ def make_study(config, comm):
     return study, distinct(comm.gather(cpu_kind()) or [])
 
 
-def follow(study, comm):
+def follow(study: Study, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
     plan = comm.broadcast(None)
     if isinstance(plan, ExitCode):
@@ -118,10 +123,13 @@ def follow(study, comm):
     return Ended(code)
 
 
-def lead(study, start, comm, progress, output=None):
+def lead(
+    study: Study, start: Beginning, comm: Communicator, progress: Progress,
+    output: str | Path | None = None,
+) -> Ended:  # fmt: skip
     """What rank 0 does: run what is missing, with the others; make the Results.
 
-    ``start`` is the Beginning; the Results are written into the file ``output`` if given.
+    They are written into the file ``output`` if given.
     """
     began = time.monotonic()
     state = make_state(study, start, comm.size)
@@ -153,7 +161,7 @@ def lead(study, start, comm, progress, output=None):
 
 
 @contextlib.contextmanager
-def sharing_errors(comm, coordinator=None):
+def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -> Iterator[None]:
     """An error of rank 0 ends the other ranks in good order, so that all have one exit code.
 
     With a ``coordinator`` they have to be called back from their work first.
@@ -174,30 +182,29 @@ def compile_in_turn(study, comm):
     study.compile(study.kinds)
 
 
-def make_state(study, start, ranks):
+def make_state(study: Study, start: Beginning, ranks: int) -> StudyState:
     """The StudyState of what is missing, for so many ranks."""
     replicates, stop = study.config.replicates, study.config.stop
     found = start.found(replicates)
+    failed = sum(
+        int(np.sum(start.store.read(place, "outcome", *interval) == FAILED))
+        for place, intervals in enumerate(found)
+        for interval in intervals
+    )
     return StudyState(
         Schedule.of(found, borders(stop, replicates), ranks),
         start.store,
         StopRule(stop, start.store),
         allowed=stop.failed * study.size,
-        failed=count_failed(start.store, found),
+        failed=failed,
         notes=start.notes,
     )
 
 
-def count_failed(store, found):
-    """How many rows of failed replicates there are in intervals of every condition."""
-    return sum(
-        int(np.sum(store.read(place, "outcome", *interval) == FAILED))
-        for place, intervals in enumerate(found)
-        for interval in intervals
-    )
-
-
-def make_results(study, start, state, ended, ranks, output):
+def make_results(
+    study: Study, start: Beginning, state: StudyState, ended: Ended, ranks: int,
+    output: str | Path | None,
+) -> Results:  # fmt: skip
     """The Results of a finished study; written to ``output`` where there is one."""
     count = state.schedule.final
     if output and start.complete == (study.conditions, count):
@@ -205,15 +212,16 @@ def make_results(study, start, state, ended, ranks, output):
     config = study.config
     reader = Reader(start.store, (*study.shape[:3], count))
     probabilities, pooled, differences = summarize(reader)
+    names: tuple = tuple(floc.name for floc in study.flocs)
     results = Results(
         types=tuple(name for name, _, _ in config.scene.conditions),
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
-        replicates=None if output else reader.arrays(ROW.names),
+        replicates=None if output else reader.arrays(COLUMNS),
         probabilities=probabilities,
         run=facts(study, start, state.notes, ended, ranks),
         failures=FAILURES,
-        flocs=[floc.name for floc in study.flocs],
+        flocs=names,
         pooled=pooled,
         differences=differences,
         count=count,
@@ -224,7 +232,6 @@ def make_results(study, start, state, ended, ranks, output):
 
 
 def facts(study, start, notes, ended, ranks):
-    """The scalars of the group ``run``."""
     config, identity = study.config, start.identity
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
@@ -243,8 +250,7 @@ def facts(study, start, notes, ended, ranks):
     }
 
 
-def announcement(study, ranks, existing=0):
-    """One line: what is about to be run."""
+def announcement(study: Study, ranks: int, existing: int = 0) -> str:
     types, vertices, delta, replicates = study.shape
     line = (
         f"{study.size} replicates: {types} types x {vertices} numbers of vertices x {delta} "

@@ -1,19 +1,27 @@
 """A study: all conditions of a config, and any one replicate of them by its number."""
 
+from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 
 import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import Condition
-from flocsim.ensembles.collision.encounter import OBSERVER, make_encounter, run_encounter
+from flocsim.ensembles.collision.encounter import (
+    OBSERVER,
+    Encounter,
+    Record,
+    make_encounter,
+    run_encounter,
+)
 from flocsim.ensembles.collision.failures import NO_FLOC
-from flocsim.ensembles.collision.flocs import FlocPool, load_flocs
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.config.schema import Config
 
 
-def flocs_of(config):
+def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's study needs: none for spheres alone."""
     polygons = any(n > 1 for n in config.shapes.vertices)
     return load_flocs(config.shapes, config.seed) if polygons else []
@@ -21,14 +29,19 @@ def flocs_of(config):
 
 @attrs.define(eq=False)
 class Study:
-    """Every replicate of a config. All that is random follows from (seed, replicate)."""
+    """Every replicate of a config. All that is random follows from (seed, replicate).
 
-    config: object
-    flocs: list = None
-    zones: dict = attrs.Factory(dict)
-    encounters: dict = attrs.Factory(dict)
-    drivers: dict = attrs.Factory(dict)
-    floc_pool: FlocPool = None
+    ``flocs`` are grown or read unless given; ``zones`` has D_0 [m] of every collision type.
+    """
+
+    config: Config
+    flocs: list[Floc] = attrs.field(
+        default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
+    )
+    zones: dict[str, float] = attrs.field(init=False)
+    floc_pool: FlocPool = attrs.field(init=False)
+    encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
+    drivers: dict[bool, Callable] = attrs.field(init=False, factory=dict)
 
     def __attrs_post_init__(self):
         config = self.config
@@ -36,30 +49,31 @@ class Study:
             name: zone_distance(config.zone, config.forces, radius_i, radius_j)
             for name, radius_i, radius_j in config.scene.conditions
         }
-        if self.flocs is None:
-            self.flocs = flocs_of(config)
         self.floc_pool = FlocPool(self.flocs, config.shapes.radius, config.shapes.pool)
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, int, int, int]:
         """(types, vertices, delta, replicates): how many there are of each."""
         scene = self.config.scene
         counts = (len(scene.conditions), len(self.config.shapes.vertices), len(scene.delta))
         return (*counts, self.config.replicates)
 
     @property
-    def size(self):
+    def size(self) -> int:
         return int(np.prod(self.shape))
 
-    def choose_flocs(self, condition, vertices, numbers):
+    def choose_flocs(
+        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
+    ) -> tuple[int, int]:
         """Places of the flocs of i and j that a replicate's random numbers choose."""
         if vertices == 1:
             return NO_FLOC, NO_FLOC
         _, radius_i, radius_j = self.config.scene.conditions[condition]
         return self.floc_pool.choose(numbers, radius_i, radius_j)
 
-    def encounter(self, condition, vertices, numbers):
-        """The Encounter that a replicate's random numbers choose."""
+    def encounter(
+        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
+    ) -> Encounter:
         name, *radii = self.config.scene.conditions[condition]
         flocs = self.choose_flocs(condition, vertices, numbers)
         key = (name, vertices, *flocs)
@@ -71,7 +85,7 @@ class Study:
             self.encounters[key] = make_encounter(self.config, shapes, self.zones[name])
         return self.encounters[key]
 
-    def driver(self, encounter):
+    def driver(self, encounter: Encounter) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons."""
         kind = encounter.system.spheres_only
         if kind not in self.drivers:
@@ -79,19 +93,22 @@ class Study:
         return self.drivers[kind]
 
     @property
-    def conditions(self):
+    def conditions(self) -> tuple[Condition, ...]:
         """All conditions, in the order of the results file."""
         scene, vertices = self.config.scene, self.config.shapes.vertices
         names = [name for name, _, _ in scene.conditions]
         return tuple(Condition(*each) for each in product(names, vertices, scene.delta))
 
     @property
-    def places(self):
+    def places(self) -> tuple[tuple[int, int, float], ...]:
         """(place of the collision type, N, share of δ_max) of every condition."""
         scene, vertices = self.config.scene, self.config.shapes.vertices
         return tuple(product(range(len(scene.conditions)), vertices, scene.delta))
 
-    def run(self, condition, vertices, share, replicate, record=None, halted=None):
+    def run(
+        self, condition: int, vertices: int, share: float, replicate: int,
+        record: Record | None = None, halted: Callable[[], bool] | None = None,
+    ) -> dict | None:  # fmt: skip
         """Run one replicate: condition's place, N, share of δ_max, index. The row as a dict.
 
         ``halted()``, looked at now and then, gives the replicate up: None then.
@@ -108,12 +125,12 @@ class Study:
         return row | {"floc_i": floc_i, "floc_j": floc_j}
 
     @property
-    def kinds(self):
+    def kinds(self) -> list[int]:
         """Numbers of vertices that stand for the kinds of compiled code that the study needs."""
         vertices = self.config.shapes.vertices
         return sorted({n > 1: n for n in vertices}.values())
 
-    def compile(self, kinds):
+    def compile(self, kinds: Iterable[int]) -> None:
         """Compile, or load from the disk, what these numbers of vertices need, by running it."""
         for vertices in kinds:
             self.run(0, vertices, self.config.scene.delta[0], 0)

@@ -22,7 +22,7 @@ BLOCK = 2**20
 """Bytes that are read at a time."""
 
 
-def replace_file(path: str | Path, data: bytes) -> None:
+def replace_file(path: str | os.PathLike, data: bytes) -> None:
     """Put ``data`` at ``path``: a reader meets the old file or the new one, never a part.
 
     Raises FileError if the folder is missing or unwritable, the disk is full, or the path names
@@ -33,7 +33,7 @@ def replace_file(path: str | Path, data: bytes) -> None:
         file.write(data)
 
 
-def replace_by_blocks(path: str | Path, size: int, blocks: Iterable[bytes]) -> None:
+def replace_by_blocks(path: str | os.PathLike, size: int, blocks: Iterable[bytes]) -> None:
     """Put ``blocks`` (in order, ``size`` bytes in all) at ``path``, sealed; never a part of them.
 
     For files larger than the memory. The space is taken before the first block, so that a full
@@ -90,7 +90,7 @@ def seal_of(digest):
     return SEAL_MARK + digest.hexdigest().encode() + b"\n"
 
 
-def ordinary_target(path: str | Path) -> Path:
+def ordinary_target(path: str | os.PathLike) -> Path:
     """The file behind ``path``, links followed; renaming over a device or a folder is refused."""
     try:
         target = Path(os.path.realpath(path))
@@ -102,7 +102,7 @@ def ordinary_target(path: str | Path) -> Path:
     return target
 
 
-def unwritable(path: str | Path, error: Exception) -> FileError:
+def unwritable(path: str | os.PathLike, error: Exception) -> FileError:
     reason = getattr(error, "strerror", None) or error
     return FileError(
         f"{path} could not be written: {reason}; check the folder, its permissions and free space"
@@ -124,14 +124,14 @@ def seal(data: bytes) -> bytes:
     return data + seal_of(hashlib.blake2b(data, digest_size=32))
 
 
-def read_sealed(path: str | Path) -> bytes:
+def read_sealed(path: str | os.PathLike) -> bytes:
     """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
     with checked_sealed(path) as (file, size):
         return file.read(size)
 
 
 @contextlib.contextmanager
-def checked_sealed(path: str | Path) -> Iterator[tuple[BinaryIO, int]]:
+def checked_sealed(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, int]]:
     """(open file, size of its HDF5 data), once its checksum has been found right.
 
     Read a block at a time, so that files larger than the memory can be checked.
@@ -173,7 +173,7 @@ def check_seal(path, file):
     return size
 
 
-def check_writable(path: str | Path) -> None:
+def check_writable(path: str | os.PathLike) -> None:
     """FileError now, rather than after hours, if ``path`` could not be written later."""
     probe = temporary_beside(ordinary_target(path))
     try:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import run
-from flocsim.ensembles.collision.sampling import draws
+from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.io.results.schema import REPLICATES

@@ -2,24 +2,30 @@
 
 import functools
 import math
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import work_of
+from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.failures import collided, outcome_of
 from flocsim.ensembles.collision.settling import terminal_motion, turn_time
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
+from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
-from flocsim.integrators.base import Status
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators.base import Integrator, Status
 from flocsim.io.results.schema import NOT_APPLICABLE
 from flocsim.run import Run
 from flocsim.system import System
 
-OBSERVER = {hooks.awaits_touch: outcomes.has_not_touched, hooks.observe: outcomes.watch_pair}
+OBSERVER: dict[Callable, Callable] = {
+    hooks.awaits_touch: outcomes.has_not_touched,
+    hooks.observe: outcomes.watch_pair,
+}
 """What a binary collision puts into the driver."""
 
 REST_TURNS = 3.0
@@ -33,13 +39,14 @@ LIMIT_TURNS = 1000.0
 class Encounter:
     """Two shapes that meet: everything about them but orientation and displacement.
 
-    Made once for each pair of shapes and used for all replicates that draw it.
+    Made once for each pair of shapes and used for all replicates that draw it. ``zone_distance``
+    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j.
     """
 
     system: System
-    options: object
+    options: SceneConfig
     zone_distance: float
-    settling: tuple = attrs.field(init=False)
+    settling: tuple[tuple[np.ndarray, float], ...] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
@@ -51,27 +58,26 @@ class Encounter:
             )
 
     @functools.cached_property
-    def scene(self):
+    def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
         return self.system.scene()
 
     @property
-    def shapes(self):
-        """Shapes of i and j."""
+    def shapes(self) -> tuple[Shape, ...]:
         return tuple(body.shape for body in self.system.bodies)
 
     @property
-    def drift(self):
+    def drift(self) -> np.ndarray:
         """Settling velocity of j relative to i (2,) [m/s]."""
         return self.settling[1][0] - self.settling[0][0]
 
     @property
-    def turn_time(self):
+    def turn_time(self) -> float:
         """(r_i + r_j)/|drift| [s]."""
-        radii = [shape.equivalent_radius for shape in self.shapes]
-        return turn_time(*radii, self.drift)
+        radius_i, radius_j = (shape.equivalent_radius for shape in self.shapes)
+        return turn_time(radius_i, radius_j, self.drift)
 
-    def observed(self):
+    def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
         observed = np.zeros(outcomes.OBSERVED_SIZE)
@@ -85,14 +91,14 @@ class Encounter:
         observed[outcomes.MOBILITY_J] = self.settling[1][1]
         return observed
 
-    def time_limit(self):
+    def time_limit(self) -> float:
         """Simulated time [s] after which a replicate is undecided."""
-        if self.options.time_limit == "auto":
+        if isinstance(self.options.time_limit, str):  # "auto"
             approach = self.options.start_gap / math.hypot(*self.drift)
             return approach + LIMIT_TURNS * self.turn_time
         return self.options.time_limit
 
-    def start(self, angles, share):
+    def start(self, angles: Sequence[float], share: float) -> Work:
         """Work arrays of a replicate with these angles [rad] at δ = share · δ_max."""
         shapes = self.shapes
         largest = largest_displacement(
@@ -103,7 +109,10 @@ class Encounter:
         velocity[0, :2], velocity[1, :2] = self.settling[0][0], self.settling[1][0]
         return work_of(self.scene, place, velocity)
 
-    def begin(self, driver, angles, share, max_steps, until=math.inf, record=False):
+    def begin(
+        self, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
+        until: float = math.inf, record: bool = False,
+    ) -> Run:  # fmt: skip
         """A Run of a replicate that has yet to take its first step, to a time [s] at most."""
         return Run(
             driver, self.scene, self.start(angles, share), self.system.integrator,
@@ -112,8 +121,8 @@ class Encounter:
         )  # fmt: skip
 
 
-def make_encounter(config, shapes, zone):
-    """The Encounter of two shapes under a config."""
+def make_encounter(config: Config, shapes: Sequence[Shape], zone: float) -> Encounter:
+    """The Encounter of two shapes under a config; ``zone`` is D_0 [m]."""
     bodies = [
         Body(shape, fixed=(config.scene.receiver == "fixed" and place == 0), **config.body_options)
         for place, shape in enumerate(shapes)
@@ -122,7 +131,45 @@ def make_encounter(config, shapes, zone):
     return Encounter(system, config.scene, zone)
 
 
-def run_encounter(encounter, driver, angles, share, max_steps, record=None, halted=None):
+def replicate_system(
+    encounter: Encounter, angles: Sequence[float], share: float,
+    integrator: Integrator | None = None,
+) -> System:  # fmt: skip
+    """The plain System where a replicate starts, with another integrator if given."""
+    system, bodies = encounter.system, []
+    starts = encounter.start(angles, share).motion[NOW].tolist()
+    for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
+        place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
+        bodies.append(attrs.evolve(body, **place))
+    return attrs.evolve(system, bodies=bodies, integrator=integrator or system.integrator)
+
+
+def end_distance(bodies: Sequence[Body], position: np.ndarray, exact: np.ndarray) -> float:
+    """The furthest [m] that any point of an outline is from where it ought to be.
+
+    ``position`` and ``exact`` (n, 3): x, y [m] and angle [rad] of the bodies at the end of two
+    runs. Largest |Δx| + R |Δθ| of a body, R its largest centroid-to-outline distance.
+    """
+    sizes = np.array([body.shape.bounding_radius for body in bodies])
+    shift = np.hypot(*(position[:, :2] - exact[:, :2]).T)
+    return float(np.max(shift + sizes * np.abs(position[:, 2] - exact[:, 2])))
+
+
+class Record:
+    """Asks run_encounter to keep every step of a replicate."""
+
+    run: Run | None = None
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
+        assert self.run is not None, "nothing has been run"
+        return self.run.motion()
+
+
+def run_encounter(
+    encounter: Encounter, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
+    record: Record | None = None, halted: Callable[[], bool] | None = None,
+) -> dict | None:  # fmt: skip
     """Run one replicate; the row of the table of replicates as a dict.
 
     ``driver`` is the compiled driver of the encounter's scene; ``record``, optional, is a Record to
@@ -159,13 +206,3 @@ def replicate_row(status, angles, run):
         "error": run.error,
         "failure": failure,
     }
-
-
-class Record:
-    """Asks run_encounter to keep every step of a replicate."""
-
-    run = None
-
-    def arrays(self):
-        """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
-        return self.run.motion()

@@ -5,9 +5,13 @@ what is needed to run it again.
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 
 from flocsim.ensembles.collision.outcomes import BOUND, COLLIDED, DEPARTED, INSIDE, MISSED
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
 
@@ -32,7 +36,7 @@ CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): 
 ALWAYS_FINITE = ("angle_i", "angle_j", "d_c_last", "t_end")
 """Columns that are numbers in every row of a replicate that has not failed."""
 
-NAN = float("nan")
+
 NO_FLOC = -1
 """In ``floc_i`` and ``floc_j``: a sphere."""
 
@@ -40,7 +44,7 @@ LONGEST_REASON = 300
 """Letters of an exception's words in a note."""
 
 
-def outcome_of(status, code, observed):
+def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
     """(outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
         if code == MISSED:
@@ -51,16 +55,18 @@ def outcome_of(status, code, observed):
     return FAILED, FAILURES.index(FAILED_ENDS[status])
 
 
-def collided(observed):
-    """Whether the outlines touched."""
-    return observed[COLLIDED] == 1.0
+def collided(observed: np.ndarray) -> bool:
+    return bool(observed[COLLIDED] == 1.0)
 
 
-def run_safely(study, place, replicate, halted=None):
+def run_safely(
+    study: Any, place: tuple[int, int, float], replicate: int,
+    halted: Callable[[], bool] | None = None,
+) -> tuple[dict | None, dict | None]:  # fmt: skip
     """(row, None) of one replicate, or (row, note) where it failed; row None where halted.
 
-    ``place``: of a condition, as Study.places has it. Running out of memory is nobody's fault but
-    the machine's, and goes on.
+    ``study``: a Study; ``place``: of a condition, as Study.places has it. Running out of memory is
+    nobody's fault but the machine's, and goes on.
     """
     condition, vertices, share = place
     try:
@@ -82,7 +88,6 @@ def run_safely(study, place, replicate, halted=None):
 
 
 def failed_row(reason, angles):
-    """The row of a replicate that ended without a result, as a dict."""
     blank = {name: BLANKS[kind] for name, (kind, _, _) in REPLICATES.items()}
     told = {"outcome": FAILED, "failure": FAILURES.index(reason)}
     return blank | {"angle_i": angles[0], "angle_j": angles[1]} | told
@@ -97,7 +102,7 @@ def make_note(study, place, replicate, why):
     }  # fmt: skip
 
 
-def describe_note(note):
+def describe_note(note: dict) -> str:
     """A failed replicate for messages, with the words that run it again."""
     return (
         f"{note['why']} (flocsim trajectory CONFIG --scene "

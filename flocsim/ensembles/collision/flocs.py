@@ -2,9 +2,12 @@
 own; resized to the scene."""
 
 import math
+from collections.abc import Sequence
 
 import attrs
+import numpy as np
 
+from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.resize import resized
@@ -25,10 +28,10 @@ class Floc:
 
     name: str
     ratio: float
-    shapes: dict
+    shapes: dict[int, Shape]
     own: bool = False
 
-    def resized(self, vertices, equivalent_radius, radius):
+    def resized(self, vertices: int, equivalent_radius: float, radius: float) -> Shape:
         """The shape of N vertices with r_eq [m], and with the spheroradius [m] if not ``own``."""
         shape = self.shapes[vertices]
         if self.own:
@@ -44,12 +47,13 @@ def grow_floc(shapes, seed, index):
     return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, fits)
 
 
-def read_flocs(shapes):
+def read_flocs(shapes: ShapesConfig) -> list[Floc]:
     """The flocs of a shape library; ConfigError where it lacks a wanted number of vertices."""
     from flocsim.io.shapes.library import read_library
 
     wanted = [n for n in shapes.vertices if n > 1]
     flocs = []
+    assert shapes.file is not None  # the config refuses a library without a file
     for entry in read_library(shapes.file):
         lacking = [n for n in wanted if n not in entry.fits]
         if lacking:
@@ -63,7 +67,7 @@ def read_flocs(shapes):
     return flocs
 
 
-def load_flocs(shapes, seed):
+def load_flocs(shapes: ShapesConfig, seed: int) -> list[Floc]:
     """All flocs that the config's [shapes] stands for, in a fixed order."""
     if shapes.own is not None:
         ratio = shapes.own.equivalent_radius / shapes.own.radius
@@ -87,30 +91,30 @@ class FlocPool:
     many flocs of about its size a body is drawn.
     """
 
-    flocs: list
+    flocs: list[Floc]
     radius: float
     pool: int
-    made: dict = attrs.Factory(dict)
+    made: dict[tuple, Shape] = attrs.Factory(dict)
 
-    def pool_for(self, equivalent_radius):
-        """Places of the flocs that a body of this size is drawn from."""
-        return nearest_in_ratio(self.flocs, equivalent_radius / self.radius, self.pool)
-
-    def choose(self, numbers, radius_i, radius_j):
+    def choose(
+        self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
+    ) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers; two, where possible."""
-        pool_i, pool_j = self.pool_for(radius_i), self.pool_for(radius_j)
+        pool_i, pool_j = (
+            nearest_in_ratio(self.flocs, radius / self.radius, self.pool)
+            for radius in (radius_i, radius_j)
+        )
         first = pool_i[int(numbers[2] * len(pool_i))]
         others = [k for k in pool_j if k != first] or pool_j
         return first, others[int(numbers[3] * len(others))]
 
-    def shape(self, place, vertices, equivalent_radius) -> Shape:
+    def shape(self, place: int, vertices: int, equivalent_radius: float) -> Shape:
         """A floc with N vertices in a size; the equivalent sphere for N = 1."""
         key = (place if vertices > 1 else None, vertices, equivalent_radius)
         if key not in self.made:
-            self.made[key] = self.make(*key)
+            self.made[key] = (
+                self.flocs[place].resized(vertices, equivalent_radius, self.radius)
+                if vertices > 1
+                else Sphere(equivalent_radius)
+            )
         return self.made[key]
-
-    def make(self, place, vertices, equivalent_radius):
-        if vertices == 1:
-            return Sphere(equivalent_radius)
-        return self.flocs[place].resized(vertices, equivalent_radius, self.radius)

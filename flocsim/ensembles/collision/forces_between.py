@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.settling import lone_view, no_force
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators.rhs.views import pair_view
@@ -52,12 +53,15 @@ def settling_force(encounter, velocity, direction):
     return np.sum(direction * np.array(forces), axis=1)
 
 
-def forces_between(encounter, times, position, velocity):
+def forces_between(
+    encounter: Encounter, times: np.ndarray, position: np.ndarray, velocity: np.ndarray
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(instants (k − 1,) [s], {name: force on body j [N]}), means over the steps of the motion.
 
     Along the line of centres, above 0 where it pushes apart. What acts at the outlines follows
     from the balance of momentum, m_j Δv_j/Δt less all other forces: exact for a step's mean up to
     the curvature of those others within a step; NaN where no more than that error is left.
+    ``times`` (k,) [s], ``position`` and ``velocity`` (k, 2, 3), as Record.arrays has them.
     """
     around = geometry(position, velocity, encounter.shapes)
     named = centre_forces(encounter, times, around)

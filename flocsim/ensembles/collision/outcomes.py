@@ -63,7 +63,6 @@ BODY_I, BODY_J = range(2)
 
 
 def has_not_touched(observed):
-    """Whether the pair has yet to touch."""
     return observed[COLLIDED] == 0.0
 
 
@@ -73,7 +72,6 @@ def outline_gap(scene, work):
 
 
 def note_collision(work, observed, time, distance):
-    """Write down the instant of the first touch."""
     observed[COLLIDED] = 1.0
     observed[INSIDE] = 1.0 if distance < observed[ZONE] else 0.0
     observed[D_COLLISION] = distance
@@ -94,7 +92,7 @@ def is_parting(scene, work, observed, time, nx, ny):
 
 
 def is_away(scene, work, observed, distance, gap):
-    """Whether the outlines are further apart than the escape gap."""
+    """Whether the outlines are further apart than the escape gap; cheap bounds first."""
     far = distance - scene.bodies[BODY_I, BOUNDING_RADIUS] - scene.bodies[BODY_J, BOUNDING_RADIUS]
     if far > observed[ESCAPE]:
         return True
@@ -192,11 +190,6 @@ def is_certain(scene, work, observed, time, nx, ny, distance):
     return arms_hold(work, centres, load, nx, ny, distance)
 
 
-def outer_size(scene):
-    """R_i + R_j [m]."""
-    return scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
-
-
 def doublet_pose(work):
     """Place and angle of body 1 in the frame of body 0, which turns with it."""
     now = work.motion
@@ -224,7 +217,8 @@ def has_rested(scene, work, observed, time, nx, ny):
         start_rest(work, observed, time)
         return False
     # A doublet that still swings passes the worst direction, but may yet be thrown open.
-    swing = abs(work.motion[NOW, BODY_I, SPIN]) * outer_size(scene)
+    outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
+    swing = abs(work.motion[NOW, BODY_I, SPIN]) * outer
     if swing > CALM * drift:
         return False
     hanging = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y] >= HANGING * drift

@@ -1,11 +1,14 @@
 """Terminal velocities: where a body's own forces balance."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from flocsim.arrays import BodyView
+from flocsim.body import Body
 from flocsim.errors import UsageError
+from flocsim.system import System
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
@@ -41,7 +44,7 @@ def derivative(force, body, fluid, parameters, velocity):
     return np.array(columns).T
 
 
-def terminal_motion(system, body):
+def terminal_motion(system: System, body: Body) -> tuple[np.ndarray, float]:
     """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
 
     The velocity at which the system's body forces balance; the mobility is the inverse of their
@@ -49,8 +52,9 @@ def terminal_motion(system, body):
     """
     if body.fixed:
         return np.zeros(2), 0.0
-    force = system.pieces.laws.get("body_force", no_force)
-    known = (force, body, system.fluid, system.pieces.parameters)
+    pieces: Any = system.pieces
+    force = pieces.laws.get("body_force", no_force)
+    known = (force, body, system.fluid, pieces.parameters)
     velocity = np.zeros(2)
     for _ in range(ITERATIONS):
         slope = derivative(*known, velocity)
@@ -62,10 +66,10 @@ def terminal_motion(system, body):
             return velocity, float(-1.0 / slope[1, 1])
     raise UsageError(
         "no terminal velocity: a binary collision starts from steady settling, which needs a drag "
-        f"(forces {', '.join(system.pieces.used) or 'none'} do not balance); add [forces.drag]"
+        f"(forces {', '.join(pieces.used) or 'none'} do not balance); add [forces.drag]"
     )
 
 
-def turn_time(radius_i, radius_j, drift):
+def turn_time(radius_i: float, radius_j: float, drift: np.ndarray) -> float:
     """(r_i + r_j)/|relative drift| [s]: how long the pair takes to pass or to turn over."""
     return (radius_i + radius_j) / math.hypot(*drift)

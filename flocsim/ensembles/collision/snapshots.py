@@ -1,9 +1,12 @@
 """Frames of one collision, for drawing: which instants, and what is seen in them."""
 
+from collections.abc import Sequence
+
 import attrs
 import numpy as np
 
 from flocsim.geometry.contact.overlap import touching_points
+from flocsim.geometry.shapes.shape import Shape
 
 
 @attrs.frozen(eq=False)
@@ -15,10 +18,10 @@ class Frames:
     """
 
     times: np.ndarray
-    outlines: list
-    contacts: list
+    outlines: list[list[list[np.ndarray]]]
+    contacts: list[np.ndarray]
     centre_distance: np.ndarray
-    paths: tuple
+    paths: tuple[np.ndarray, np.ndarray]
 
 
 def travelled(position, size):
@@ -41,7 +44,9 @@ def choose_instants(times, position, size, count, collision):
     return np.unique(rows)
 
 
-def frames_of(shapes, times, position, collision, count):
+def frames_of(
+    shapes: Sequence[Shape], times: np.ndarray, position: np.ndarray, collision: float, count: int
+) -> Frames:
     """The Frames of a replicate's motion: ``position`` (k, 2, 3), ``collision`` time [s] or nan."""
     size = 0.5 * sum(shape.bounding_radius for shape in shapes)
     rows = choose_instants(times, position, size, count, collision)

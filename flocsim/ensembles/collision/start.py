@@ -1,24 +1,44 @@
-"""Where a binary collision starts: j above i, displaced sideways, outlines a gap apart."""
+"""How a replicate starts: its random numbers, and j above i, displaced sideways, a gap apart."""
 
 import math
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.circle_tree import core_distance, outlines_of
+from flocsim.geometry.shapes.shape import Shape
 
 MOST_ADVANCES = 1000
 """Moves towards the wanted gap; each is as long as the distance still allows."""
 
 
-def half_extents(shape, angle):
+def draws(seed: int, replicate: int) -> np.ndarray:
+    """Four uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc.
+
+    They depend on the seed and the replicate's index alone, so that no number of ranks changes
+    them, and one replicate has the same orientations and the same flocs at every displacement,
+    number of vertices and type.
+    """
+    stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
+    return np.random.Generator(np.random.Philox(stream)).random(4)
+
+
+def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    """Angles θ = 2πn [rad] of bodies i and j."""
+    return 2.0 * np.pi * numbers[0], 2.0 * np.pi * numbers[1]
+
+
+def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
     """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
     x = shape.placed_vertices(angle=angle)[:, 0]
     return shape.radius - x.min(), shape.radius + x.max()
 
 
-def largest_displacement(rule, shape_i, angle_i, shape_j, angle_j):
+def largest_displacement(
+    rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
+) -> float:
     """δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j ("radius")."""
     if rule == "radius":
         return shape_i.bounding_radius + shape_j.bounding_radius
@@ -49,11 +69,12 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
 
 @cache
 def compiled_height():
-    """`start_height` as machine code."""
     return compose(start_height, {})
 
 
-def place_pair(shapes, angles, displacement, gap):
+def place_pair(
+    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float
+) -> np.ndarray:
     """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius

@@ -5,9 +5,12 @@ roots where S ≤ 4/e², x = −2 W₀(−√S/2) (inner) and −2 W₋₁(−�
 """
 
 import math
+from collections.abc import Sequence
 
+from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
+from flocsim.forces.base import Force
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
@@ -16,7 +19,9 @@ BRANCHES = {"inner": 0, "outer": -1}
 """Branch of the Lambert function that gives each root."""
 
 
-def attraction_ratio(hamaker, potential, debye_length, permittivity):
+def attraction_ratio(
+    hamaker: float, potential: float, debye_length: float, permittivity: float
+) -> float:
     """S = H_A κ/(24π ε0 ε_r φ²) [-]; inf without a potential."""
     layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
     if layer.strength == 0.0:
@@ -24,7 +29,9 @@ def attraction_ratio(hamaker, potential, debye_length, permittivity):
     return hamaker / (6.0 * layer.strength * debye_length**2)
 
 
-def neutral_distance(hamaker, potential, debye_length, permittivity, root):
+def neutral_distance(
+    hamaker: float, potential: float, debye_length: float, permittivity: float, root: str
+) -> float:
     """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
     from scipy.special import lambertw
 
@@ -46,7 +53,6 @@ def neutral_distance(hamaker, potential, debye_length, permittivity, root):
 
 
 def only_one(forces, kind):
-    """The one force of a class; ZoneError unless there is just one."""
     found = [force for force in forces if isinstance(force, kind)]
     if len(found) != 1:
         raise ZoneError(
@@ -56,17 +62,17 @@ def only_one(forces, kind):
     return found[0]
 
 
-def zone_distance(zone, forces, radius_i, radius_j):
+def zone_distance(
+    zone: ZoneConfig, forces: Sequence[Force], radius_i: float, radius_j: float
+) -> float:
     """D_0 [m], the centre distance within which a pair counts as inside the zone."""
     if zone.centre is not None:
         return zone.centre
     if zone.distance is not None:
         return radius_i + radius_j + zone.distance
     attraction, layer = only_one(forces, VanDerWaals), only_one(forces, DoubleLayer)
-    return (
-        radius_i
-        + radius_j
-        + neutral_distance(
-            attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity, zone.root
-        )
-    )
+    distance = neutral_distance(
+        attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity,
+        zone.root or "outer",
+    )  # fmt: skip
+    return radius_i + radius_j + distance

@@ -56,7 +56,6 @@ class Reader:
     problems: Problems
 
     def config_parts(self, table):
-        """Everything of the Config that comes from the tables, by attribute name."""
         for key in table:
             if key not in TOP_KEYS:
                 self.problems.unknown((key,), TOP_KEYS)
@@ -94,7 +93,6 @@ class Reader:
         return self.made(table_class, values, (name,))
 
     def check_alternatives(self, name, table, keys):
-        """Note keys of one table that do not go together."""
         present = [sorted(each & table.keys()) for each in ALTERNATIVES.get(name, ())]
         first, *others = [each for each in present if each] or [[]]
         for key in [key for each in others for key in each]:
@@ -108,7 +106,6 @@ class Reader:
                 self.problems.note((name, key), text)
 
     def library(self, name):
-        """The path of a shape library, noted where no file is there."""
         path = self.folder / name
         if not os.path.isfile(path):
             what = "is no ordinary file" if os.path.exists(path) else "does not exist"

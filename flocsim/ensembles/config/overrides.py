@@ -1,13 +1,15 @@
 """Tables laid over one another: preset, config file, `--set key=value` of the command line."""
 
 import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from flocsim.ensembles.config.schema import ALTERNATIVES
 from flocsim.ensembles.config.toml_text import DEEPEST_TABLE
 from flocsim.errors import ConfigError
 
 
-def lay_over(below, above, path=()):
+def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """``below`` with everything that ``above`` gives put over it; tables are merged.
 
     A key of ALTERNATIVES replaces those below that it excludes. A value None in ``above`` counts
@@ -26,7 +28,7 @@ def lay_over(below, above, path=()):
     return merged
 
 
-def parse_setting(text):
+def parse_setting(text: str) -> tuple[list[str], Any]:
     """(keys, value) of "scene.delta=[0.0, 0.5]"; a value that is no TOML is a string.
 
     So `--set forces.contact.k_n='10 N/m'` needs no quotes within quotes.
@@ -43,9 +45,9 @@ def parse_setting(text):
     return keys, table["value"] if len(table) == 1 else value
 
 
-def nested(settings):
+def nested(settings: Iterable[tuple[list[str], Any]]) -> dict[str, Any]:
     """{"scene": {"delta": …}} of (keys, value) pairs; ConfigError where two cannot both hold."""
-    table = {}
+    table: dict[str, Any] = {}
     for keys, value in settings:
         inner = table
         for key in keys[:-1]:

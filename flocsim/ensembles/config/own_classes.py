@@ -12,6 +12,7 @@ import sys
 import traceback
 from numbers import Real
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -31,7 +32,7 @@ class Kind:
     """What a class named in the config has to be, and how messages call it."""
 
     name: str
-    bases: tuple
+    bases: tuple[type, ...]
     advice: str
     example: str
 
@@ -48,17 +49,17 @@ INTEGRATOR = Kind(
 SHAPE = Kind("shape", (Shape,), "flocsim.geometry.shapes.shape.Shape", "mine:Rod")
 
 
-def named_class(kind, help):
+def named_class(kind: Kind, help: str) -> dict[str, Any]:
     """Metadata of a field for an object of the class that the key ``class`` names."""
     return {"key": "class", "own": kind, "allowed": '`"module:Class"`', "help": help}
 
 
-def full_name(own):
+def full_name(own: object) -> str:
     """ "module:Class" of an object."""
     return f"{type(own).__module__}:{type(own).__qualname__}"
 
 
-def load_class(name, folder, kind):
+def load_class(name: object, folder: Path, kind: Kind) -> type:
     """The class ``name`` = "module:Class" of a Kind; the module lies in ``folder`` or is installed.
 
     Misfit for a name of another form. ConfigError, of one line without the key, for a module that
@@ -72,7 +73,13 @@ def load_class(name, folder, kind):
     module = load_module(module_name, folder)
     where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
     if not hasattr(module, class_name):
-        known = [key for key, value in vars(module).items() if is_own(value, module, kind)]
+        known = [
+            key
+            for key, value in vars(module).items()
+            if inspect.isclass(value)
+            and issubclass(value, kind.bases)
+            and value.__module__ == module.__name__
+        ]
         raise ConfigError(
             f"{where} has no {class_name!r}; its {kind.name}s: {', '.join(known) or 'none'}"
         )
@@ -81,12 +88,6 @@ def load_class(name, folder, kind):
     if wrong:
         raise ConfigError(f"{class_name} of {where} {wrong}")
     return found
-
-
-def is_own(value, module, kind):
-    """Whether the value is a class of the kind that the module itself defines."""
-    right = inspect.isclass(value) and issubclass(value, kind.bases)
-    return right and value.__module__ == module.__name__
 
 
 def why_unfit(found, kind):
@@ -102,16 +103,16 @@ def why_unfit(found, kind):
     return ""
 
 
-def check_integrator(integrator):
+def check_integrator(integrator: Integrator) -> None:
     """ConfigError unless an integrator of the user's own has all that the driver reads of it."""
     for name in ("tolerance", "first_step", "largest_step"):
-        value = getattr(integrator, name)
-        if not isinstance(value, Real) or isinstance(value, bool) or not value > 0.0:
+        value: Any = getattr(integrator, name)
+        if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
             raise ConfigError(f"{name} must be a number above 0, found {value!r}")
     dict(integrator.fillings)  # what it raises is told like a wrong value
 
 
-def check_shape(shape):
+def check_shape(shape: Shape) -> None:
     """ConfigError unless a shape of the user's own is one that can be a body of any size."""
     points = np.asarray(shape.vertices, float)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
@@ -133,22 +134,16 @@ def check_shape(shape):
 
 
 def load_module(name, folder):
-    """The module, from ``folder`` where a file of its name lies there, else as installed."""
-    path = folder / f"{name}.py"
-    try:
-        with searched_first(folder):
-            return run_file(name, path) if path.is_file() else importlib.import_module(name)
-    except (Exception, SystemExit) as error:
-        raise ConfigError(why_not(name, folder, error)) from error
+    """The module, from ``folder`` where a file of its name lies there, else as installed.
 
-
-@contextlib.contextmanager
-def searched_first(folder):
-    """Let a module import its neighbours while it loads, and leave sys.path as it was."""
-    entry = str(folder.resolve())
+    While it loads it may import its neighbours; sys.path is left as it was.
+    """
+    path, entry = folder / f"{name}.py", str(folder.resolve())
     sys.path.insert(0, entry)
     try:
-        yield
+        return run_file(name, path) if path.is_file() else importlib.import_module(name)
+    except (Exception, SystemExit) as error:
+        raise ConfigError(why_not(name, folder, error)) from error
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
@@ -159,10 +154,15 @@ def run_file(name, path):
 
     A file that has not changed is not run again. It is compiled here: Python's cache tells
     versions by a time in whole seconds and could bring back the physics before the last edit.
+    ConfigError where a module of this name, but not of this file, is loaded already.
     """
     file, source = str(path.resolve()), path.read_bytes()
     known = sys.modules.get(name)
-    if known is not None and is_current(known, file, source):
+    if known is not None and not hasattr(known, SOURCE):
+        if os.path.realpath(getattr(known, "__file__", None) or "") != file:
+            raise ConfigError(f"{file} has the name of a module that is already loaded: rename it")
+        return known
+    if known is not None and getattr(known, SOURCE) == (file, source):
         return known
     spec = importlib.util.spec_from_file_location(name, file)
     module = importlib.util.module_from_spec(spec)
@@ -174,15 +174,6 @@ def run_file(name, path):
         raise
     setattr(module, SOURCE, (file, source))
     return module
-
-
-def is_current(known, file, source):
-    """Whether a loaded module is what the file holds; ConfigError if it is somebody else's."""
-    if hasattr(known, SOURCE):
-        return getattr(known, SOURCE) == (file, source)
-    if os.path.realpath(getattr(known, "__file__", None) or "") == file:
-        return True
-    raise ConfigError(f"{file} has the name of a module that is already loaded: rename it")
 
 
 def why_not(name, folder, error):

@@ -65,8 +65,7 @@ takes strings with a unit and checks the dimension; a plain `attrs.field()` take
 """
 
 
-def schema_page():
-    """The whole page as Markdown text."""
+def schema_page() -> str:
     parts = [INTRODUCTION, "## At the top\n", key_table(STUDY_KEYS)]
     tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
     for name, table_class in tables.items():
@@ -82,7 +81,6 @@ def about(documented, name):
 
 
 def key_table(keys):
-    """A Markdown table: key, what it takes, default, meaning."""
     rows = [
         [f"`{key}`", takes(field), default_of(field), field.metadata.get("help", "")]
         for key, field in keys.items()
@@ -91,7 +89,6 @@ def key_table(keys):
 
 
 def takes(field):
-    """What a key takes, in words."""
     metadata = field.metadata
     if metadata.get("flag"):
         return "`true` or `false`"
@@ -101,7 +98,6 @@ def takes(field):
 
 
 def default_of(field):
-    """The default as TOML writes it."""
     shown = field.metadata.get("shown") or as_toml(field.default)
     return shown if shown == "none" else f"`{shown}`"
 
@@ -118,18 +114,14 @@ def as_toml(value):
 
 
 def preset_table():
-    """A Markdown table of every value of every preset."""
-    columns = [dict(flat(preset)) for preset in PRESETS.values()]
+    """Every value of every preset; empty where it does not give a key, "on" for a bare table."""
+    columns = [
+        {key: "on" if value == {} else as_toml(value) for key, value in flat(preset)}
+        for preset in PRESETS.values()
+    ]
     keys = list(dict.fromkeys(key for column in columns for key in column))
-    rows = [[f"`{key}`", *(as_cell(column.get(key)) for column in columns)] for key in keys]
+    rows = [[f"`{key}`", *(column.get(key, "") for column in columns)] for key in keys]
     return markdown_table(["key", *(f"`{name}`" for name in PRESETS)], rows) + "\n"
-
-
-def as_cell(value):
-    """A preset's value; empty where the preset does not give the key, "on" for a bare table."""
-    if value is None:
-        return ""
-    return "on" if value == {} else as_toml(value)
 
 
 def flat(table, around=""):

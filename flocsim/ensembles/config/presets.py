@@ -15,7 +15,9 @@
   where the repulsion has long died out.
 """
 
-TANG2014 = {
+from typing import Any
+
+TANG2014: dict[str, Any] = {
     "bodies": {"surface_density": 2.0},
     "fluid": {"viscosity": 8.9e-4, "buoyancy": False},
     "forces": {
@@ -38,7 +40,7 @@ TANG2014_LITERAL = TANG2014 | {
     | {"double_layer": TANG2014["forces"]["double_layer"] | {"debye_length": 0.98e-9}}
 }
 
-SI = {
+SI: dict[str, Any] = {
     "bodies": {"density": 2650.0, "depth": "sphere"},
     "fluid": {"viscosity": 8.9e-4, "density": 997.0, "buoyancy": True},
     "forces": {

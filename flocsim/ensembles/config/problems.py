@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections.abc import Iterable, Mapping
 
 import attrs
 
@@ -15,17 +16,17 @@ BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 class Misfit(ValueError):
     """A value that does not fit; ``findings`` are pairs (place such as "[2]", what is wrong)."""
 
-    def __init__(self, *findings):
+    def __init__(self, *findings: tuple[str, str]) -> None:
         self.findings = findings
         super().__init__("; ".join(f"{place} {text}".strip() for place, text in findings))
 
 
-def misfit(allowed, value, hint=""):
+def misfit(allowed: str, value: object, hint: str = "") -> Misfit:
     """The Misfit "must be ALLOWED, found VALUE"."""
     return Misfit(("", f"must be {allowed}, found {show(value)}{hint}"))
 
 
-def show(value):
+def show(value: object) -> str:
     """A value as a config file writes it, on one short line."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -39,13 +40,13 @@ def show(value):
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "…"
 
 
-def suggestion(word, words):
+def suggestion(word: str, words: Iterable[str]) -> str:
     """ " (did you mean …?)", or "" where nothing is close."""
     close = difflib.get_close_matches(word, words, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
-def dotted(place):
+def dotted(place: Iterable[str]) -> str:
     """The keys as TOML writes them, "forces.contact.k_n"."""
     return ".".join(key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
 
@@ -56,34 +57,37 @@ class Problems:
 
     file: str
     text: str
-    overrides: dict
-    found: list = attrs.Factory(list)
+    overrides: Mapping
+    found: list[tuple[tuple[str, ...], str]] = attrs.Factory(list)
 
-    def misfit(self, place, error):
-        """Note the findings of a Misfit of the value at ``place``."""
+    def misfit(self, place: tuple[str, ...], error: Misfit) -> None:
         for index, text in error.findings:
             self.found.append((place, f"{dotted(place)}{index} {text}"))
 
-    def note(self, place, text):
+    def note(self, place: tuple[str, ...], text: str) -> None:
         """Note anything else that is wrong at ``place``, () being the whole file."""
         self.found.append((place, f"{dotted(place)}: {text}" if place else text))
 
-    def unknown(self, place, known):
-        """Note the last key of ``place``, which is none of those known."""
+    def unknown(self, place: tuple[str, ...], known: Iterable[str]) -> None:
         words = f"known: {', '.join(known)}" if known else "there are none here"
         self.note(place, f"unknown key{suggestion(place[-1], known)}; {words}")
 
-    def at(self, *tables):
+    def at(self, *tables: str) -> bool:
         """Whether anything within one of the top-level tables was found wrong."""
         return any(place[:1] == (table,) for place, _ in self.found for table in tables)
 
-    def raise_if_any(self):
+    def raise_if_any(self) -> None:
         """ConfigError with one line per problem, in the order of the file."""
         if self.found:
             lines = key_lines(self.text)
             located = [(self.line_of(place, lines), text) for place, text in self.found]
             located.sort(key=lambda item: item[0])
-            raise ConfigError("\n".join(f"{self.label(line)}: {text}" for line, text in located))
+            places = {-1: f"given over {self.file}", 0: self.file}
+            raise ConfigError(
+                "\n".join(
+                    f"{places.get(line, f'{self.file}:{line}')}: {text}" for line, text in located
+                )
+            )
 
     def line_of(self, place, lines):
         """The line of the key or of the nearest table around it; else 0, and −1 if overridden."""
@@ -94,9 +98,3 @@ class Problems:
             return -1
         around = (lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in lines)
         return next(around, 0)
-
-    def label(self, line):
-        """Where a problem is, for the front of its line."""
-        if line < 0:
-            return f"given over {self.file}"
-        return f"{self.file}:{line}" if line else self.file

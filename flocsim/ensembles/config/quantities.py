@@ -34,34 +34,28 @@ SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶�
 DIGITS = 60
 
 
-def kind_of(unit):
+def kind_of(unit: str) -> str:
     """What a value of the unit is, in words: "an energy such as '1e-18 J'"."""
     name, example = KINDS.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
     return f"{name} such as {example!r}"
 
 
-def read_quantity(text, unit):
+def read_quantity(text: str, unit: str) -> float:
     """The value of ``text``, a number and its unit, in ``unit`` as a float.
 
     The conversion is decimal: ``read_quantity("16.41 um", "m") == 16.41e-6``. Units multiply by a
     space, "*" or "·", divide by "/", and have whole exponents: "mPa s", "kg/m^3", "kg m-3", "m²".
     ValueError, with the reason, for text that is no quantity or has another dimension.
     """
-    number, written = split_quantity(text)
-    with localcontext() as context:
-        context.prec = DIGITS
-        return float(number * factor(written, unit))
-
-
-def split_quantity(text):
-    """The number (Decimal) and the text of the unit behind it."""
     match = NUMBER.fullmatch(text)
     if not match:
         raise ValueError("no number in front")
     written = match[2].translate(SIGNS).strip()
     if not written:
         raise ValueError("a number in quotes needs a unit")
-    return Decimal(match[1]), written
+    with localcontext() as context:
+        context.prec = DIGITS
+        return float(Decimal(match[1]) * factor(written, unit))
 
 
 @functools.cache
@@ -86,23 +80,20 @@ def factor(written, unit):
 
 def parse_unit(text):
     """A product of powers of units. Read here, since pint would evaluate "9**9**9 m"."""
-    product = registry().Unit("dimensionless")
+    import pint
+
+    units = registry()
+    product = units.Unit("dimensionless")
     place = 1 if re.match(r"1\s*/", text) else 0
     while place < len(text):
         match = UNIT_FACTOR.match(text, place)
         if not match or not match[2].isidentifier():
             raise ValueError(f"{text[place:].strip()!r} is no unit")
+        try:
+            one = units.Unit(match[2])
+        except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
+            raise ValueError(f"unknown unit {match[2]!r}") from error
         exponent = int(match[3] or 1)
-        product = product * named_unit(match[2]) ** (-exponent if match[1] == "/" else exponent)
+        product = product * one ** (-exponent if match[1] == "/" else exponent)
         place = match.end()
     return product
-
-
-def named_unit(name):
-    """One unit by its name; ValueError if there is none."""
-    import pint
-
-    try:
-        return registry().Unit(name)
-    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
-        raise ValueError(f"unknown unit {name!r}") from error

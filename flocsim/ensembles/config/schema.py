@@ -9,8 +9,10 @@ schema alone: ``shown`` is the default where it depends on other keys, ``only_fo
 of flocs that a key goes with; ``beside_class`` marks keys that stay where a class is named.
 """
 
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import attrs
 
@@ -37,6 +39,7 @@ from flocsim.ensembles.config.values import (
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.forces.base import Force
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
 
@@ -47,7 +50,7 @@ TYPES = {"I": (16.41e-6, 23.02e-6), "II": (4.95e-6, 23.02e-6), "III": (4.62e-6, 
 """Equivalent radii (receiving, approaching) [m] of the paper's three types of collision."""
 
 
-def unless_own(value, of_own=lambda own: None):
+def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> Any:
     """A default: the value, or what follows from the user's own object where there is one."""
     return attrs.Factory(
         lambda self: value if self.own is None else of_own(self.own), takes_self=True
@@ -58,7 +61,7 @@ def unless_own(value, of_own=lambda own: None):
 class SceneConfig:
     """[scene]: who meets whom, and how the meeting begins and ends."""
 
-    pairs: tuple = read_by(
+    pairs: tuple[tuple[float, float], ...] | None = read_by(
         list_of(
             vector(2, "m", above=0.0, at_most=LARGEST_LENGTH),
             "a list of pairs such as [['16.41 um', '23.02 um']]",
@@ -68,7 +71,7 @@ class SceneConfig:
         unit="m",
         help="equivalent radii (receiving, approaching), instead of `types`",
     )
-    types: tuple = read_by(
+    types: tuple[str, ...] | None = read_by(
         list_of(one_of(tuple(TYPES)), "a list of 'I', 'II', 'III'"),
         'a list of "I", "II", "III"',
         default=attrs.Factory(lambda self: None if self.pairs else tuple(TYPES), takes_self=True),
@@ -76,7 +79,7 @@ class SceneConfig:
         help="the paper's collision types: (r_i, r_j) = I (16.41, 23.02), "
         "II (4.95, 23.02), III (4.62, 4.95) µm",
     )
-    delta: tuple = read_by(
+    delta: tuple[float, ...] = read_by(
         list_of(number("", *number_range(at_least=0.0)), "a list of fractions such as [0.0, 0.5]"),
         "a list of distinct numbers, each at least 0",
         default=(0.0, 0.25, 0.5, 0.75, 1.0),
@@ -122,19 +125,17 @@ class SceneConfig:
     )
 
     @property
-    def conditions(self):
-        """(name, r_i, r_j) [-, m, m] of every collision type or pair, in the config's order."""
+    def conditions(self) -> tuple[tuple[str, float, float], ...]:
+        """(name, r_i, r_j) [-, m, m] of every collision type or pair, in the config's order.
+
+        A pair is called "16.41um-23.02um".
+        """
         if self.pairs:
-            return tuple((pair_name(*pair), *pair) for pair in self.pairs)
-        return tuple((name, *TYPES[name]) for name in self.types)
+            return tuple((f"{micrometres(i)}um-{micrometres(j)}um", i, j) for i, j in self.pairs)
+        return tuple((name, *TYPES[name]) for name in self.types or ())
 
 
-def pair_name(radius_i, radius_j):
-    """ "16.41um-23.02um", of radii in metres."""
-    return f"{micrometres(radius_i)}um-{micrometres(radius_j)}um"
-
-
-def micrometres(length):
+def micrometres(length: float) -> str:
     """A length [m] in µm, with just the digits that it has: 16.41e-6 → "16.41"."""
     return format(Decimal(repr(float(length))).scaleb(6).normalize(), "f")
 
@@ -160,7 +161,7 @@ class StopConfig:
         default=None,
         help="largest half-width of the 95 % intervals; none: run all",
     )
-    of: tuple = read_by(
+    of: tuple[str, ...] = read_by(
         list_of(one_of(ESTIMATES), "a list of estimates"),
         f"a list of {', '.join(ESTIMATES)}",
         default=("pr_inside", "pr_a"),
@@ -215,7 +216,7 @@ class ShapesConfig:
             "only_for": "library",
         },
     )
-    vertices: tuple = read_by(
+    vertices: tuple[int, ...] = read_by(
         list_of(whole(1, MOST_VERTICES), "a list of integers such as [1, 4, 16]"),
         f"a list of distinct integers from 1 to {MOST_VERTICES}",
         default=unless_own((1, 4, 16, 64), lambda own: (len(own.vertices),)),
@@ -247,7 +248,14 @@ class ShapesConfig:
 
     def __attrs_post_init__(self):
         if self.own is not None:
-            self.check_own()
+            check_shape(self.own)
+            known = (1, len(self.own.vertices))
+            for count in self.vertices:
+                if count not in known:
+                    raise ConfigError(
+                        f"vertices may be 1, the equivalent sphere, and {known[1]}, the core "
+                        f"points of {full_name(self.own)}, found {count}"
+                    )
         if self.source == "library" and self.file is None:
             raise ConfigError(
                 'source = "library" needs file, the shape library that `flocsim fit` wrote'
@@ -258,19 +266,8 @@ class ShapesConfig:
                 "change source"
             )
 
-    def check_own(self):
-        """ConfigError unless the user's own shape is whole and ``vertices`` fit it."""
-        check_shape(self.own)
-        known = (1, len(self.own.vertices))
-        for count in self.vertices:
-            if count not in known:
-                raise ConfigError(
-                    f"vertices may be 1, the equivalent sphere, and {known[1]}, the core points of "
-                    f"{full_name(self.own)}, found {count}"
-                )
-
     @property
-    def label(self):
+    def label(self) -> str:
         """The source, or the name of the user's own class."""
         return self.source or full_name(self.own)
 
@@ -321,7 +318,7 @@ class ZoneConfig:
     )
 
 
-METHODS = {
+METHODS: dict[str, type] = {
     "implicit": Implicit,
     "dormand_prince54": DormandPrince54,
     "overdamped": Overdamped,
@@ -372,16 +369,15 @@ class IntegratorConfig:
             )
 
     @property
-    def label(self):
+    def label(self) -> str:
         """The name, or that of the user's own class."""
         return self.name or full_name(self.own)
 
     @property
-    def method(self):
-        """The Integrator itself."""
+    def method(self) -> Integrator:
         if self.own is not None:
             return self.own
-        made = METHODS[self.name]
+        made = METHODS[self.name or "implicit"]
         keys = attrs.fields_dict(type(self)).keys() & attrs.fields_dict(made).keys()
         return made(**{key: getattr(self, key) for key in keys})
 
@@ -416,25 +412,25 @@ class Config:
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)
     fluid: Fluid = attrs.Factory(Fluid)
-    forces: tuple = attrs.field(kw_only=True)
-    force_names: tuple = attrs.field(kw_only=True)
+    forces: tuple[Force, ...] = attrs.field(kw_only=True)
+    force_names: tuple[str, ...] = attrs.field(kw_only=True)
     zone: ZoneConfig = attrs.Factory(ZoneConfig)
     integrator: IntegratorConfig = attrs.Factory(IntegratorConfig)
     stop: StopConfig = attrs.Factory(StopConfig)
     output: OutputConfig = attrs.Factory(OutputConfig)
     text: str = ""
     folder: Path = attrs.Factory(Path)
-    overrides: dict = attrs.Factory(dict)
+    overrides: dict[str, Any] = attrs.Factory(dict)
 
     @property
-    def body_options(self):
+    def body_options(self) -> dict[str, Any]:
         """The bodies' weight as keyword arguments of flocsim.body.Body."""
         if self.bodies.density is None:
             return {"surface_density": self.bodies.surface_density}
         return {"density": self.bodies.density, "depth": self.bodies.depth}
 
 
-def keys_of(some_class):
+def keys_of(some_class: type) -> dict[str, attrs.Attribute]:
     """Key in the config → attrs field, for all fields that the class is made with."""
     return {
         field.metadata.get("key", field.alias): field
@@ -443,7 +439,9 @@ def keys_of(some_class):
     }
 
 
-TABLES = {field.name: field.type for field in attrs.fields(Config) if attrs.has(field.type)}
+TABLES = {
+    field.name: field.type for field in attrs.fields(Config) if field.type and attrs.has(field.type)
+}
 """Name of a top-level table → class; [forces] is read by itself."""
 
 STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" in field.metadata}
@@ -451,7 +449,7 @@ STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" 
 
 TOP_KEYS = (*STUDY_KEYS, *TABLES, "forces")
 
-FORCES = {
+FORCES: dict[str, type] = {
     "gravity": Gravity,
     "drag": StokesDrag,
     "van_der_waals": VanDerWaals,
@@ -460,7 +458,7 @@ FORCES = {
 }
 """Name of the table [forces.NAME] → class, in the order of Config.forces."""
 
-ALTERNATIVES = {
+ALTERNATIVES: dict[str, tuple[set[str], ...]] = {
     "scene": ({"types"}, {"pairs"}),
     "shapes": ({"source"}, {"class"}),
     "bodies": ({"surface_density"}, {"density", "depth"}),
@@ -470,11 +468,13 @@ ALTERNATIVES = {
 """Table → sets of keys that exclude each other: one of them replaces the others from below."""
 
 
-def contradictions(bodies, fluid):
+def contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[tuple[tuple[str, ...], str]]:
     """(place, what is wrong) of values that do not go together though each is right by itself."""
-    if fluid.buoyancy and bodies.density is None:
+    if not fluid.buoyancy:
+        return
+    if bodies.density is None:
         text = "true needs bodies.density, but bodies.surface_density is given: give density and "
         yield ("fluid", "buoyancy"), text + "depth instead, or buoyancy = false"
-    elif fluid.buoyancy and bodies.density <= fluid.density:
+    elif bodies.density <= fluid.density:
         text = f"{bodies.density:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
         yield ("bodies", "density"), text + "give a larger density, or fluid.buoyancy = false"

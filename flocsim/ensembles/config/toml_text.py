@@ -1,8 +1,10 @@
 """The text of a TOML file: read, parsed, and the lines of its keys."""
 
 import itertools
+import os
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 from flocsim.errors import ConfigError
@@ -16,7 +18,7 @@ MOST_ATTEMPTS = 300
 CLOSERS = ("]", "}", '"""', "'''")
 
 
-def read_text_file(path):
+def read_text_file(path: str | os.PathLike) -> str:
     """The text of the file, its line ends as "\\n"; ConfigError of one line where there is none."""
     try:
         if not Path(path).exists():
@@ -36,32 +38,30 @@ def read_text_file(path):
         raise ConfigError(f"{path}: could not be read: {reason}") from error
 
 
-def parse(path, text):
+def parse(path: str | os.PathLike, text: str) -> dict:
     """The TOML tables; ConfigError with file and line where the text is not TOML."""
     try:
         return tomllib.loads(text)
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid TOML: nested too deeply") from error
     except ValueError as error:
-        raise ConfigError(syntax_error(path, text, str(error))) from error
+        # tomllib says "WHAT (at line 3, column 5)".
+        match = TOML_PLACE.fullmatch(str(error))
+        if not match:
+            what = str(error).split(";")[0]
+            raise ConfigError(f"{path}: not valid TOML: {what}") from error
+        line = match[2] or len(text.rstrip("\n").split("\n"))
+        column = f" (column {match[3]})" if match[3] else ""
+        raise ConfigError(f"{path}:{line}: not valid TOML: {match[1]}{column}") from error
 
 
-def syntax_error(path, text, message):
-    """tomllib's message, "WHAT (at line 3, column 5)", with the place in front."""
-    match = TOML_PLACE.fullmatch(message)
-    if not match:
-        return f"{path}: not valid TOML: {message.split(';')[0]}"
-    line = match[2] or len(text.rstrip("\n").split("\n"))
-    column = f" (column {match[3]})" if match[3] else ""
-    return f"{path}:{line}: not valid TOML: {match[1]}{column}"
-
-
-def key_lines(text):
+def key_lines(text: str) -> dict[tuple[str, ...], int]:
     """Place of every key and table of a valid TOML text → number of its line.
 
     Each header and each ``key = value`` is valid TOML by itself, so tomllib finds where it ends.
     """
-    lines, header = {}, ()
+    lines: dict[tuple[str, ...], int] = {}
+    header: tuple[str, ...] = ()
     for start, table, is_header in statements(text):
         places = places_in(table)
         header = places[-1] if is_header and places else header
@@ -70,7 +70,7 @@ def key_lines(text):
     return lines
 
 
-def statements(text):
+def statements(text: str) -> Iterator[tuple[int, dict, bool]]:
     """(number of its first line, tables, whether it is a header) of each statement in turn.
 
     Stops early in a statement of very many lines, each of which might be the last.
@@ -98,7 +98,6 @@ def may_close(line):
 
 
 def parse_or_none(statement):
-    """The tables of a whole statement, None while it goes on."""
     try:
         return tomllib.loads(statement)
     except (ValueError, RecursionError):

@@ -6,7 +6,9 @@ makes a field that has a reader of its own.
 """
 
 import math
+from collections.abc import Callable, Collection
 from types import SimpleNamespace
+from typing import Any
 
 import attrs
 
@@ -15,9 +17,10 @@ from flocsim.ensembles.config.quantities import kind_of, read_quantity
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
 
+Reader = Callable[[Any], Any]
 
-def reader_of(attribute):
-    """The reader of an attrs field, of flocsim's or of a user's class."""
+
+def reader_of(attribute: attrs.Attribute) -> Reader:
     metadata = attribute.metadata
     if "read" in metadata:
         return metadata["read"]
@@ -47,7 +50,7 @@ def passes(attribute):
     return check
 
 
-def read_by(read, allowed, *, default=attrs.NOTHING, **metadata):
+def read_by(read: Reader, allowed: str, *, default: Any = attrs.NOTHING, **metadata: Any) -> Any:
     """A field with a reader of its own, which holds in Python too."""
 
     def check(instance, attribute, value):
@@ -62,28 +65,25 @@ def read_by(read, allowed, *, default=attrs.NOTHING, **metadata):
     return attrs.field(default=default, validator=check, metadata=metadata)
 
 
-def whole_field(at_least, at_most, **more):
-    """A field that takes an integer within the limits."""
+def whole_field(at_least: int, at_most: int, **more: Any) -> Any:
     allowed = f"an integer from {at_least} to {at_most}"
     return read_by(whole(at_least, at_most), allowed, **more)
 
 
-def read_flag(value):
+def read_flag(value: object) -> bool:
     if not isinstance(value, bool):
         raise misfit("true or false", value)
     return value
 
 
-def read_text(value):
+def read_text(value: object) -> str:
     """A string of printable characters that is not blank."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise misfit("a string that is not blank", value)
     return value
 
 
-def one_of(choices):
-    """A reader of one of the words."""
-
+def one_of(choices: Collection[str]) -> Reader:
     def read(value):
         if not isinstance(value, str) or value not in choices:
             hint = suggestion(value, choices) if isinstance(value, str) else ""
@@ -93,7 +93,7 @@ def one_of(choices):
     return read
 
 
-def whole(at_least, at_most):
+def whole(at_least: int, at_most: int) -> Reader:
     """A reader of integers within the limits; 3.0 is none."""
 
     def read(value):
@@ -104,7 +104,9 @@ def whole(at_least, at_most):
     return read
 
 
-def number(unit, check, allowed, choices=()):
+def number(
+    unit: str, check: Callable[[float], bool], allowed: str, choices: Collection[str] = ()
+) -> Reader:
     """A reader of a number in a unit, as such or as a string such as "16.41 um", or of a choice.
 
     ``check`` and ``allowed`` say what numbers are right, as flocsim.fields.number_range does.
@@ -132,7 +134,9 @@ def number(unit, check, allowed, choices=()):
     return read
 
 
-def list_of(read_item, allowed, length=None, distinct=True):
+def list_of(
+    read_item: Reader, allowed: str, length: int | None = None, distinct: bool = True
+) -> Reader:
     """A reader of lists with at least one item, or of a ``length``; returns a tuple.
 
     Its Misfit tells the findings of all items. ``distinct`` items are no two the same.
@@ -160,7 +164,7 @@ def list_of(read_item, allowed, length=None, distinct=True):
     return read
 
 
-def vector(length, unit="", **limits):
+def vector(length: int, unit: str = "", **limits: float) -> Reader:
     """A reader of exactly ``length`` numbers; returns a tuple of floats."""
     allowed = f"a list of {length} numbers" + (f" [{unit}]" if unit else "")
     return list_of(number(unit, *number_range(**limits)), allowed, length, distinct=False)

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.results.schema import CLASSES
+from flocsim.io.results.schema import CLASSES, Results
 
 
 @attrs.frozen(eq=False)
@@ -26,7 +26,7 @@ class OutcomeChanges:
     outcome: np.ndarray
 
 
-def outcome_changes(found, exact):
+def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
     """The OutcomeChanges of ``found`` against ``exact``, Results of the same conditions.
 
     Replicates are paired; the shorter of the two decides how many are compared. UsageError where
@@ -39,13 +39,14 @@ def outcome_changes(found, exact):
     )
     if not same:
         raise UsageError("the two results are not of the same conditions: name runs of one config")
-    count = min(found.count, exact.count)
-    a, b = (each.replicates["outcome"][..., :count] for each in (found, exact))
+    outcomes = [each.replicates["outcome"] for each in (found, exact) if each.replicates]
+    count = min(each.shape[-1] for each in outcomes)
+    a, b = (each[..., :count] for each in outcomes)
     both = (a < len(CLASSES)) & (b < len(CLASSES))
     return OutcomeChanges(both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), a != b)
 
 
-def percent_changed(changed, among):
+def percent_changed(changed: np.ndarray, among: np.ndarray) -> float:
     """Percent of what is in ``among`` that has changed; NaN of nothing."""
     count = np.count_nonzero(among)
     return 100.0 * np.count_nonzero(changed & among) / count if count else np.nan

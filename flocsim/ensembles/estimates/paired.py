@@ -5,27 +5,23 @@ them is correlated, and the difference is known better than from independent sam
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.statistics import AGGREGATED, DECIDED
 from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import AXES, NOT_APPLICABLE
 
 
-def events_of(outcome, inside):
-    """(counts, happens) of the two events, each (2, …): a collision is inside; it aggregates."""
-    counts = np.stack([inside != NOT_APPLICABLE, outcome < DECIDED])
-    happens = np.stack([inside == 1, np.isin(outcome, AGGREGATED)])
-    return counts, happens & counts
-
-
-def joint_counts(outcome, inside):
+def joint_counts(outcome: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """How often an event happens in both, here only, there only, in neither.
 
     ``outcome``, ``inside``: codes (type, vertices, delta, replicate). Returns whole numbers
     (against, event, type, vertices, delta, 4): each condition and the first along each axis, over
     the replicates that count in both.
     """
-    counts, happens = events_of(outcome, inside)
+    # The two events (2, …): a collision is inside; it aggregates.
+    counts = np.stack([inside != NOT_APPLICABLE, outcome < DECIDED])
+    happens = counts & np.stack([inside == 1, np.isin(outcome, AGGREGATED)])
     tables = []
     for axis in range(1, 1 + len(AXES)):
         first_counts = np.take(counts, [0], axis)
@@ -36,7 +32,7 @@ def joint_counts(outcome, inside):
     return np.stack(tables)
 
 
-def paired_differences(joint):
+def paired_differences(joint: np.ndarray) -> dict[str, np.ndarray]:
     """The arrays of DIFFERENCES from joint counts (…, 4); NaN where no replicate counts."""
     joint = np.asarray(joint)
     pairs = joint.sum(axis=-1)
@@ -49,15 +45,18 @@ def paired_differences(joint):
     }
 
 
-def newcombe(both, here, there, neither):
+def newcombe(
+    both: ArrayLike, here: ArrayLike, there: ArrayLike, neither: ArrayLike
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(difference, low, high) of two paired proportions: here minus there, 95 %.
 
     ``both``, ``here`` only, ``there`` only, ``neither``: whole-number counts. Wilson's intervals
     of the two, joined by squares with the correlation φ between them. Source: R. G. Newcombe,
     Stat. Med. 17 (1998) 2635–2650, method 10.
     """
-    counts = (np.asarray(each, dtype=float) for each in (both, here, there, neither))
-    both, here, there, neither = counts
+    both, here, there, neither = (
+        np.asarray(each, dtype=float) for each in (both, here, there, neither)
+    )
     n = both + here + there + neither
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (both + here) / n, (both + there) / n
@@ -70,7 +69,6 @@ def newcombe(both, here, there, neither):
 
 
 def joined(one, other, phi):
-    """√(a² − 2φab + b²)."""
     return np.sqrt(np.maximum(one * one - 2.0 * phi * one * other + other * other, 0.0))
 
 

@@ -6,7 +6,10 @@ number of independent events which the spread between replicates shows (a ratio 
 W. G. Cochran, Sampling Techniques, 1977, ch. 6).
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flocsim.errors import UsageError
 from flocsim.io.confidence import clustered_proportion, proportion, wilson
@@ -23,7 +26,7 @@ AGGREGATED = (0, 2)
 INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
 
 
-def tabulate(outcome, inside):
+def tabulate(outcome: ArrayLike, inside: ArrayLike) -> dict[str, np.ndarray]:
     """Counts and probabilities of every condition, over the last axis of the arrays.
 
     ``outcome``, ``inside``: codes as in the results file, (…, replicate), in practice
@@ -31,12 +34,11 @@ def tabulate(outcome, inside):
     A–D: the counts ``n_*`` (see `count`) and the probabilities of `probabilities`.
     Raises UsageError for unknown codes, and where outcome and inside contradict each other.
     """
-    outcome, inside = checked_codes(outcome, inside)
-    counts = count(outcome, inside)
+    counts = count(*checked_codes(outcome, inside))
     return counts | probabilities(counts)
 
 
-def count(outcome, inside):
+def count(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
     """Whole-number counts over the last axis.
 
     n_total = n_missed + n_undecided + n_failed + Σ n_class. n_collided counts every replicate
@@ -55,7 +57,7 @@ def count(outcome, inside):
     }
 
 
-def probabilities(counts):
+def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Probabilities with Wilson 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
 
     pr_inside = n_inside / n_collided: where the outlines first touched is known for every one.
@@ -73,15 +75,15 @@ def probabilities(counts):
         "pr_a": (a + c, decided),
         "pr_class": (counts["n_class"], decided[..., np.newaxis]),
     }
-    table = {}
+    table: dict[str, np.ndarray] = {}
     for name, (successes, trials) in estimates.items():
         values = proportion(successes, trials)
         table |= zip((name, f"{name}_low", f"{name}_high"), values, strict=True)
     return table
 
 
-def checked_codes(outcome, inside):
-    """Both arrays, after a check that every replicate's outcome and inside agree."""
+def checked_codes(outcome: ArrayLike, inside: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Both arrays; UsageError where a replicate's outcome and inside contradict each other."""
     outcome, inside = np.asarray(outcome), np.asarray(inside)
     if outcome.shape != inside.shape or outcome.ndim == 0:
         raise UsageError(
@@ -100,27 +102,23 @@ def checked_codes(outcome, inside):
     return outcome, inside
 
 
-def trials_of(outcome, inside):
-    """{estimate: (trials, successes)}, flags of the codes' shape."""
-    aggregated = np.isin(outcome, AGGREGATED)
-    within = np.isin(outcome, INSIDE_CLASSES)
-    without = np.isin(outcome, OUTSIDE_CLASSES)
-    return {
-        "pr_inside": (inside != NOT_APPLICABLE, inside == 1),
-        "pr_a_given_inside": (within, within & aggregated),
-        "pr_a_given_outside": (without, without & aggregated),
-        "pr_a": (outcome < DECIDED, aggregated),
-    }
-
-
-def pooled_sums(outcome, inside):
+def pooled_sums(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
     """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
 
     S and M are a replicate's successes and trials over all displacements; sums are over
     replicates. Codes are (type, vertices, delta, replicate).
     """
+    aggregated = np.isin(outcome, AGGREGATED)
+    within = np.isin(outcome, INSIDE_CLASSES)
+    without = np.isin(outcome, OUTSIDE_CLASSES)
+    estimates = {
+        "pr_inside": (inside != NOT_APPLICABLE, inside == 1),
+        "pr_a_given_inside": (within, within & aggregated),
+        "pr_a_given_outside": (without, without & aggregated),
+        "pr_a": (outcome < DECIDED, aggregated),
+    }
     sums = {}
-    for name, (trials, successes) in trials_of(outcome, inside).items():
+    for name, (trials, successes) in estimates.items():
         m = np.sum(trials, axis=2, dtype=np.int64)
         s = np.sum(successes, axis=2, dtype=np.int64)
         terms = (s, m, s * s, s * m, m * m, m > 0)
@@ -128,9 +126,9 @@ def pooled_sums(outcome, inside):
     return sums
 
 
-def pooled_probabilities(sums):
+def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The arrays of POOLED; NaN where there was no event."""
-    table = {}
+    table: dict[str, np.ndarray] = {}
     for name, each in sums.items():
         share, low, high, effective = clustered_proportion(*each.astype(float))
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}

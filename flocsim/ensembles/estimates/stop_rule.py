@@ -5,6 +5,7 @@ import math
 import attrs
 import numpy as np
 
+from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.statistics import count, probabilities
 from flocsim.ensembles.storage.row_store import RowStore
 
@@ -12,7 +13,7 @@ GROWTH = 1.25
 """Each look is at so many times the replicates of the one before."""
 
 
-def borders(stop, replicates):
+def borders(stop: StopConfig, replicates: int) -> list[int]:
     """The numbers of replicates at which the rule looks; the last is ``replicates``."""
     looks = []
     look = stop.least
@@ -26,29 +27,28 @@ def borders(stop, replicates):
 class StopRule:
     """Whether the first so many replicates of every condition are enough. Counts as it goes."""
 
-    stop: object
+    stop: StopConfig
     store: RowStore
     seen: int = 0
-    counts: list = None
+    counts: list[dict[str, np.ndarray]] = attrs.Factory(list)
 
-    def __call__(self, replicates):
+    def __call__(self, replicates: int) -> bool:
         """Whether the study may end with this many, all of which exist."""
         for place in range(len(self.store.conditions)):
             codes = (
                 self.store.read(place, name, self.seen, replicates)
                 for name in ("outcome", "inside")
             )
-            self.add(place, count(*codes))
+            more = count(*codes)
+            if place == len(self.counts):
+                self.counts.append(more)
+            else:
+                before = self.counts[place]
+                self.counts[place] = {name: more[name] + before[name] for name in more}
         self.seen = replicates
         if self.stop.half_width is None:
             return False
         return all(self.is_narrow(counts) for counts in self.counts)
-
-    def add(self, place, more):
-        if self.counts is None:
-            self.counts = [None] * len(self.store.conditions)
-        before = self.counts[place]
-        self.counts[place] = {n: more[n] + (before[n] if before else 0) for n in more}
 
     def is_narrow(self, counts):
         table = probabilities(counts)

@@ -8,6 +8,8 @@ import collections
 import os
 import sys
 import time
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 from flocsim.errors import FlocsimError
 from flocsim.interruption import INTERRUPTION, LAUNCHER_RANKS, stop_requested
@@ -33,24 +35,35 @@ class Communicator:
     says whether a thread of rank 0 may send and receive while the main one computes.
     """
 
+    rank: int
+    size: int
     threads = True
 
-    def __init__(self):
-        self.inbox = collections.defaultdict(collections.deque)
+    def __init__(self) -> None:
+        self.inbox: dict[int, collections.deque] = collections.defaultdict(collections.deque)
 
-    def take_in(self):
+    def send(self, to: int, message: Any) -> None:
+        raise NotImplementedError
+
+    def arrived(self) -> Iterable[tuple[int, Any]]:
+        raise NotImplementedError
+
+    def abort(self, code: int) -> None:
+        raise NotImplementedError
+
+    def take_in(self) -> None:
         """Put what has come into the inbox."""
         for source, message in self.arrived():
             self.inbox[source].append(message)
 
-    def messages(self):
+    def messages(self) -> Iterator[tuple[int, Any]]:
         """(source, message) of all that is here."""
         self.take_in()
         for source in [source for source, queue in self.inbox.items() if queue]:
             while self.inbox[source]:
                 yield source, self.inbox[source].popleft()
 
-    def receive(self, source, heed_signals=True):
+    def receive(self, source: int, heed_signals: bool = True) -> Any:
         """The next message of a rank; StopRequested where a signal comes first."""
         while not self.inbox[source]:
             self.take_in()
@@ -61,14 +74,14 @@ class Communicator:
             time.sleep(SLEEP)
         return self.inbox[source].popleft()
 
-    def gather(self, value):
+    def gather(self, value: Any) -> list | None:
         """The values of all ranks, on rank 0."""
         if self.rank > 0:
             self.send(0, value)
             return None
         return [value, *(self.receive(rank) for rank in range(1, self.size))]
 
-    def broadcast(self, value):
+    def broadcast(self, value: Any) -> Any:
         """Rank 0's value, on all ranks."""
         if self.rank > 0:
             return self.receive(0)
@@ -76,15 +89,14 @@ class Communicator:
             self.send(rank, value)
         return value
 
-    def all_gather(self, value):
+    def all_gather(self, value: Any) -> list:
         """The values of all ranks, on all ranks."""
         return self.broadcast(self.gather(value))
 
-    def barrier(self):
-        """Wait until all ranks are here."""
+    def barrier(self) -> None:
         self.all_gather(None)
 
-    def close(self):
+    def close(self) -> None:
         """The work is done: let the others go."""
 
 
@@ -94,19 +106,19 @@ class SerialCommunicator(Communicator):
     rank = 0
     size = 1
 
-    def send(self, to, message):
+    def send(self, to: int, message: Any) -> None:
         """There is nobody."""
 
-    def arrived(self):
+    def arrived(self) -> tuple:
         return ()
 
-    def abort(self, code):
+    def abort(self, code: int) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         sys.exit(code)
 
 
-def launched_size():
+def launched_size() -> int | None:
     """Number of ranks that the launcher started: None where it does not say, 0 without one."""
     for name in LAUNCHER_SIZES:
         if os.environ.get(name, "").isdigit():
@@ -114,13 +126,13 @@ def launched_size():
     return None if any(name in os.environ for name in LAUNCHER_RANKS) else 0
 
 
-def launched_rank():
+def launched_rank() -> int:
     """This process's rank according to its launcher, 0 without one; needs no MPI library."""
     said = [os.environ.get(name, "") for name in LAUNCHER_RANKS]
     return next((int(rank) for rank in said if rank.isdigit()), 0)
 
 
-def find_communicator():
+def find_communicator() -> Communicator:
     """The ranks of this job: MPI only where a launcher started more than one."""
     try:
         size = launched_size()

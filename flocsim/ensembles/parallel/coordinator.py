@@ -7,11 +7,13 @@ RemoteCoordinator, which sends messages to rank 0's.
 
 import threading
 import time
+from collections.abc import Callable
 
 import attrs
 
+from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
-from flocsim.ensembles.parallel.messages import Assignment, Dismissal, Halt, Request
+from flocsim.ensembles.parallel.messages import Assignment, ChunkResult, Dismissal, Halt, Request
 from flocsim.ensembles.parallel.study_state import Phase, StudyState
 from flocsim.interruption import stop_requested
 
@@ -30,32 +32,31 @@ class Coordinator:
 
     comm: Communicator
     state: StudyState
-    report: object
+    report: Callable[[int], object]
     present: int = attrs.field(init=False)
-    computing: set = attrs.Factory(set)
-    waiting: list = attrs.Factory(list)
-    lock: object = attrs.Factory(threading.Lock)
-    thread: object = None
-    error: object = None
+    computing: set[int] = attrs.Factory(set)
+    waiting: list[int] = attrs.Factory(list)
+    lock: threading.Lock = attrs.Factory(threading.Lock)
+    thread: threading.Thread | None = None
+    error: BaseException | None = None
 
     def __attrs_post_init__(self):
         self.present = self.comm.size - 1
 
-    def start(self):
-        """Begin to serve the other ranks."""
+    def start(self) -> None:
         self.state.look_at_stages()
         if self.comm.size > 1 and self.comm.threads:
             self.thread = threading.Thread(target=self.serve_on, daemon=True)
             self.thread.start()
 
-    def finish(self):
+    def finish(self) -> None:
         """Serve until all other ranks have been dismissed."""
         while self.present:
             self.wait_a_little()
         if self.thread is not None:
             self.thread.join()
 
-    def give_up(self):
+    def give_up(self) -> bool:
         """Dismiss all other ranks, taking nothing in any more; whether they went in time."""
         self.state.give_up()
         if self.thread is not None:
@@ -66,14 +67,14 @@ class Coordinator:
                 time.sleep(SLEEP)
         return self.present == 0
 
-    def exchange(self, result):
+    def exchange(self, result: ChunkResult | None) -> Chunk | None:
         """Hand in what rank 0 has done, None at first; its next Chunk, None at the end."""
         self.take_in(result, stop_requested())
         while (chunk := self.next_chunk()) is None and self.state.is_running:
             self.wait_a_little()
         return chunk
 
-    def is_halted(self):
+    def is_halted(self) -> bool:
         """Whether rank 0 is to give up the replicate at hand; serves where no thread does."""
         if self.error is not None:
             raise self.error
@@ -82,7 +83,6 @@ class Coordinator:
         return not self.state.is_running or stop_requested()
 
     def wait_a_little(self):
-        """Look at what others want, or let the thread do so."""
         if self.error is not None:
             raise self.error
         if self.thread is not None or not self.serve():
@@ -101,7 +101,6 @@ class Coordinator:
             return self.state.next_chunk()
 
     def serve_on(self):
-        """What the thread does."""
         try:
             while self.present and self.state.phase is not Phase.GIVEN_UP:
                 if not self.serve():
@@ -143,14 +142,14 @@ class RemoteCoordinator:
     comm: Communicator
     halted: bool = False
 
-    def exchange(self, result):
+    def exchange(self, result: ChunkResult | None) -> Chunk | None:
         """Hand in what is done; the next Chunk, or None where there is none."""
         self.comm.send(0, Request(result, stop_requested()))
         while isinstance(answer := self.comm.receive(0, heed_signals=False), Halt):
             pass  # it has crossed the request
         return answer.chunk if isinstance(answer, Assignment) else None
 
-    def is_halted(self):
+    def is_halted(self) -> bool:
         """Whether the replicate at hand is to be given up."""
         self.comm.take_in()
         if self.comm.inbox[0]:  # while a rank works, rank 0 says nothing but Halt

@@ -33,7 +33,7 @@ class ChunkResult:
     record: bytes
     data_start: int
     failed: int = 0
-    notes: tuple = ()
+    notes: tuple[dict, ...] = ()
 
 
 @attrs.frozen
@@ -49,8 +49,6 @@ class Request:
 
 @attrs.frozen
 class Assignment:
-    """The next chunk of a rank."""
-
     chunk: Chunk
 
 
@@ -66,6 +64,4 @@ class Dismissal:
 
 @attrs.frozen
 class ExitCode:
-    """How the run has ended, on all ranks."""
-
     code: int

@@ -4,7 +4,10 @@ import contextlib
 import multiprocessing
 import os
 import sys
-from multiprocessing.connection import wait
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any
 
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.errors import FlocsimError
@@ -21,23 +24,27 @@ class LostRank(FlocsimError):
 class ProcessCommunicator(Communicator):
     """One process of several, with a pipe to rank 0 or, on rank 0, to each of the others."""
 
-    def __init__(self, rank, size, pipes, others=()):
+    def __init__(
+        self, rank: int, size: int, pipes: Mapping[int, Connection],
+        others: Sequence[BaseProcess] = (),
+    ) -> None:  # fmt: skip
         """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started."""
         super().__init__()
         self.rank, self.size = rank, size
         self.pipes = pipes
         self.others = others
 
-    def send(self, to, message):
+    def send(self, to: int, message: Any) -> None:
         try:
             self.pipes[to].send(message)
         except OSError:
             self.lose(to)
 
-    def arrived(self):
+    def arrived(self) -> Iterator[tuple[int, Any]]:
         """(source, message) of all that has come; LostRank where a process has gone."""
         ranks = {pipe: rank for rank, pipe in self.pipes.items()}
-        for pipe in wait(list(ranks), timeout=0):
+        ready: Any = wait(list(ranks), timeout=0)
+        for pipe in ready:
             try:
                 yield ranks[pipe], pipe.recv()
             except (EOFError, OSError):
@@ -56,7 +63,7 @@ class ProcessCommunicator(Communicator):
             "computed is kept: go on with --resume"
         )
 
-    def close(self):
+    def close(self) -> None:
         """Wait for the other processes, which have nothing more to do."""
         for process in self.others:
             process.join(LAST_SECONDS)
@@ -67,17 +74,20 @@ class ProcessCommunicator(Communicator):
             with contextlib.suppress(Exception):
                 process.kill()
 
-    def abort(self, code):
+    def abort(self, code: int) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         self.end_others()
         os._exit(code)
 
 
-def start_processes(jobs, target, arguments):
+def start_processes(
+    jobs: int, target: Callable[[Communicator, Any], int], arguments: Any
+) -> ProcessCommunicator:
     """Start ``jobs`` − 1 processes that call ``target(communicator, arguments)``; rank 0's own."""
     context = multiprocessing.get_context("spawn")
-    pipes, others = {}, []
+    pipes: dict[int, Connection] = {}
+    others: list[BaseProcess] = []
     for rank in range(1, jobs):
         pipes[rank], far_end = context.Pipe()
         process = context.Process(

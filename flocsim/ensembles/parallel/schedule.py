@@ -5,9 +5,11 @@ rank gives back what it has not done when its time for the chunk is up, since re
 1 to 1000 times as much as each other.
 """
 
+from collections.abc import Iterator, Sequence
+
 import attrs
 
-from flocsim.ensembles.chunks import MOST_ROWS, Chunk, missing, total
+from flocsim.ensembles.chunks import MOST_ROWS, Chunk, Interval, missing, total
 
 SHORTEST_SECONDS = 0.25
 """Least time for a chunk [s]: asking costs about 1 ms."""
@@ -19,7 +21,7 @@ SHARE = 3
 """A chunk is no more than what is left over so many chunks per rank."""
 
 
-def chunk_seconds(size):
+def chunk_seconds(size: int) -> float:
     """How long a chunk may take [s] on one of ``size`` ranks."""
     return max(SHORTEST_SECONDS, SECONDS_PER_RANK * size)
 
@@ -34,7 +36,7 @@ class Stage:
 
     first: int
     stop: int
-    todo: list
+    todo: list[tuple[int, int, int]]
     waiting: int
     unfinished: int
 
@@ -48,22 +50,29 @@ class Schedule:
     """
 
     size: int
-    stages: list
+    stages: list[Stage]
     remaining: int = 0
     final: int = -1
 
     @classmethod
-    def of(cls, done, borders, size):
+    def of(
+        cls, done: Sequence[Sequence[Interval]], borders: Sequence[int], size: int
+    ) -> "Schedule":
         """The Schedule of what is missing.
 
         ``done``: of every condition the intervals that exist already; ``borders``: where stages
         end, [100, 125, …].
         """
-        starts = [0, *borders[:-1]]
-        stages = [make_stage(done, *ends) for ends in zip(starts, borders, strict=True)]
+        stages = []
+        for first, stop in zip([0, *borders[:-1]], borders, strict=True):
+            gaps = [missing(intervals, first, stop) for intervals in done]
+            places = reversed(list(enumerate(gaps)))
+            todo = [(place, *gap) for place, each in places for gap in each[::-1]]
+            count = sum(map(total, gaps))
+            stages.append(Stage(first, stop, todo, count, count))
         return cls(size, stages, sum(stage.unfinished for stage in stages))
 
-    def take(self):
+    def take(self) -> Chunk | None:
         """The next Chunk, None where all is handed out."""
         stage = next((stage for stage in self.stages if stage.todo), None)
         if stage is None:
@@ -76,7 +85,7 @@ class Schedule:
         stage.waiting -= chunk.stop - chunk.first
         return chunk
 
-    def give_back(self, chunk, done):
+    def give_back(self, chunk: Chunk, done: int) -> None:
         """Note that the first ``done`` replicates of a chunk are finished; hand out the rest."""
         stages = (stage for stage in self.stages if stage.first <= chunk.first < stage.stop)
         if (stage := next(stages, None)) is None:
@@ -87,19 +96,11 @@ class Schedule:
             stage.todo.append((chunk.condition, chunk.first + done, chunk.stop))
             stage.waiting += chunk.stop - chunk.first - done
 
-    def finished_stages(self):
+    def finished_stages(self) -> Iterator[int]:
         """Take away the leading stages of which all is there; the last replicate of each."""
         while self.stages and self.stages[0].unfinished == 0:
             yield self.stages.pop(0).stop
 
-    def end_at(self, final):
+    def end_at(self, final: int) -> None:
         """Hand out nothing more: the study ends with this many replicates."""
         self.final, self.stages, self.remaining = final, [], 0
-
-
-def make_stage(done, first, stop):
-    """The Stage of replicates [first, stop) where these exist already."""
-    gaps = [missing(intervals, first, stop) for intervals in done]
-    todo = [(place, *gap) for place, each in reversed(list(enumerate(gaps))) for gap in each[::-1]]
-    count = sum(map(total, gaps))
-    return Stage(first, stop, todo, count, count)

@@ -4,10 +4,13 @@ Nothing here sends a message or waits: the same calls give the same state.
 """
 
 import enum
+from collections.abc import Callable
 
 import attrs
 
+from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.parallel.messages import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
@@ -40,22 +43,21 @@ class StudyState:
 
     schedule: Schedule
     store: RowStore
-    is_enough: object
+    is_enough: Callable[[int], bool]
     allowed: float
     failed: int = 0
-    notes: list = attrs.Factory(list)
+    notes: list[dict] = attrs.Factory(list)
     computed: int = 0
     phase: Phase = Phase.RUNNING
 
     @property
-    def is_running(self):
+    def is_running(self) -> bool:
         return self.phase is Phase.RUNNING
 
-    def next_chunk(self):
-        """The next Chunk; None where there is none now."""
+    def next_chunk(self) -> Chunk | None:
         return self.schedule.take() if self.is_running else None
 
-    def take_in(self, result):
+    def take_in(self, result: ChunkResult) -> None:
         """Write a ChunkResult down, and see whether that is enough.
 
         Raises TooManyFailures beyond the allowed number.
@@ -68,10 +70,6 @@ class StudyState:
             self.store.add(condition, first, first + result.count, offset)
         self.computed += result.count
         self.schedule.give_back(result.chunk, result.count)
-        self.count_failures(result)
-        self.look_at_stages()
-
-    def count_failures(self, result):
         self.failed += result.failed
         self.notes += result.notes[: MOST_NOTES - len(self.notes)]
         if self.failed > self.allowed:
@@ -79,18 +77,18 @@ class StudyState:
                 f"{self.failed} replicates have failed, more than stop.failed allows; the first: "
                 f"{describe_note(self.notes[0]) if self.notes else 'see the journal'}"
             )
+        self.look_at_stages()
 
-    def look_at_stages(self):
+    def look_at_stages(self) -> None:
         """End the study where a finished stage is enough."""
         for stop in self.schedule.finished_stages():
             if not self.schedule.stages or self.is_enough(stop):
                 self.phase = Phase.FINISHED
                 self.schedule.end_at(stop)
 
-    def interrupt(self):
+    def interrupt(self) -> None:
         if self.is_running:
             self.phase = Phase.INTERRUPTED
 
-    def give_up(self):
-        """An error ends the study."""
+    def give_up(self) -> None:
         self.phase = Phase.GIVEN_UP

@@ -8,12 +8,14 @@ that is close to a decision may end otherwise.
 
 import os
 import platform
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 MOST_FEATURES = 4
 """Features by which a message tells two kinds apart."""
 
 
-def cpu_kind():
+def cpu_kind() -> dict:
     """The kind of CPU of this process, as JSON can hold it; two that are equal give equal rows.
 
     ``cpu``: LLVM's name of the machine's; ``compiled_for`` and ``features``: what numba makes code
@@ -24,28 +26,29 @@ def cpu_kind():
     import numba
     import numpy
 
+    config: Any = numba.config
     cpu, native = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    named = numba.config.CPU_FEATURES
+    named = config.CPU_FEATURES
     features = (native if named is None else named).split(",")
     simd = numpy.show_config(mode="dicts").get("SIMD Extensions", {})
     libm = [" ".join(platform.libc_ver()).strip() or platform.platform()]
-    libm += ["SVML"] if numba.config.USING_SVML else []
+    libm += ["SVML"] if config.USING_SVML else []
     libm += [os.environ["GLIBC_TUNABLES"]] if os.environ.get("GLIBC_TUNABLES") else []
     return {
         "cpu": cpu,
-        "compiled_for": numba.config.CPU_NAME or cpu,
+        "compiled_for": config.CPU_NAME or cpu,
         "features": sorted(each[1:] for each in features if each.startswith("+")),
         "numpy": [*simd.get("baseline", []), *simd.get("found", [])],
         "libm": libm,
     }
 
 
-def distinct(kinds):
+def distinct(kinds: Sequence[dict]) -> list[dict]:
     """Each kind once, in the order in which they come."""
     return [kind for place, kind in enumerate(kinds) if kind not in kinds[:place]]
 
 
-def describe_kind(kind, others=()):
+def describe_kind(kind: dict, others: Sequence[dict] = ()) -> str:
     """A kind in words: its name, and what it has that one of the others has not."""
     words = [kind["cpu"]]
     if kind["compiled_for"] != kind["cpu"]:
@@ -58,7 +61,7 @@ def describe_kind(kind, others=()):
     return words[0] if len(words) == 1 else f"{words[0]} ({'; '.join(words[1:])})"
 
 
-def mixture_warnings(path, found, now):
+def mixture_warnings(path: object, found: Sequence[dict], now: Sequence[dict]) -> Iterator[str]:
     """Lines that warn of rows of several kinds in one file.
 
     ``found``: kinds of the rows that the file at ``path`` has already; ``now``: those of the ranks

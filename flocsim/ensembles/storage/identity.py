@@ -10,6 +10,7 @@ import ast
 import hashlib
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import attrs
@@ -18,6 +19,7 @@ import numpy as np
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
+from flocsim.ensembles.study import Study
 from flocsim.integrators.loop.driver import advance
 
 VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file", "own"}}
@@ -39,7 +41,7 @@ list against all that a replicate imports."""
 PACKAGE = Path(__file__).parents[2]
 
 
-def identity_of(study):
+def identity_of(study: Study) -> dict:
     """{name: text or number} of all that the rows of a Study follow from."""
     config = study.config
     facts = {"seed": config.seed, "code": physics_digest(), "arithmetic": arithmetic_digest()}
@@ -99,14 +101,11 @@ def floc_facts(study):
             parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
             if study.config.shapes.own is not None:
                 # Its class computes what is known of others, and how it grows.
-                parts += [numbers_of(each) for each in (*shapes, *(s.scaled(2.0) for s in shapes))]
+                for each in (*shapes, *(shape.scaled(2.0) for shape in shapes)):
+                    numbers = [each.radius, each.area, each.second_moment]
+                    parts.append(np.append(np.ravel(each.vertices), numbers))
             facts[f"flocs.{n}"] = digest(np.concatenate(parts))
     return facts
-
-
-def numbers_of(shape):
-    """All numbers that a shape hands to the kernels."""
-    return np.append(np.ravel(shape.vertices), [shape.radius, shape.area, shape.second_moment])
 
 
 def kernel_facts(config):
@@ -142,7 +141,7 @@ def arithmetic_digest():
     return digest(np.concatenate(found))
 
 
-def physics_digest(root=PACKAGE):
+def physics_digest(root: Path = PACKAGE) -> str:
     """A hash of the modules that decide what is in a row: of what they do, not how they look."""
     found = hashlib.blake2b(digest_size=16)
     for path in physics_files(root):
@@ -150,7 +149,7 @@ def physics_digest(root=PACKAGE):
     return found.hexdigest()
 
 
-def physics_files(root=PACKAGE):
+def physics_files(root: Path = PACKAGE) -> Iterator[Path]:
     """The files of PHYSICS in the package's folder, in an order that is always the same."""
     for name in PHYSICS:
         place = root / name
@@ -163,25 +162,24 @@ def essence(source):
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
-            node.body = [each for each in body if not is_text(each)]
+            node.body = [
+                each
+                for each in body
+                if not (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
+            ]
     return ast.dump(tree)
-
-
-def is_text(node):
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def digest(array):
     return hashlib.blake2b(np.ascontiguousarray(array).tobytes(), digest_size=16).hexdigest()
 
 
-def short(identity):
-    """An identity in 16 letters."""
+def short(identity: dict) -> str:
     text = json.dumps(identity, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-def differences(stored, current):
+def differences(stored: dict, current: dict) -> list[str]:
     """Lines on what differs between two identities; none where rows of both agree."""
     names = sorted(stored.keys() | current.keys())
     apart = [name for name in names if stored.get(name) != current.get(name)]
@@ -194,14 +192,15 @@ def differences(stored, current):
     telling = [name for name in both if name.partition(".")[0] not in EXPLAINED] or both
     if "arithmetic" in telling:
         telling = [name for name in telling if not name.startswith("flocs.")]
-    return [difference(name, stored.get(name), current.get(name)) for name in telling]
-
-
-def difference(name, stored, current):
-    kind, _, rest = name.partition(".")
-    if kind in EXPLAINED:
-        return EXPLAINED[kind].format(rest)
-    return f"{name} is {show(stored)} in the file, {show(current)} now"
+    lines = []
+    for name in telling:
+        kind, _, rest = name.partition(".")
+        if kind in EXPLAINED:
+            lines.append(EXPLAINED[kind].format(rest))
+        else:
+            there, here = show(stored.get(name)), show(current.get(name))
+            lines.append(f"{name} is {there} in the file, {here} now")
+    return lines
 
 
 EXPLAINED = {

@@ -5,15 +5,19 @@ import json
 import os
 import shlex
 import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import attrs
 
-from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, named
+from flocsim.ensembles.chunks import Condition, Interval, condition_of, fits, layout, named
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore
+from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
-from flocsim.io.journal.journal import Journal, journal_path
+from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, SESSION, encode
 from flocsim.io.provenance import now
 
@@ -37,20 +41,20 @@ class Beginning:
 
     store: RowStore
     identity: dict
-    remarks: list = attrs.Factory(list)
-    notes: list = attrs.Factory(list)
-    history: list = attrs.Factory(list)
-    complete: tuple = None
-    cpus_now: list = attrs.Factory(list)
-    cpus_found: list = attrs.Factory(list)
-    resources: object = attrs.Factory(contextlib.ExitStack)
+    remarks: list[str] = attrs.Factory(list)
+    notes: list[dict] = attrs.Factory(list)
+    history: list[dict] = attrs.Factory(list)
+    complete: tuple[tuple[Condition, ...], int] | None = None
+    cpus_now: list[dict] = attrs.Factory(list)
+    cpus_found: list[dict] = attrs.Factory(list)
+    resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
     @property
-    def journal(self):
+    def journal(self) -> Journal | MemoryJournal:
         """Where finished chunks go."""
         return self.store.journal
 
-    def found(self, count):
+    def found(self, count: int) -> list[list[Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""
         whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
         return [
@@ -58,7 +62,9 @@ class Beginning:
         ]
 
 
-def begin(study, identity, output, mode, cpus=()):
+def begin(
+    study: Study, identity: dict, output: str | Path, mode: str, cpus: Sequence[dict] = ()
+) -> Beginning:
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
     Raises UsageError where an unfinished run is in the way, or is one of another config, of other
@@ -80,24 +86,20 @@ def begin(study, identity, output, mode, cpus=()):
         take_journal(start)
         if mode == RESUME and os.path.exists(output):
             take_results(start, output)
-        journal.append(encode(SESSION, session(start)))
+        session = {
+            "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
+            "command": shlex.join(sys.argv), "cpus": start.cpus_now,
+        }  # fmt: skip
+        journal.append(encode(SESSION, session))
     except Exception:
         journal.drop_if_empty()
         raise
     return start
 
 
-def session(start):
-    identity = start.identity
-    return {
-        "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
-        "command": shlex.join(sys.argv), "cpus": start.cpus_now,
-    }  # fmt: skip
-
-
-def take_journal(start):
+def take_journal(start: Beginning) -> None:
     """Find the chunks in the journal; UsageError where they are those of another study."""
-    journal = start.journal
+    journal: Any = start.journal
     if journal.damage and not journal.records and not journal.is_cut_short:
         raise FileError(
             f"{journal.path} is no journal of flocsim, or damaged from its start: move it away"
@@ -131,8 +133,8 @@ def refuse_other(start, path, stored):
     lines = differences(stored, start.identity)
     if lines:
         shown = "; ".join(lines[:MOST_DIFFERENCES])
-        more = len(lines) - MOST_DIFFERENCES
-        more = f"; and {more} more" if more > 0 else ""
+        rest = len(lines) - MOST_DIFFERENCES
+        more = f"; and {rest} more" if rest > 0 else ""
         raise UsageError(f"{path} is of another study: {shown}{more}; {REMEDY}")
 
 
@@ -165,14 +167,22 @@ def take_results(start, output):
     begun = any(start.store.counts)
     try:
         file = start.resources.enter_context(opened(output))
-        refuse_other(start, output, stored_identity(output, file))
+        if "identity" not in file["run"]:
+            raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
+        refuse_other(start, output, stored(file, "identity", None))
     except (FileError, UsageError) as error:
         if not begun:
             raise
         start.remarks.append(f"not used: {error}")
         return
     rows = file["replicates"]
-    places = old_places(rows)
+    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
+    places = {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for t, name in enumerate(axes[0])
+        for v, n in enumerate(axes[1])
+        for d, share in enumerate(axes[2])
+    }
     count = len(rows["replicate"])
     for place, condition in enumerate(start.store.conditions):
         if condition in places and count:
@@ -180,33 +190,12 @@ def take_results(start, output):
     start.store.old = OldTable(rows, places)
     start.notes += stored(file, "failed", [])
     start.cpus_found = distinct([*stored(file, "cpus", []), *start.cpus_found])
-    start.history = [*stored(file, "history", []), earlier(file), *start.history]
+    earlier = {key: file[f"run/{key}"].asstr()[()] for key in HISTORY if key in file["run"]}
+    start.history = [*stored(file, "history", []), earlier, *start.history]
     if not begun:
         start.complete = (tuple(places), count)
-
-
-def stored_identity(output, file):
-    if "identity" not in file["run"]:
-        raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
-    return json.loads(file["run/identity"].asstr()[()])
 
 
 def stored(file, name, default):
     """What a results file holds as JSON."""
     return json.loads(file[f"run/{name}"].asstr()[()]) if name in file["run"] else default
-
-
-def earlier(file):
-    """Date and command of the run that wrote a results file."""
-    return {key: file[f"run/{key}"].asstr()[()] for key in HISTORY if key in file["run"]}
-
-
-def old_places(rows):
-    """Condition → its place in the arrays of a results file."""
-    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
-    return {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }

@@ -1,9 +1,13 @@
 """Where the rows of finished replicates lie: in the journal, or in an older results file."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, STARTS, merged
+from flocsim.ensembles.chunks import ROW, STARTS, Condition, Interval, merged
+from flocsim.io.journal.journal import Journal, MemoryJournal
 
 ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8")])
 """A run of rows: its replicates, and where its data begin in the journal; −1: in the old file."""
@@ -11,13 +15,15 @@ ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8")])
 
 @attrs.define(eq=False)
 class OldTable:
-    """The table of replicates of a results file that is open: dataset by name."""
+    """The table of replicates of a results file that is open: dataset by name.
 
-    datasets: object
-    places: dict
+    ``places``: Condition → its place in the arrays.
+    """
 
-    def read(self, condition, name, first, stop):
-        """Part of a column."""
+    datasets: Mapping[str, Any]
+    places: Mapping[Condition, tuple[int, int, int]]
+
+    def read(self, condition: Condition, name: str, first: int, stop: int) -> np.ndarray:
         return self.datasets[name][(*self.places[condition], slice(first, stop))]
 
 
@@ -25,17 +31,17 @@ class OldTable:
 class RowStore:
     """Finds rows by condition and replicate. Few bytes per chunk, none per row."""
 
-    journal: object
-    conditions: tuple
-    old: OldTable = None
-    entries: list = attrs.field(init=False)
-    counts: list = attrs.field(init=False)
+    journal: Journal | MemoryJournal
+    conditions: tuple[Condition, ...]
+    old: OldTable | None = None
+    entries: list[np.ndarray] = attrs.field(init=False)
+    counts: list[int] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         self.entries = [np.empty(4, ENTRY) for _ in self.conditions]
         self.counts = [0] * len(self.conditions)
 
-    def add(self, place, first, stop, offset):
+    def add(self, place: int, first: int, stop: int, offset: int) -> None:
         """Note where rows of the condition at a place of the list lie."""
         count = self.counts[place]
         if count == len(self.entries[place]):
@@ -43,16 +49,18 @@ class RowStore:
         self.entries[place][count] = (first, stop, offset)
         self.counts[place] = count + 1
 
-    def known(self, place):
+    def known(self, place: int) -> np.ndarray:
         """The entries of a condition, in order of the replicates."""
         found = self.entries[place][: self.counts[place]]
         return np.sort(found, order=("first", "stop"))
 
-    def intervals(self, place):
-        """What exists of a condition."""
+    def intervals(self, place: int) -> list[Interval]:
+        """The replicates of a condition that exist."""
         return merged([(int(e["first"]), int(e["stop"])) for e in self.known(place)])
 
-    def read(self, place, name, first, stop, known=None):
+    def read(
+        self, place: int, name: str, first: int, stop: int, known: np.ndarray | None = None
+    ) -> np.ndarray:
         """The values of a column for replicates [first, stop), all of which exist."""
         values = np.empty(stop - first, ROW[name])
         known = self.known(place) if known is None else known
@@ -61,14 +69,13 @@ class RowStore:
         for start, end, offset in known[near].tolist():
             low, high = max(start, first), min(end, stop)
             if low < high:
-                part = self.part(place, name, (start, end, offset), low, high)
+                if offset < 0:
+                    assert self.old is not None, "rows of an older file, which is open"
+                    part = self.old.read(self.conditions[place], name, low, high)
+                else:
+                    size = ROW[name].itemsize
+                    offset += (end - start) * STARTS[name] + (low - start) * size
+                    data = self.journal.read(offset, (high - low) * size)
+                    part = np.frombuffer(data, ROW[name])
                 values[low - first : high - first] = part
         return values
-
-    def part(self, place, name, entry, low, high):
-        start, end, offset = entry
-        if offset < 0:
-            return self.old.read(self.conditions[place], name, low, high)
-        size = ROW[name].itemsize
-        offset += (end - start) * STARTS[name] + (low - start) * size
-        return np.frombuffer(self.journal.read(offset, (high - low) * size), ROW[name])

@@ -102,7 +102,7 @@ def fit_mask(
     return _fit_polygon(floc, int(vertices), float(radius), method, preserve_area, inscribed)
 
 
-def _require_one_region(mask) -> np.ndarray:
+def _require_one_region(mask: object) -> np.ndarray:
     """The mask as a bool array; ShapeError unless it holds just one 8-connected region."""
     from scipy.ndimage import label
 

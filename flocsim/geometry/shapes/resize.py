@@ -37,7 +37,7 @@ def core_factor(vertices: np.ndarray, radius: float, area: float) -> float:
     return trials[-1][0]
 
 
-def resized(shape: SpheroPolygon, equivalent_radius: float, radius: float) -> Shape:
+def resized(shape: Shape, equivalent_radius: float, radius: float) -> Shape:
     """The SpheroPolygon's core scaled so that, swept by ``radius`` [m], r_eq is exact [m].
 
     Raises ShapeError where the disk alone is already as large as the wanted body.

@@ -3,6 +3,8 @@
 The file itself is written and read by `flocsim.io.results.file`, which offers these names too.
 """
 
+from collections.abc import Iterable
+
 import attrs
 import numpy as np
 
@@ -97,6 +99,22 @@ COORDINATES = {
 }
 
 
+def as_names(names: Iterable) -> tuple[str, ...]:
+    return tuple(str(name) for name in names)
+
+
+def as_words(words: Iterable) -> tuple[str, ...]:
+    return tuple("_".join(str(word).split()) for word in words)
+
+
+def as_vertices(counts: Iterable) -> np.ndarray:
+    return exact(counts, "i8", "vertices")
+
+
+def as_shares(shares: Iterable) -> np.ndarray:
+    return exact(shares, "f8", "delta")
+
+
 @attrs.frozen(eq=False)
 class Results:
     """All that one ensemble found, checked for names, shapes and exact conversion.
@@ -112,16 +130,14 @@ class Results:
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
 
-    types: tuple[str, ...] = attrs.field(converter=lambda names: tuple(str(name) for name in names))
-    vertices: np.ndarray = attrs.field(converter=lambda counts: exact(counts, "i8", "vertices"))
-    delta: np.ndarray = attrs.field(converter=lambda shares: exact(shares, "f8", "delta"))
+    types: tuple[str, ...] = attrs.field(converter=as_names)
+    vertices: np.ndarray = attrs.field(converter=as_vertices)
+    delta: np.ndarray = attrs.field(converter=as_shares)
     replicates: dict[str, np.ndarray] | None
     probabilities: dict[str, np.ndarray]
     run: dict[str, str | int | float] = attrs.field(factory=dict)
-    failures: tuple[str, ...] = attrs.field(
-        default=("none",), converter=lambda words: tuple("_".join(str(w).split()) for w in words)
-    )
-    flocs: tuple[str, ...] = attrs.field(default=(), converter=tuple)
+    failures: tuple[str, ...] = attrs.field(default=("none",), converter=as_words)
+    flocs: tuple[str, ...] = attrs.field(default=(), converter=as_names)
     pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
     differences: dict[str, np.ndarray] = attrs.field(factory=dict)
     count: int = 0

@@ -9,7 +9,7 @@ from flocsim import run
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, Record, run_encounter
-from flocsim.ensembles.collision.sampling import draws, orientations
+from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study

@@ -13,8 +13,7 @@ from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
-from flocsim.ensembles.collision.sampling import draws, orientations
-from flocsim.ensembles.collision.start import largest_displacement, place_pair
+from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.base import Status

@@ -5,8 +5,8 @@ import pytest
 
 from flocsim import Sphere
 from flocsim.ensembles.collision.encounter import Record
-from flocsim.ensembles.collision.sampling import draws
 from flocsim.ensembles.collision.snapshots import choose_instants, frames_of, travelled
+from flocsim.ensembles.collision.start import draws
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study
 

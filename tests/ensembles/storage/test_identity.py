@@ -19,6 +19,7 @@ NOT_PHYSICS = {
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/files.py": "how files are written",
     "io/journal/records.py": "how rows are stored, sealed by checksums",
+    "ensembles/config/": "reads values, and these are compared themselves",
     "ensembles/chunks.py": "how rows are stored; the columns are compared on their own",
 }
 """What a replicate imports without its rows depending on it, and why."""
