@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision import encounter as scene
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.io.results.schema import REPLICATES
+from flocsim.run import Run
 from tests.helpers.small_study import small_config, small_study
 
 
@@ -39,7 +39,7 @@ def test_a_row_has_all_columns_and_names_its_flocs(study):
 
 
 def test_a_replicate_that_is_given_up_has_no_row(study, monkeypatch):
-    monkeypatch.setattr(scene, "STEPS_AT_A_TIME", 5)
+    monkeypatch.setattr(Run.advance, "__defaults__", (5,))
     looks = []
     whole = study.run(0, 4, 0.0, 0, halted=lambda: looks.append(0))
     assert len(looks) > 2
