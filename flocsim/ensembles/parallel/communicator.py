@@ -64,12 +64,16 @@ class Communicator:
                 yield source, self.inbox[source].popleft()
 
     def receive(self, source: int, heed_signals: bool = True) -> Any:
-        """The next message of a rank; StopRequested where a signal comes first."""
+        """The next message of a rank; on rank 0, StopRequested where a signal comes first.
+
+        The other ranks wait for rank 0 to end the job, which says why: one that ended it first
+        would cut that short. Where rank 0 does not, flocsim.interruption does.
+        """
         while not self.inbox[source]:
             self.take_in()
             if self.inbox[source]:
                 break
-            if heed_signals and stop_requested():
+            if heed_signals and self.rank == 0 and stop_requested():
                 raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
             time.sleep(SLEEP)
         return self.inbox[source].popleft()

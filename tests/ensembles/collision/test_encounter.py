@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from flocsim import run
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, Record, run_encounter
@@ -73,18 +72,17 @@ def test_a_replicate_repeats_to_the_bit_in_any_order(study):
     assert same_row(study.run(0, 16, 0.0, 2), first)
 
 
-def recorded(study, rows):
-    """(row, arrays) of one replicate, recorded ``rows`` at a time."""
+def recorded(study):
+    """(row, arrays) of one replicate."""
     record = Record()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, "RECORD_ROWS", rows)
-        return study.run(0, 16, 0.0, 0, record), record.arrays()
+    return study.run(0, 16, 0.0, 0, record), record.arrays()
 
 
-def test_recording_changes_nothing_and_pieces_make_the_whole(study):
+def test_recording_changes_nothing_and_pieces_make_the_whole(study, monkeypatch):
     silent = study.run(0, 16, 0.0, 0)
-    row, whole = recorded(study, 4096)
-    again, pieces = recorded(study, 7)
+    row, whole = recorded(study)
+    monkeypatch.setattr("flocsim.run.RECORD_ROWS", 7)
+    again, pieces = recorded(study)
     assert same_row(row, silent)
     assert same_row(again, silent)
     for one, other in zip(whole, pieces, strict=True):
@@ -92,7 +90,7 @@ def test_recording_changes_nothing_and_pieces_make_the_whole(study):
 
 
 def test_a_record_holds_every_step_with_the_instant_of_the_collision(study):
-    row, (times, position, velocity) = recorded(study, 4096)
+    row, (times, position, velocity) = recorded(study)
     assert len(times) == row["steps"] + 1
     assert times[0] == 0.0
     assert np.all(np.diff(times) > 0.0)
@@ -108,7 +106,7 @@ def test_a_record_holds_every_step_with_the_instant_of_the_collision(study):
 
 
 def test_before_they_meet_both_only_settle(study):
-    _, (times, position, velocity) = recorded(study, 4096)
+    _, (times, position, velocity) = recorded(study)
     fall = study.encounter(0, 16, draws(1, 0)).settling[1][0][1]
     # 2 um apart the forces along the centres are weak: the first step shows settling alone.
     assert velocity[1, 1, 1] == pytest.approx(fall, rel=1e-2)

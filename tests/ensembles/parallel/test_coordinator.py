@@ -3,7 +3,8 @@
 import pytest
 
 from flocsim.ensembles.chunks import Chunk
-from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.parallel import communicator
+from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import Assignment, Dismissal, Halt, Request
 from flocsim.ensembles.parallel.study_state import TooManyFailures
@@ -108,6 +109,15 @@ def test_who_does_not_come_back_is_not_waited_for_long(monkeypatch):
     asked(rank0, 1)
     assert not rank0.give_up()
     assert rank0.comm.new() == [(1, Halt())]
+
+
+def test_on_a_signal_rank_0_waits_no_longer_and_the_others_wait_for_it(monkeypatch):
+    monkeypatch.setattr(communicator, "stop_requested", lambda: True)
+    with pytest.raises(StopRequested):
+        Wire(0, 2).receive(1)
+    other, looks = Wire(1, 2), iter([[], [], [(0, "a word")]])
+    other.arrived = lambda: next(looks)
+    assert other.receive(0) == "a word"
 
 
 def test_another_rank_asks_and_works_until_it_is_halted():
