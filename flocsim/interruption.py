@@ -25,6 +25,10 @@ PATIENCE = 1.2
 SHORTEST_PATIENCE = 0.3
 """Seconds that it has at least, from when it has joined the other ranks."""
 
+FORWARDING = 0.25
+"""Seconds that a launcher has to forward the last words of a rank: it drops what comes with an
+abort. Ranks that say nothing wait twice as long before they abort."""
+
 LAUNCHER_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "PMIX_RANK")
 """Environment variables that only a process started by an MPI launcher has."""
 
@@ -118,6 +122,8 @@ def end_in_time():
         sys.stdout.flush()
         if INTERRUPTION.speaks:
             print(f"flocsim: stopped by {INTERRUPTION.name}", file=sys.stderr, flush=True)
+    if INTERRUPTION.leave is not os._exit:
+        time.sleep(FORWARDING if INTERRUPTION.speaks else 2.0 * FORWARDING)
     INTERRUPTION.leave(STOPPED)
 
 
