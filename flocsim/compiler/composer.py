@@ -29,7 +29,7 @@ from typing import Any
 from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
 from flocsim.errors import KernelError
 
-INLINED_SIZE = 800
+INLINED_SIZE = 1200
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
 
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
