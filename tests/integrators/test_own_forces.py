@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flocsim import Body, Sphere, SpheroPolygon, system
+from flocsim import Body, Sphere, SpheroPolygon, run
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from tests.helpers.methods import by_method, by_setting
 from tests.helpers.trial_scenes import (
@@ -121,7 +121,7 @@ def test_film_and_hertzian_contact_against_an_independent_solver(integrator, all
 def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
     scene = PolygonSystem(crowd(3), own(), integrator)
     whole = scene.run(3e-4)
-    monkeypatch.setattr(system, "RECORD_ROWS", 37)
+    monkeypatch.setattr(run, "RECORD_ROWS", 37)
     pieces = scene.run(3e-4)
     assert len(whole.t) > 300
     for name in ("t", "position", "velocity"):
@@ -131,7 +131,7 @@ def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
 
 def test_more_rows_than_the_record_holds():
     found = PolygonSystem(crowd(3), own(), VelocityVerlet(5e-8)).run(5e-4)
-    assert found.steps > 2 * system.RECORD_ROWS
+    assert found.steps > 2 * run.RECORD_ROWS
     assert len(found.t) == found.steps + 1
     assert np.all(np.diff(found.t) > 0.0)
     assert np.allclose(np.diff(found.t)[:-1], 5e-8, rtol=1e-6)
