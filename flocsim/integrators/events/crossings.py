@@ -16,7 +16,7 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.points import locate_polygons, turn_bodies
 from flocsim.hooks import hook
-from flocsim.integrators.events.resolution import memory_of, release_grain, touch_grain
+from flocsim.integrators.events.resolution import memory_of, release_resolution, touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
 
 NEVER = 2.0
@@ -115,9 +115,9 @@ def lowest_share(scene, work, step, row, rival):
     return share
 
 
-def crossing(scene, work, step, row, rival, high, grain):
+def crossing(scene, work, step, row, rival, high, resolution):
     """The share at which the margin, which is too low at ``high``, is just below zero."""
-    low, target = 0.0, 0.5 * grain
+    low, target = 0.0, 0.5 * resolution
     at_low = margin(work, NOW, row, rival) + target
     at_high = look_at(scene, work, step, high, row, rival) + target
     side = 0
@@ -127,7 +127,7 @@ def crossing(scene, work, step, row, rival, high, grain):
         if not low < share < high:
             share = 0.5 * (low + high)
         value = look_at(scene, work, step, share, row, rival) + target
-        if abs(value) <= 0.25 * grain or high - low < 1e-15:
+        if abs(value) <= 0.25 * resolution or high - low < 1e-15:
             break
         # The value of an end that stays is halved, so that both ends close in (Illinois).
         if value > 0.0:
@@ -150,22 +150,22 @@ def collides(work, step, row, depth):
     return lasting and speed * speed > 2.0 * slowing * depth
 
 
-def unnoticed(scene, work, step, row, grain, depth):
+def unnoticed(scene, work, step, row, resolution, depth):
     """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
     before, after = work.geometry[NOW, row, GAP], work.geometry[NEW, row, GAP]
     if before < 0.0 <= after:
-        return release_grain(scene, work, NEW, row, grain)
+        return release_resolution(scene, work, NEW, row, resolution)
     if before >= 0.0 > after and collides(work, step, row, depth):
-        return touch_grain(scene, work, NEW, row, grain)
+        return touch_resolution(scene, work, NEW, row, resolution)
     return depth
 
 
-def switch_of(scene, work, step, row, rival, earliest, grain, depth):
+def switch_of(scene, work, step, row, rival, earliest, resolution, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
     high, limit = min(earliest, 1.0), depth
     if rival < 0:
-        limit = unnoticed(scene, work, step, row, grain, depth)
-        grain = min(grain, limit)
+        limit = unnoticed(scene, work, step, row, resolution, depth)
+        resolution = min(resolution, limit)
     if margin(work, NEW, row, rival) >= -limit:
         if rival < 0 and work.geometry[NOW, row, GAP] < 0.0:
             return earliest
@@ -175,21 +175,21 @@ def switch_of(scene, work, step, row, rival, earliest, grain, depth):
         high = lowest
     if look_at(scene, work, step, high, row, rival) >= -limit:
         return earliest
-    return crossing(scene, work, step, row, rival, high, grain)
+    return crossing(scene, work, step, row, rival, high, resolution)
 
 
-def first_switch(scene, work, step, grain, depth):
+def first_switch(scene, work, step, resolution, depth):
     """The share of the step at which the first flag must change; NEVER where none has to.
 
     Expects the geometry of NOW and of NEW. A violation by less than ``depth`` [m] counts as none;
-    one that counts is located to ``grain`` [m].
+    one that counts is located to ``resolution`` [m].
     """
     earliest, rival = NEVER, -1
     for row in range(work.tally[CANDIDATES]):
-        earliest = switch_of(scene, work, step, row, -1, earliest, grain, depth)
+        earliest = switch_of(scene, work, step, row, -1, earliest, resolution, depth)
         if scene.surface_reach > 0.0:
             if rival < 0 or not same_bodies(work, row, rival):
                 rival = rival_of(work, row)
             if rival != row:
-                earliest = switch_of(scene, work, step, row, rival, earliest, grain, depth)
+                earliest = switch_of(scene, work, step, row, rival, earliest, resolution, depth)
     return earliest

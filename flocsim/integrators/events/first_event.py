@@ -18,10 +18,10 @@ from flocsim.integrators.rhs.error import step_tolerance
 from flocsim.integrators.rhs.views import contact_view, pressed_view
 from flocsim.laws import contact_event
 
-GRAIN = 1e-3
+RESOLUTION = 1e-3
 """A switch is located to this share of the tolerance, …"""
 
-GRAIN_OF_OVERLAP = 0.02
+RESOLUTION_OF_OVERLAP = 0.02
 """… and to this share of the deepest overlap, …"""
 
 ROUNDING = 4e-16
@@ -43,13 +43,13 @@ def deepest_overlap(work):
     return deepest
 
 
-def grain_of(work, clock):
+def resolution_of(work, clock):
     """How far a pair may go behind its switch unnoticed [m]."""
-    grain = GRAIN * step_tolerance(work, clock) if clock[TOLERANCE] < math.inf else 1e-13
+    resolution = RESOLUTION * step_tolerance(work, clock) if clock[TOLERANCE] < math.inf else 1e-13
     deepest = deepest_overlap(work)
     if deepest > 0.0:
-        grain = min(grain, GRAIN_OF_OVERLAP * deepest)
-    return max(grain, ROUNDING * furthest_place(work, NEW))
+        resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
+    return max(resolution, ROUNDING * furthest_place(work, NEW))
 
 
 def event_share(scene, work, row, which):
@@ -80,9 +80,9 @@ def switch_share(scene, work, observed, clock, step):
     """The share of the step at which the first pair switches; above 1 where none does."""
     locate_contacts(scene, work, NEW)
     if clock[TOLERANCE] < math.inf or awaits_touch(observed):
-        grain = grain_of(work, clock)
+        resolution = resolution_of(work, clock)
         shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
-        depth = grain if deepest_overlap(work) > 0.0 else max(grain, shallowest)
-        share = first_switch(scene, work, step, grain, depth)
+        depth = resolution if deepest_overlap(work) > 0.0 else max(resolution, shallowest)
+        share = first_switch(scene, work, step, resolution, depth)
         return law_event_share(scene, work, share) if share > 1.0 else share
     return math.inf

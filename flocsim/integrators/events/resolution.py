@@ -13,10 +13,10 @@ from flocsim.laws import CONTACT_FORCE, contact_force, has
 SHARE_OF_DEPTH = 0.02
 """Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
 
-GRAINS_LATER = 100.0
-"""… and so finely that the error of velocity leads to so many grains at most."""
+MOST_LATER = 100.0
+"""… and so finely that the error of velocity leads to so many times that at most."""
 
-GRAINS_AFTER_RELEASE = 1e3
+MOST_AFTER_RELEASE = 1e3
 """As many where a contact ends: a step that has to be cut there costs more than that is worth."""
 
 NEARLY = 0.99
@@ -63,26 +63,26 @@ def above_rounding(work, state, length):
     return max(length, COARSEST_ROUNDING * furthest_place(work, state))
 
 
-def touch_grain(scene, work, state, row, grain):
-    """The overlap that a new contact may have got to unnoticed [m]; ``grain`` if it is damped."""
+def touch_resolution(scene, work, state, row, resolution):
+    """The overlap that a new contact may have got to unnoticed [m]; all of it if it is damped."""
     speed = -normal_rate(work, state, row)
     view = contact_view(scene, work, state, row)
-    stiffness = pressed(scene, view, grain, 0.0) / grain
+    stiffness = pressed(scene, view, resolution, 0.0) / resolution
     if not (stiffness > 0.0 and speed > 0.0):
-        return grain
+        return resolution
     frequency = math.sqrt(stiffness / view.effective_mass)
     if not bounces(scene, view, speed, frequency):
-        return grain
-    later = GRAINS_LATER * grain / max(frequency * memory_of(work, row), TINY)
-    return above_rounding(work, state, min(grain, SHARE_OF_DEPTH * speed / frequency, later))
+        return resolution
+    later = MOST_LATER * resolution / max(frequency * memory_of(work, row), TINY)
+    return above_rounding(work, state, min(resolution, SHARE_OF_DEPTH * speed / frequency, later))
 
 
-def release_grain(scene, work, state, row, grain):
+def release_resolution(scene, work, state, row, resolution):
     """How far a contact may have opened unnoticed [m], while its damping still pulls."""
     speed = normal_rate(work, state, row)
     if not speed > 0.0:
-        return grain
+        return resolution
     view = contact_view(scene, work, state, row)
     pull = abs(pressed(scene, view, 0.0, -speed)) / view.effective_mass
-    later = GRAINS_AFTER_RELEASE * grain * speed / max(pull * memory_of(work, row), TINY)
-    return above_rounding(work, state, min(grain, later))
+    later = MOST_AFTER_RELEASE * resolution * speed / max(pull * memory_of(work, row), TINY)
+    return above_rounding(work, state, min(resolution, later))

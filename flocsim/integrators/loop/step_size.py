@@ -23,9 +23,9 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
-from flocsim.integrators.events.first_event import grain_of
+from flocsim.integrators.events.first_event import resolution_of
 from flocsim.integrators.events.modes import OTHER_CLOSEST, OTHER_CONTACTS
-from flocsim.integrators.events.resolution import touch_grain
+from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
 
 SAFETY = 0.9
@@ -84,13 +84,13 @@ SETTLED_GROWTH = 3.0
 
 def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
-    grain = grain_of(work, clock)
+    resolution = resolution_of(work, clock)
     for row in range(work.tally[CANDIDATES]):
         gap = work.geometry[NOW, row, GAP]
         if 0.0 <= gap < clock[TOLERANCE]:
             rate = normal_rate(work, NOW, row)
             if gap * rate < 0.0:
-                behind = 0.5 * touch_grain(scene, work, NOW, row, grain)
+                behind = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
                 ahead = (abs(gap) + behind) / abs(rate)
                 if ahead < IMMINENT * step:
                     step = ahead

@@ -19,7 +19,7 @@ from tests.helpers.methods import by_adaptive
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, head_on, star, watched
 from tests.reference.samples import scene_of as random_scene
 
-GRAIN = 1e-13
+RESOLUTION = 1e-13
 RADIUS = 5e-6
 SCENES = range(30)
 
@@ -54,17 +54,17 @@ def test_a_graze_inside_one_step_is_found(depth, along):
     half = 4.0 * math.sqrt(4.0 * RADIUS * depth) / min(along, 1.0 - along) / 2.0
     scene, work = passing(depth, half, along)
     assert work.geometry[NOW, 0, 2] > 0.0 < work.geometry[NEW, 0, 2]
-    share = first_switch(scene, work, 1.0, GRAIN, GRAIN)
+    share = first_switch(scene, work, 1.0, RESOLUTION, RESOLUTION)
     assert share < along
-    assert -GRAIN <= look_at(scene, work, 1.0, share, 0, -1) < 0.0
+    assert -RESOLUTION <= look_at(scene, work, 1.0, share, 0, -1) < 0.0
     # Earlier, the outlines are apart.
     enters = along - math.sqrt(4.0 * RADIUS * depth) / (2.0 * half)
     assert share == pytest.approx(enters, abs=0.05 * along)
 
 
-@pytest.mark.parametrize("depth", [-1e-12, -1e-15, 0.5 * GRAIN])
+@pytest.mark.parametrize("depth", [-1e-12, -1e-15, 0.5 * RESOLUTION])
 def test_a_near_miss_is_none(depth):
-    assert first_switch(*passing(depth), 1.0, GRAIN, GRAIN) == NEVER
+    assert first_switch(*passing(depth), 1.0, RESOLUTION, RESOLUTION) == NEVER
 
 
 def fly_by(depth, integrator):
@@ -121,17 +121,17 @@ def worst_margin(scene, work, shares, reaching):
 def found(seed, reaching):
     """Scene, work arrays, and the share at which the first switch is found."""
     scene, work = wandering(seed, reaching)
-    return scene, work, first_switch(scene, work, 1.0, GRAIN, GRAIN)
+    return scene, work, first_switch(scene, work, 1.0, RESOLUTION, RESOLUTION)
 
 
 @pytest.mark.parametrize("reaching", [False, True], ids=["touch", "closest"])
 @pytest.mark.parametrize("seed", SCENES)
-def test_the_first_switch_is_located_to_the_grain(seed, reaching):
+def test_the_first_switch_is_located_to_the_resolution(seed, reaching):
     scene, work, share = found(seed, reaching)
     before = np.linspace(0.0, min(share, 1.0), 200)
-    assert worst_margin(scene, work, before, reaching).min() >= -GRAIN
+    assert worst_margin(scene, work, before, reaching).min() >= -RESOLUTION
     if share < 1.0:
-        assert -GRAIN <= worst_margin(scene, work, [share], reaching)[0] < 0.0
+        assert -RESOLUTION <= worst_margin(scene, work, [share], reaching)[0] < 0.0
 
 
 def test_these_scenes_switch_in_every_way():
