@@ -18,6 +18,7 @@ from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
+from flocsim.hooks import HOOKS
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
@@ -156,7 +157,13 @@ class System:
     def fillings(self, observer: Fillings | None = None) -> Fillings:
         """{hook: function} of integrator, shapes and an observer."""
         shapes: Fillings = spheres_only.FILLINGS if self.spheres_only else {}
-        return {**self.integrator.fillings, **shapes, **(observer or {})}
+        filled = {**self.integrator.fillings, **shapes, **(observer or {})}
+        for replaced in filled.keys() - set(HOOKS.values()):
+            raise UsageError(
+                f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "
+                "flocsim.hooks.HOOKS lists what can"
+            )
+        return filled
 
     def compose(
         self, entry: Callable = advance, observer: Fillings | None = None, *, jit: bool = True

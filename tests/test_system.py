@@ -9,7 +9,9 @@ from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact import spheres_only
+from flocsim.hooks import HOOKS
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
+from flocsim.laws import compiled_calls
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 
 BALL = Body(Sphere(5e-6), surface_density=2.0)
@@ -228,3 +230,18 @@ def test_spheres_by_their_own_code_and_by_that_of_polygons(integrator):
     assert np.abs(own.position - general.position).max() < 1e-14
     gap = np.hypot(*(own.position[:, 0] - own.position[:, 1])[:, :2].T) - 1e-5
     assert gap.min() < 0.0
+
+
+@attrs.frozen
+class Meddling(VelocityVerlet):
+    @property
+    def replaces(self):
+        return {contacts.least_listed_gap: contacts.least_listed_gap}
+
+
+def test_only_hooks_can_be_replaced():
+    with pytest.raises(UsageError, match=r"points\.least_listed_gap cannot be replaced: flocsim"):
+        System(head_on(), [ELASTIC], Meddling()).run(1e-6)
+    marked = set(System(head_on(), [ELASTIC]).fillings()) | set(compiled_calls())
+    assert marked <= set(HOOKS.values())
+    assert "flocsim.hooks.attempt" in HOOKS
