@@ -54,15 +54,16 @@ SCENES = {"trapped": trapped, "pressed": pressed}
 
 
 @cache
-def end_of(scene, integrator, count):
+def end_of(name, integrator, count):
     """Places and velocities times 0.1 ms (n, 6) [m] after so many equal steps, turns at 10 µm."""
-    bodies, forces, until = SCENES[scene]()
+    bodies, forces, until = SCENES[name]()
     system = PolygonSystem(bodies, forces, integrator)
     driver = system.compose(entry=even_steps, jit=False)
-    work, clock = work_of(system.scene(), *system.motion()), integrator.fresh_clock()
+    scene = system.scene(jit=False)
+    work, clock = work_of(scene, *system.motion()), integrator.fresh_clock()
     clock[TOLERANCE] = min(clock[TOLERANCE], EXACT)
     clock[UNTIL], clock[LARGEST_STEP] = until, until / count
-    assert driver(system.scene(), work, clock, until / count, count)
+    assert driver(scene, work, clock, until / count, count)
     return work.motion[NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
