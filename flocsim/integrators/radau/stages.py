@@ -118,7 +118,7 @@ def solve_stages(scene, work, clock, step):
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
         change = newton_step(scene, work, clock[TIME], step)
-        goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, step))
+        goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         if before == math.inf:
             pace = FIRST_PACE

@@ -78,7 +78,7 @@ def error_ratio(scene, work, clock, step):
     clock[STEP_ERROR] = error
     if not error < math.inf:
         return -1.0
-    return error / max(step_tolerance(work, clock), rounding_size(scene, work, step))
+    return error / max(step_tolerance(work, clock), rounding_size(scene, work, NEW, step))
 
 
 def body_error(scene, work, body):
@@ -105,14 +105,14 @@ def error_size(scene, work):
     return largest
 
 
-def rounding_size(scene, work, step):
-    """What rounding alone does to a step's result [m]."""
+def rounding_size(scene, work, state, step):
+    """What rounding alone does to a step that ends in a state [m]."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
         memory = work.bodies[body, MEMORY]
         for axis in range(3):
-            place = abs(work.motion[NEW, body, axis])
-            speed = abs(work.motion[NEW, body, VELOCITY + axis])
+            place = abs(work.motion[state, body, axis])
+            speed = abs(work.motion[state, body, VELOCITY + axis])
             size = place * (1.0 + memory / step) + speed * (step + memory)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest
