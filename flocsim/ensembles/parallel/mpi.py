@@ -7,7 +7,7 @@ from typing import Any
 
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.errors import UsageError
-from flocsim.interruption import INTERRUPTION, PATIENCE, STOPPED, end_with_parent
+from flocsim.interruption import INTERRUPTION, end_with_parent
 
 LAST_WORDS = 0.5
 """Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
@@ -62,6 +62,4 @@ class MpiCommunicator(Communicator):
         sys.stdout.flush()
         sys.stderr.flush()
         time.sleep(LAST_WORDS)
-        if code == STOPPED and self.rank > 0:
-            time.sleep(PATIENCE)  # rank 0 has got the signal as well, and is the one that says so
         self.world.Abort(code)
