@@ -39,8 +39,8 @@ LAWLESS = (
 """(law, what is left out where a scene has none, why)."""
 
 UNDERIVED = (
-    ("position_force", "derivative by the place", "no body force reads a place or the time"),
-    ("velocity_force", "derivative by the velocity", "no body force reads a velocity"),
+    ("position_derivatives", "derivative by the place", "no body force reads a place or the time"),
+    ("velocity_derivatives", "derivative by the velocity", "no body force reads a velocity"),
 )
 """The same for the derivatives that an implicit method would take."""
 

@@ -20,14 +20,16 @@ from flocsim.compiler.composer import compile_law
 from flocsim.hooks import hook
 
 LAWS = (
-    "body_force", "velocity_force", "position_force", "centre_force", "centre_derivatives",
-    "surface_force", "surface_derivatives", "contact_force", "slip_limit", "contact_event",
+    "body_force", "velocity_derivatives", "position_derivatives",
+    "centre_force", "centre_derivatives", "surface_force", "surface_derivatives",
+    "contact_force", "contact_derivatives", "slip_limit", "contact_event",
 )  # fmt: skip
 """Names of the laws, in the order of ``scene.laws``."""
 
 (
-    BODY_FORCE, VELOCITY_FORCE, POSITION_FORCE, CENTRE_FORCE, CENTRE_DERIVATIVES,
-    SURFACE_FORCE, SURFACE_DERIVATIVES, CONTACT_FORCE, SLIP_LIMIT, CONTACT_EVENT,
+    BODY_FORCE, VELOCITY_DERIVATIVES, POSITION_DERIVATIVES,
+    CENTRE_FORCE, CENTRE_DERIVATIVES, SURFACE_FORCE, SURFACE_DERIVATIVES,
+    CONTACT_FORCE, CONTACT_DERIVATIVES, SLIP_LIMIT, CONTACT_EVENT,
 ) = range(len(LAWS))  # fmt: skip
 
 
@@ -44,15 +46,18 @@ def body_force(scene, view):
 
 
 @hook
-def velocity_force(scene, view):
-    """The part of body_force whose kernels read the body's velocity."""
-    return scene.laws[VELOCITY_FORCE](view, scene.parameters)
+def velocity_derivatives(scene, view):
+    """Derivatives of body_force by the body's velocity: (fx, fy, torque) by vx, by vy, by spin.
+
+    None where no kernel reads it [N s/m, N s/rad, N s, N m s/rad].
+    """
+    return scene.laws[VELOCITY_DERIVATIVES](view, scene.parameters)
 
 
 @hook
-def position_force(scene, view):
-    """The part of body_force whose kernels read the body's place or the time."""
-    return scene.laws[POSITION_FORCE](view, scene.parameters)
+def position_derivatives(scene, view):
+    """The same by its place: (fx, fy, torque) by x, by y, by the angle [N/m, N/rad, N, N m/rad]."""
+    return scene.laws[POSITION_DERIVATIVES](view, scene.parameters)
 
 
 @hook
@@ -86,6 +91,13 @@ def contact_force(scene, view):
 
 
 @hook
+def contact_derivatives(scene, view):
+    """(normal, tangential) of contact_force, then both by overlap, by its rate, by slip, by its
+    rate [N, N/m, N s/m]."""
+    return scene.laws[CONTACT_DERIVATIVES](view, scene.parameters)
+
+
+@hook
 def slip_limit(scene, view):
     """The largest elastic tangential displacement that a contact holds [m]."""
     return scene.laws[SLIP_LIMIT](view, scene.parameters)
@@ -102,22 +114,27 @@ def signatures():
     """{law: its numba signature}."""
     from numba import types
 
-    number, parameters = types.float64, types.Array(types.float64, 1, "C")
+    number, parameters = types.float64, types.CPointer(types.float64)
 
     def view_type(view):
         return types.NamedUniTuple(number, len(view._fields), view)
 
     body, pair, contact = map(view_type, (BodyView, PairView, ContactView))
-    two, three = types.UniTuple(number, 2), types.UniTuple(number, 3)
-    of_body, of_pair = three(body, parameters), number(pair, parameters)
-    derivatives = two(pair, parameters)
+
+    def numbers(count):
+        return types.UniTuple(number, count)
+
+    of_body, of_pair = numbers(3)(body, parameters), number(pair, parameters)
+    derivatives_of_body = numbers(9)(body, parameters)
+    derivatives_of_pair = numbers(2)(pair, parameters)
     return dict(
         zip(
             LAWS,
             (
-                of_body, of_body, of_body, of_pair, derivatives, of_pair, derivatives,
-                two(contact, parameters), number(contact, parameters),
-                number(contact, parameters, types.int64),
+                of_body, derivatives_of_body, derivatives_of_body,
+                of_pair, derivatives_of_pair, of_pair, derivatives_of_pair,
+                numbers(2)(contact, parameters), numbers(10)(contact, parameters),
+                number(contact, parameters), number(contact, parameters, types.int64),
             ),
             strict=True,
         )

@@ -65,8 +65,8 @@ def test_laws_that_a_scene_has_not_are_said_to_be_out():
     names = {
         "centre_force": "forces along lines of centres",
         "surface_force": "forces at closest points",
-        "position_force": "derivative by the place",
-        "velocity_force": "derivative by the velocity",
+        "position_derivatives": "derivative by the place",
+        "velocity_derivatives": "derivative by the velocity",
     }
     for forces in ([], [VanDerWaals()], [VanDerWaals(gap="surface"), Trap()], [StokesDrag()]):
         laws, out = System(FAR, forces).pieces.laws, lines_of("out:", FAR, forces)

@@ -41,13 +41,21 @@ def compiler_error() -> type[Exception]:
 def call_by_address(signature: Any) -> Callable:
     """A function for compiled code: ``call(address, *arguments)`` of a function of a signature.
 
-    The arguments must have just the types of the signature.
+    The arguments must have just the types of the signature, but that an array is handed to a
+    pointer: the seven words that make an array do not fit into registers.
     """
+    from numba import types
     from numba.core import cgutils
     from numba.core.errors import TypingError
     from numba.extending import intrinsic
 
     def generate(context, builder, typed, values):
+        values = [
+            context.make_array(given)(context, builder, value).data
+            if isinstance(given, types.Array)
+            else value
+            for given, value in zip(typed.args, values, strict=True)
+        ]
         convention = context.call_conv
         kind = convention.get_function_type(signature.return_type, signature.args)
         function = builder.inttoptr(values[0], kind.as_pointer())
@@ -58,8 +66,12 @@ def call_by_address(signature: Any) -> Callable:
             convention.return_status_propagate(builder, status)
         return result
 
+    def as_handed(given):
+        is_plain = isinstance(given, types.Array) and given.layout == "C"
+        return types.CPointer(given.dtype) if is_plain else given
+
     def typed_call(address, given):
-        if tuple(given) != signature.args:
+        if tuple(map(as_handed, given)) != signature.args:
             raise TypingError(f"a law takes {signature.args}, found {tuple(given)}")
         return signature.return_type(address, *given), generate
 

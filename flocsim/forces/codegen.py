@@ -23,11 +23,17 @@ from flocsim.forces.check import (
     reach_of,
     sample_pairs,
 )
+from flocsim.forces.differences import (
+    body_change,
+    changed_body,
+    changed_contact,
+    contact_change,
+)
 from flocsim.laws import LAWS
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
-
+CHANGES = body_change, changed_body, contact_change, changed_contact
 
 ROOM = 64
 """Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
@@ -84,6 +90,7 @@ class Source:
 def made_laws(text, base, kernels):
     """{law: function} of a source text; the same functions for the same text and kernels."""
     namespace = {"PairView": PairView, "BASE": base, "max": max, "min": min, "abs": abs}
+    namespace |= {each.__name__: each for each in CHANGES}
     namespace |= dict(kernels)
     exec(compile(text, "<scene>", "exec"), namespace)
     return {name: namespace[name] for name in LAWS if name in namespace}
@@ -117,8 +124,24 @@ def difference_text(call, field, size):
     return f"({shifted[0]} - {shifted[1]}) / (2.0 * {size})"
 
 
+def differences_text(name, force, view, parts, axes, keep):
+    """Source of a function with the one-sided differences of a sum of forces by some axes.
+
+    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis.
+    """
+    lines = [f"def {name}({view}, parameters):", f"    now = {force}({view}, parameters)"]
+    found = [f"now[{part}]" for part in range(parts)] if keep else []
+    for axis in axes:
+        lines += [
+            f"    size_{axis} = {view}_change({view}, {axis})",
+            f"    new_{axis} = {force}(changed_{view}({view}, {axis}, size_{axis}), parameters)",
+        ]
+        found += [f"(new_{axis}[{part}] - now[{part}]) / size_{axis}" for part in range(parts)]
+    return "\n".join([*lines, f"    return {', '.join(found)}"]) + "\n"
+
+
 def write_body_laws(source, forces):
-    """Body forces, and the parts of them that the implicit integrators differentiate."""
+    """Body forces, and derivatives of those parts of them that depend on velocity or place."""
     terms = {"body_force": [], "velocity_force": [], "position_force": []}
     for force in forces:
         kernel = force.kernel_in(source.fluid)
@@ -132,6 +155,10 @@ def write_body_laws(source, forces):
     source.functions += [
         sum_function(name, "body", some, 3) for name, some in terms.items() if some
     ]
+    for name, axes in (("position", range(3)), ("velocity", range(3, 6))):
+        if terms[f"{name}_force"]:
+            law = f"{name}_derivatives", f"{name}_force"
+            source.functions.append(differences_text(*law, "body", 3, axes, keep=False))
 
 
 def write_pair_laws(source, forces, kind):
@@ -171,6 +198,8 @@ def write_contact_laws(source, forces):
             events.append((event_count(force, source.fluid), call))
     if terms:
         source.functions.append(sum_function("contact_force", "contact", terms, 2))
+        law = "contact_derivatives", "contact_force"
+        source.functions.append(differences_text(*law, "contact", 2, range(4), keep=True))
     if limits:
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
         source.functions.append(f"def slip_limit(contact, parameters):\n    return {least}\n")

@@ -101,7 +101,7 @@ def load(tmp_path, monkeypatch):
     return write
 
 
-SIGNATURE = numba.float64(numba.float64, numba.float64[::1])
+SIGNATURE = numba.float64(numba.float64, numba.types.CPointer(numba.float64))
 by_address = call_by_address(SIGNATURE)
 
 

@@ -23,7 +23,7 @@ from flocsim.compiler.numba_internals import (
     typed_once,
 )
 
-ONE = numba.float64(numba.float64, numba.float64[::1])
+ONE = numba.float64(numba.float64, numba.types.CPointer(numba.float64))
 
 
 def root(x):
@@ -95,6 +95,8 @@ def test_what_a_function_raises_comes_through_a_call_by_address():
 def test_arguments_of_other_types_are_refused_when_compiled():
     with pytest.raises(numba.TypingError, match="a law takes"):
         calling(1, 3, np.ones(1))
+    with pytest.raises(numba.TypingError, match="a law takes"):
+        calling(1, 3.0, np.ones(4)[::2])
 
 
 def test_inner_functions_are_linked_and_have_no_machine_code(fresh):

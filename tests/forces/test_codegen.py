@@ -116,13 +116,13 @@ def test_body_forces_add_up():
 )  # fmt: skip
 def test_derivatives_are_asked_of_the_forces_that_have_them(force, velocity, position):
     pieces = laws_of([force], Fluid())
-    assert ("velocity_force" in pieces.laws) is velocity
-    assert ("position_force" in pieces.laws) is position
+    assert ("velocity_derivatives" in pieces.laws) is velocity
+    assert ("position_derivatives" in pieces.laws) is position
 
 
 def test_a_flow_that_varies_makes_drag_a_function_of_place():
     shear = laws_of([StokesDrag()], Fluid(gradient=(0.0, 1.0, 0.0, 0.0)))
-    assert "position_force" in shear.laws
+    assert "position_derivatives" in shear.laws
 
 
 def central_difference(pieces, law, pair, field, size):

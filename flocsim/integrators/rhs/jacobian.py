@@ -30,8 +30,6 @@ from flocsim.arrays import (
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
-    BodyView,
-    ContactView,
 )
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.views import (
@@ -44,16 +42,16 @@ from flocsim.integrators.rhs.views import (
 from flocsim.laws import (
     CENTRE_FORCE,
     CONTACT_FORCE,
-    POSITION_FORCE,
-    VELOCITY_FORCE,
+    POSITION_DERIVATIVES,
+    VELOCITY_DERIVATIVES,
     centre_derivatives,
     centre_force,
-    contact_force,
+    contact_derivatives,
     has,
-    position_force,
+    position_derivatives,
     surface_derivatives,
     surface_force,
-    velocity_force,
+    velocity_derivatives,
 )
 
 
@@ -133,36 +131,17 @@ def add_turning(scene, work, row, normal, tangential):
         stiffness[STIFFNESS, 3 * b + ANGLE, 3 * b + ANGLE] -= torque_b
 
 
-def changed_view(view, axis, by):
-    """A ContactView with its overlap, overlap rate, slip or slip rate (axis 0–3) changed."""
-    return ContactView(
-        view.overlap + by * (axis == 0), view.overlap_rate + by * (axis == 1),
-        view.slip + by * (axis == 2), view.slip_rate + by * (axis == 3),
-        view.effective_mass, view.radius_i, view.radius_j,
-    )  # fmt: skip
-
-
-def change_of(view, axis):
-    """How much to change one entry of a view by for a difference [m or m/s]."""
-    value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
-    floor = 1e-13 if axis % 2 == 0 else 1e-9
-    return 1e-3 * abs(value) + floor
-
-
 def add_contact(scene, work, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    view = contact_view(scene, work, NOW, row)
-    normal, tangential = contact_force(scene, view)
+    found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
     for axis in range(4):
-        size = change_of(view, axis)
-        more, further = contact_force(scene, changed_view(view, axis, size))
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
         which = STIFFNESS if axis % 2 == 0 else DAMPING
-        add_product(work, which, a, b, along, by, sign * (more - normal) / size)
-        add_product(work, which, a, b, across, by, sign * (further - tangential) / size)
-    add_turning(scene, work, row, normal, tangential)
+        add_product(work, which, a, b, along, by, sign * found[2 + 2 * axis])
+        add_product(work, which, a, b, across, by, sign * found[3 + 2 * axis])
+    add_turning(scene, work, row, found[0], found[1])
 
 
 def add_contacts(scene, work):
@@ -171,47 +150,21 @@ def add_contacts(scene, work):
             add_contact(scene, work, row)
 
 
-def shifted(view, axis, by):
-    """A BodyView with one of x, y, angle (axis 0–2) or vx, vy, spin (axis 3–5) changed."""
-    return BodyView(
-        view.time,
-        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
-        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
-        view.mass, view.buoyant_mass, view.inertia, view.radius,
-    )  # fmt: skip
-
-
-def add_velocity_derivative(scene, work, view, body):
-    """One body's forces by its velocity, by differences of the kernels."""
-    speeds = (view.vx, view.vy, view.spin)
-    before = velocity_force(scene, view)
+def add_body(work, which, body, derivatives):
+    """Add the derivatives of one body's force by its coordinates, of one after another."""
     for axis in range(3):
-        floor = 1e-9 / view.radius if axis == 2 else 1e-9
-        size = 1e-3 * abs(speeds[axis]) + floor
-        after = velocity_force(scene, shifted(view, 3 + axis, size))
         for part in range(3):
-            damping = -(after[part] - before[part]) / size
-            work.jacobian[DAMPING, 3 * body + part, 3 * body + axis] += damping
-
-
-def add_position_derivative(scene, work, view, body):
-    """One body's forces by its place, by differences of the kernels."""
-    before = position_force(scene, view)
-    for axis in range(3):
-        size = 1e-6 if axis == 2 else 1e-6 * view.radius
-        after = position_force(scene, shifted(view, axis, size))
-        for part in range(3):
-            stiffness = -(after[part] - before[part]) / size
-            work.jacobian[STIFFNESS, 3 * body + part, 3 * body + axis] += stiffness
+            entry = derivatives[3 * axis + part]
+            work.jacobian[which, 3 * body + part, 3 * body + axis] -= entry
 
 
 def add_bodies(scene, work, time):
     for body in range(scene.bodies.shape[0]):
         view = body_view(scene, work, time, NOW, body)
-        if has(scene, VELOCITY_FORCE):
-            add_velocity_derivative(scene, work, view, body)
-        if has(scene, POSITION_FORCE):
-            add_position_derivative(scene, work, view, body)
+        if has(scene, VELOCITY_DERIVATIVES):
+            add_body(work, DAMPING, body, velocity_derivatives(scene, view))
+        if has(scene, POSITION_DERIVATIVES):
+            add_body(work, STIFFNESS, body, position_derivatives(scene, view))
 
 
 def add_centres(scene, work, time):
