@@ -17,11 +17,9 @@ numba's symbol table, where two of them can collide and silently return each oth
 import builtins
 import functools
 import hashlib
-import os
 import re
 import sys
 import types
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,11 +33,10 @@ INLINED_SIZE = 1200
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of functions that only compiled code calls."""
 
-MADE = re.compile(r"flocsim_(scene|law)_[0-9a-f]+\.py$")
-"""Files that are made here, and say nothing to a user."""
+MADE = re.compile(r"<flocsim_(scene|law)_[0-9a-f]+>$")
+"""Code that is made here, and says nothing to a user."""
 
 _composed: dict = {}
-_warned: list[OSError] = []
 
 
 class Linker:
@@ -72,37 +69,6 @@ class Linker:
         return copy
 
 
-def cache_folder() -> Path | None:
-    """The folder of compiled scenes, or None where it cannot be written (said once)."""
-    folder = cache_path()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".probe-{os.getpid()}"
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        warn_uncached(error)
-        return None
-    return folder
-
-
-def warn_uncached(error):
-    """Say once that compiled code cannot be kept."""
-    if not _warned:
-        _warned.append(error)
-        warnings.warn(
-            f"no compiled code is kept: the cache folder {cache_path()} cannot be written "
-            f"({error.strerror}); set FLOCSIM_CACHE to one that can",
-            stacklevel=2,
-        )
-
-
-def cache_path() -> Path:
-    import platformdirs
-
-    return Path(os.environ.get("FLOCSIM_CACHE") or platformdirs.user_cache_dir("flocsim"))
-
-
 def entry_source(entry):
     """The text of the module that numba caches: one function that calls the driver."""
     code = entry.__code__
@@ -113,16 +79,8 @@ def entry_source(entry):
     )
 
 
-def write_once(path, text):
-    """Write a file that several processes may write at once; all of them write the same."""
-    if not path.exists():
-        temporary = path.with_suffix(f".{os.getpid()}")
-        temporary.write_text(text)
-        os.replace(temporary, path)
-
-
 def linked_module(entry, fillings, name, options):
-    """(module ``name``, whose ``run`` calls the linked entry; whether the disk keeps it)."""
+    """The module ``name``, whose ``run`` calls the linked entry."""
     import numba
 
     from flocsim.compiler.numba_internals import inner_compiler, typed_once
@@ -135,17 +93,11 @@ def linked_module(entry, fillings, name, options):
         small = len(clone.__code__.co_code) < INLINED_SIZE
         return typed_once(numba.njit(clone, **inner, forceinline=small))
 
-    folder = cache_folder()
-    text = entry_source(entry)
-    path = (folder or Path("<composed>")) / f"{name}.py"
-    if folder is not None:
-        write_once(path, text)
     module = types.ModuleType(name)
-    module.__file__ = str(path)
-    sys.modules[name] = module
+    sys.modules[name] = module  # where numba looks for it when it loads compiled code
     module.driver = Linker(fillings, transform).link(entry)
-    exec(compile(text, str(path), "exec"), module.__dict__)
-    return module, folder is not None
+    exec(compile(entry_source(entry), f"<{name}>", "exec"), module.__dict__)
+    return module
 
 
 def options_of(allocates):
@@ -159,11 +111,11 @@ def compiled(entry, fillings, name, allocates):
     """The entry compiled as module ``name`` at its first call, from the disk where it is there."""
     import numba
 
-    from flocsim.compiler.numba_internals import compiler_error, quick_typing
+    from flocsim.compiler.numba_internals import compiler_error, kept_on_disk, quick_typing
 
     options = options_of(allocates)
-    module, kept = linked_module(entry, fillings, name, options)
-    dispatcher = numba.njit(module.run, cache=kept, **options)
+    module = linked_module(entry, fillings, name, options)
+    dispatcher = kept_on_disk(numba.njit(module.run, **options), name)
 
     def call(*arguments):
         try:
@@ -173,10 +125,6 @@ def compiled(entry, fillings, name, allocates):
             return dispatcher(*arguments)
         except compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
-        except OSError as error:
-            # Compiled, but the disk took no copy: go on with what is in memory.
-            warn_uncached(error)
-            return dispatcher(*arguments)
 
     return call
 
@@ -226,19 +174,22 @@ def compile_law(law: Callable, signature: Any) -> int:
     """
     import numba
 
-    from flocsim.compiler.numba_internals import address_of, compiler_error, quick_typing
+    from flocsim.compiler.numba_internals import (
+        address_of,
+        compiler_error,
+        kept_on_disk,
+        quick_typing,
+    )
 
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
-        module, kept = linked_module(law, {}, f"flocsim_law_{key[0]}", options_of(False))
+        name = f"flocsim_law_{key[0]}"
+        module = linked_module(law, {}, name, options_of(False))
         options = {**options_of(False), **UNWRAPPED}
+        dispatcher = kept_on_disk(numba.njit(module.run, **options), name)
         try:
             with quick_typing():
-                try:
-                    dispatcher = numba.njit(signature, cache=kept, **options)(module.run)
-                except OSError as error:
-                    warn_uncached(error)
-                    dispatcher = numba.njit(signature, **options)(module.run)
+                dispatcher.compile(signature)
         except compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         _composed[key] = dispatcher, address_of(dispatcher, signature)

@@ -10,6 +10,7 @@
    were to call it: that halves the time of compiling.
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits.
+6. ``kept_on_disk``: numba's own cache unpickles whatever lies in its folder; ours is checked first.
 
 Measured: benchmarks/speed/compile_times.py --without NAME leaves one of 3 to 5 out.
 """
@@ -18,9 +19,13 @@ import contextlib
 import functools
 import gc
 import os
+import pickle
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
+
+from flocsim.compiler import disk_cache
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 """Names of what to leave out, to measure what it gains."""
@@ -98,6 +103,57 @@ def address_of(dispatcher: Any, signature: Any) -> int:
     """
     compiled = dispatcher.get_compile_result(signature)
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+def type_text(kind: Any) -> str:
+    """A numba type, or types, in words that differ where what is compiled may: with the names of
+    fields, in their order."""
+    from numba import types
+
+    if isinstance(kind, tuple | types.BaseTuple):
+        parts: Any = kind
+        return f"{getattr(kind, 'fields', '')}({', '.join(map(type_text, parts))})"
+    return str(kind)
+
+
+def kept_on_disk(dispatcher: Any, name: str) -> Any:
+    """The function, loaded from flocsim.compiler.disk_cache where it is there, and put there else.
+
+    ``name`` is one that only functions which do the same have.
+    """
+    import llvmlite
+    import numba
+    from numba.core.caching import NullCache
+    from numba.core.compiler import CompileResult
+    from numba.core.serialize import dumps
+
+    class DiskCache(NullCache):
+        """What numba asks for compiled code, and tells of it."""
+
+        def key(self, signature, codegen):
+            """What compiled code depends on beside its name: types, processor, versions."""
+            versions = sys.version, numba.__version__, llvmlite.__version__
+            return repr((type_text(signature), codegen.magic_tuple(), versions))
+
+        def load_overload(self, sig, target_context):
+            """The compiled function for a signature; None where there is none to be relied upon."""
+            target_context.refresh()
+            data = disk_cache.read(name, self.key(sig, target_context.codegen()))
+            if data is None:
+                return None
+            try:
+                return CompileResult._rebuild(target_context, *pickle.loads(data))
+            except Exception:
+                return None  # written by this code, and yet of no use: compiled anew
+
+        def save_overload(self, sig, data):
+            """Keep what has been compiled, unless it holds addresses of this process."""
+            if not data.library.has_dynamic_globals:
+                key = self.key(sig, data.codegen)
+                disk_cache.write(name, key, dumps(data._reduce()))
+
+    dispatcher._cache = DiskCache()
+    return dispatcher
 
 
 class NoEnvironment:

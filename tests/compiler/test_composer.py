@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, System
-from flocsim.compiler import composer
+from flocsim.compiler import composer, disk_cache
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.numba_internals import call_by_address
@@ -170,7 +170,7 @@ def test_an_edited_kernel_returns_the_new_physics_from_a_warm_cache(load, tmp_pa
         return compose(load(*edits).scaled, {})(3.0)
 
     def files():
-        return sorted(path.name for path in folder.rglob("*.nbc"))
+        return sorted(path.name for path in folder.rglob("*.code"))
 
     assert answer() == 6.0
     first = files()
@@ -213,7 +213,7 @@ def test_a_law_is_called_by_its_address_and_compiled_anew_only_where_it_was_edit
         return scale(compile_law(load(*edits).scaled_view, SIGNATURE), 3.0, np.ones(1))
 
     def files():
-        return sorted(path.name for path in (tmp_path / "cache").rglob("*.nbc"))
+        return sorted(path.name for path in (tmp_path / "cache").rglob("*.code"))
 
     assert answer() == 6.0
     first = files()
@@ -273,7 +273,7 @@ def test_a_cache_folder_that_cannot_be_written_is_said_once_and_costs_no_result(
     # A file in the way stops even the superuser, whom no permission bits would.
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "file" / "cache"))
-    monkeypatch.setattr(composer, "_warned", [])
+    monkeypatch.setattr(disk_cache, "_warned", set())
     monkeypatch.setattr(composer, "_composed", {})
     with pytest.warns(UserWarning, match="FLOCSIM_CACHE") as caught:
         assert compose(entry, {hooked: filling})(1.0) == 20.0

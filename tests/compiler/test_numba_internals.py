@@ -3,6 +3,7 @@
 import gc
 import re
 import sys
+from collections import namedtuple
 from pathlib import Path
 
 import numba
@@ -18,8 +19,10 @@ from flocsim.compiler.numba_internals import (
     address_of,
     call_by_address,
     inner_compiler,
+    kept_on_disk,
     quick_typing,
     remembering,
+    type_text,
     typed_once,
 )
 
@@ -155,6 +158,27 @@ def test_what_cannot_be_typed_is_asked_again():
     for _ in range(2):
         with pytest.raises(TypeError):
             memory("plus", None, (), {})
+
+
+def test_compiled_code_is_kept_by_ours_and_never_by_numbas_cache(fresh, tmp_path):
+    kept = kept_on_disk(numba.njit(twice), "twice")
+    assert kept(3.0) == 6.0
+    [path] = tmp_path.iterdir()
+    assert path.suffix == ".code"
+    again = kept_on_disk(numba.njit(twice), "twice")
+    again.compile((types.float64,))
+    assert again.stats.cache_hits == {(types.float64,): 1}
+    assert again(3.0) == 6.0
+    # Another type is other code.
+    assert kept(3) == 6
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_the_text_of_a_type_has_the_names_of_fields_in_their_order():
+    first, second = (namedtuple("View", names) for names in ("x y", "y x"))
+    texts = {type_text((types.NamedUniTuple(types.float64, 2, kind),)) for kind in (first, second)}
+    assert len(texts) == 2
+    assert str(ONE.args[1]) in type_text(ONE.args)
 
 
 @pytest.mark.parametrize("collecting", [True, False])

@@ -1,0 +1,218 @@
+"""Compiled code on disk: files whose content is checked, in folders that nobody else can write.
+
+Loading compiled code runs what it says, so that a file is taken only where its folder and all
+folders above are the user's or root's and writable by nobody else (as OpenSSH's StrictModes asks of
+keys), and where its checksum is right. The checksum finds damage and files under wrong names; it
+is no secret, so that it keeps nobody out: the permissions do. On any doubt there is no file, and
+the code is compiled anew.
+"""
+
+import contextlib
+import hashlib
+import os
+import secrets
+import stat
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+MARK = b"flocsim compiled code 1\n"
+DIGEST_SIZE = 32
+SUFFIX = ".code"
+UNFINISHED = ".unfinished"
+
+LARGEST = 256 * 2**20
+"""Bytes of the largest file that is read: an engine has one million."""
+
+ABANDONED = 86_400.0
+"""Seconds after which a file that was never finished is removed: its writer was killed."""
+
+WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+_warned: set[str] = set()
+
+
+def warn_once(text: str) -> None:
+    """A warning, the first time that it is given in this process."""
+    if text not in _warned:
+        _warned.add(text)
+        warnings.warn(text, stacklevel=2)
+
+
+def own_folder() -> Path:
+    """The user's own folder of compiled code."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("flocsim"))
+
+
+def cache_path() -> Path:
+    """The folder of compiled code: FLOCSIM_CACHE, else the user's own."""
+    named = os.environ.get("FLOCSIM_CACHE")
+    return Path(named) if named else own_folder()
+
+
+def owner_name(number: int) -> str:
+    """A user in words, "alice" or "user 1234"."""
+    import pwd
+
+    try:
+        return pwd.getpwuid(number).pw_name
+    except KeyError:
+        return f"user {number}"
+
+
+def home_folder() -> Path | None:
+    """The user's home: who can exchange that can do anything, so that no folder above matters."""
+    import pwd
+
+    try:
+        return Path(os.path.realpath(pwd.getpwuid(os.getuid()).pw_dir))
+    except KeyError:
+        return None
+
+
+def is_ours(found: os.stat_result) -> bool:
+    """Whether something is the user's or root's."""
+    return found.st_uid in (0, os.getuid())
+
+
+def why_unsafe(folder: Path) -> str:
+    """Why others could exchange what is in a folder, in words with the remedy; "" if they can't.
+
+    ``folder`` is resolved (without links); parts that do not exist yet are left out. Above the
+    folder itself a folder that all can write will do if it is sticky, as /tmp is: there
+    nobody can rename or remove what is another's.
+    """
+    if not hasattr(os, "getuid"):
+        return ""  # Windows keeps a user's folders by other means
+    home = home_folder()
+    for each in (folder, *folder.parents):
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            found = os.lstat(each)
+            if not is_ours(found):
+                return (
+                    f"{each} belongs to {owner_name(found.st_uid)}, not to you or root: "
+                    "set FLOCSIM_CACHE to a folder of your own"
+                )
+            sticky = each != folder and found.st_mode & stat.S_ISVTX
+            if found.st_mode & WRITABLE_BY_OTHERS and not sticky:
+                return (
+                    f"others can write into {each}: chmod go-w {each}, or set FLOCSIM_CACHE to a "
+                    "folder that only you can write"
+                )
+        if each == home:
+            break
+    return ""
+
+
+def resolved(folder: Path) -> Path:
+    return Path(os.path.realpath(folder))
+
+
+def folders() -> Iterator[Path]:
+    """Where compiled code is looked for: in the cache folder, and in the user's own if the first
+    one cannot be written; only in those where nobody else can have put it."""
+    first = resolved(cache_path())
+    for folder in [first] if is_writable(first) else [first, resolved(own_folder())]:
+        if reason := why_unsafe(folder):
+            warn_once(f"no compiled code is kept: {reason}")
+        else:
+            yield folder
+
+
+def is_writable(folder: Path) -> bool:
+    """Whether files can be put into a folder, or it can be made."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return not folder.is_dir() or os.access(folder, os.W_OK | os.X_OK)
+
+
+def file_name(name: str, key: str) -> str:
+    """The file of what is called ``name``; the key tells what else its content depends on."""
+    return f"{name}-{hashlib.blake2b(key.encode(), digest_size=8).hexdigest()}{SUFFIX}"
+
+
+def digest(name: str, key: str, data: bytes) -> bytes:
+    """The checksum of a file's content, which says what it is the content of as well."""
+    hashed = hashlib.blake2b(f"{name}\0{key}\0".encode(), digest_size=DIGEST_SIZE)
+    hashed.update(data)
+    return hashed.digest()
+
+
+def read(name: str, key: str) -> bytes | None:
+    """What has been written under a name and a key, whole and unchanged; else None."""
+    for folder in folders():
+        content = content_of(folder / file_name(name, key))
+        start = len(MARK) + DIGEST_SIZE
+        if content is not None and content.startswith(MARK):
+            data = content[start:]
+            if content[len(MARK) : start] == digest(name, key, data):
+                return data
+    return None
+
+
+def content_of(path):
+    """The bytes of an ordinary file of the user's or root's that only they can write; else None."""
+    flags = os.O_RDONLY
+    for more in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+        flags |= getattr(os, more, 0)
+    with contextlib.suppress(OSError), open(os.open(path, flags), "rb") as file:
+        found = os.fstat(file.fileno())
+        ours = not hasattr(os, "getuid") or (
+            is_ours(found) and not found.st_mode & WRITABLE_BY_OTHERS
+        )
+        if stat.S_ISREG(found.st_mode) and ours and found.st_size <= LARGEST:
+            return file.read()
+    return None
+
+
+def write(name: str, key: str, data: bytes) -> None:
+    """Keep data under a name and a key, in place of what is there; said once where that fails."""
+    for folder in folders():
+        if not is_writable(folder):
+            continue
+        try:
+            make_folder(folder)
+            if reason := why_unsafe(folder):
+                return warn_once(f"no compiled code is kept: {reason}")
+            replace(folder / file_name(name, key), MARK + digest(name, key, data) + data)
+        except OSError as error:
+            warn_once(
+                f"no compiled code is kept: the cache folder {folder} cannot be written "
+                f"({error.strerror}); set FLOCSIM_CACHE to one that can"
+            )
+        return None
+    return None
+
+
+def make_folder(folder):
+    """Make a folder and those above that are missing, writable by this user alone."""
+    if not folder.is_dir():
+        make_folder(folder.parent)
+        with contextlib.suppress(FileExistsError):
+            os.mkdir(folder, 0o755)
+
+
+def replace(path, content):
+    """Put a file in its place, whole or not at all; no two processes write to one name."""
+    temporary = path.with_name(f".{secrets.token_hex(12)}{UNFINISHED}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
+    try:
+        with open(os.open(temporary, flags | getattr(os, "O_BINARY", 0), 0o644), "wb") as file:
+            file.write(content)
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+    remove_abandoned(path.parent)
+
+
+def remove_abandoned(folder):
+    """Remove what killed processes have left unfinished."""
+    for each in folder.glob(f".*{UNFINISHED}"):
+        with contextlib.suppress(OSError):
+            if time.time() - os.lstat(each).st_mtime > ABANDONED:
+                os.unlink(each)

@@ -1,0 +1,297 @@
+"""Compiled code on disk: taken only where it is whole and nobody else can have put it there."""
+
+import os
+import pickle
+import stat
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from flocsim.compiler import composer, disk_cache
+from flocsim.compiler.composer import compose
+from flocsim.compiler.disk_cache import MARK, digest, file_name, read, why_unsafe, write
+
+ROOT = hasattr(os, "getuid") and os.getuid() == 0
+only_root = pytest.mark.skipif(not ROOT, reason="gives files to other users")
+NOBODY = 65534
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The cache folder, which is made when it is first needed; the user's own lies beside it."""
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(disk_cache, "own_folder", lambda: tmp_path / "own")
+    monkeypatch.setattr(disk_cache, "_warned", set())
+    return tmp_path / "cache"
+
+
+def only_file(folder):
+    [path] = folder.iterdir()
+    return path
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+def entry(x):
+    return doubled(x) + 1.0
+
+
+def answer():
+    """What a new process would compute: nothing compiled is at hand but on disk."""
+    composer._composed.clear()
+    return compose(entry, {})(3.0)
+
+
+def test_what_was_written_is_read_by_its_name_and_key_only(folder):
+    write("law", "key", b"code")
+    assert read("law", "key") == b"code"
+    assert read("law", "other") is None
+    assert read("other", "key") is None
+    assert stat.S_IMODE(only_file(folder).stat().st_mode) & 0o022 == 0
+
+
+def test_a_file_under_another_ones_name_is_none(folder):
+    write("law", "key", b"code")
+    only_file(folder).rename(folder / file_name("other", "key"))
+    assert read("other", "key") is None
+
+
+def test_no_flipped_bit_and_no_lost_end_is_believed(folder):
+    write("law", "key", b"code of some length")
+    path = only_file(folder)
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        changed = bytearray(whole)
+        changed[place] ^= 1 << place % 8
+        path.write_bytes(changed)
+        assert read("law", "key") is None
+        path.write_bytes(whole[:place])
+        assert read("law", "key") is None
+    path.write_bytes(whole + b"\0")
+    assert read("law", "key") is None
+    write("law", "key", b"code of some length")
+    assert path.read_bytes() == whole
+
+
+DAMAGES = {
+    "empty": lambda data: b"",
+    "cut short": lambda data: data[: len(data) // 2],
+    "a flipped bit": lambda data: data[:-50] + bytes([data[-50] ^ 1]) + data[-49:],
+    "something else": lambda data: b"not code",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_code_is_compiled_anew_and_replaced(folder, damage):
+    assert answer() == 7.0
+    path = only_file(folder)
+    whole = path.read_bytes()
+    path.write_bytes(DAMAGES[damage](whole))
+    assert answer() == 7.0
+    assert only_file(folder) == path
+    assert path.stat().st_size == len(whole)
+    before = path.stat().st_mtime_ns
+    assert answer() == 7.0
+    assert path.stat().st_mtime_ns == before
+
+
+class Planted:
+    """A pickle that runs a command."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+def plant(path, target, name="", key=""):
+    """Put a pickle that makes the folder ``target`` into a file, under its checksum if asked."""
+    data = pickle.dumps(Planted(target))
+    path.write_bytes(MARK + digest(name, key, data) + data if name else data)
+
+
+def test_a_planted_pickle_is_not_run(folder, tmp_path):
+    assert answer() == 7.0
+    plant(only_file(folder), tmp_path / "ran")
+    assert answer() == 7.0
+    assert not (tmp_path / "ran").exists()
+
+
+def test_code_that_cannot_be_loaded_is_compiled_anew(folder):
+    assert answer() == 7.0
+    path = only_file(folder)
+    name, key = path.name, []
+    real = disk_cache.write
+
+    def noting(name, text, data):
+        key.append((name, text))
+        real(name, text, data)
+
+    path.unlink()
+    disk_cache.write = noting
+    try:
+        answer()
+    finally:
+        disk_cache.write = real
+    # Whole, by its checksum, and of no use: what another version of numba may have meant.
+    real(*key[0], pickle.dumps(("an", "odd", "tuple")))
+    assert only_file(folder).name == name
+    assert answer() == 7.0
+
+
+def said(caught):
+    return [str(each.message) for each in caught]
+
+
+def test_a_folder_that_others_can_write_is_neither_read_nor_written(folder, tmp_path):
+    write("law", "key", b"code")
+    for mode in (0o777, 0o775, 0o1777):
+        folder.chmod(mode)
+        disk_cache._warned.clear()
+        with pytest.warns(UserWarning, match=f"others can write into {folder}: chmod go-w") as got:
+            assert read("law", "key") is None
+            write("law", "other", b"code")
+        assert len(said(got)) == 1
+    folder.chmod(0o755)
+    assert len(list(folder.iterdir())) == 1
+    assert read("law", "key") == b"code"
+
+
+def test_a_folder_above_that_others_can_write_is_refused_unless_it_is_sticky(tmp_path):
+    above = tmp_path / "above"
+    (above / "cache").mkdir(parents=True)
+    above.chmod(0o777)
+    assert str(above) in why_unsafe(above / "cache")
+    above.chmod(0o1777)
+    assert why_unsafe(above / "cache") == ""
+    assert why_unsafe(above / "not" / "there" / "yet") == ""
+
+
+@only_root
+def test_what_belongs_to_others_is_refused(folder):
+    write("law", "key", b"code")
+    path = only_file(folder)
+    os.chown(path, NOBODY, NOBODY)
+    assert read("law", "key") is None
+    write("law", "key", b"code")
+    assert path.stat().st_uid == 0
+    os.chown(folder, NOBODY, NOBODY)
+    with pytest.warns(UserWarning, match=r"cache belongs to \w+, not to you or root: set FLOCSIM"):
+        assert read("law", "key") is None
+
+
+def test_a_file_that_others_can_write_and_a_link_are_replaced(folder, tmp_path):
+    write("law", "key", b"code")
+    path = only_file(folder)
+    path.chmod(0o666)
+    assert read("law", "key") is None
+    write("law", "key", b"code")
+    assert read("law", "key") == b"code"
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert read("law", "key") is None
+    before = (tmp_path / "elsewhere").read_bytes()
+    write("law", "key", b"new code")
+    assert read("law", "key") == b"new code" and not path.is_symlink()
+    assert (tmp_path / "elsewhere").read_bytes() == before
+
+
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(folder):
+    folder.mkdir()
+    os.mkfifo(folder / file_name("law", "key"))
+    assert read("law", "key") is None
+    write("law", "key", b"code")
+    assert read("law", "key") == b"code"
+
+
+def test_a_folder_in_the_place_of_a_file_costs_the_copy_only(folder):
+    (folder / file_name("law", "key")).mkdir(parents=True)
+    assert read("law", "key") is None
+    with pytest.warns(UserWarning, match="cannot be written"):
+        write("law", "key", b"code")
+    assert [path.name for path in folder.iterdir()] == [file_name("law", "key")]
+
+
+def test_a_shared_folder_that_can_only_be_read_is_used_and_new_code_goes_to_ones_own(
+    folder, tmp_path, monkeypatch
+):
+    write("law", "key", b"code")
+    allowed = os.access
+    # The superuser may write anywhere: only the question is answered as for anybody else.
+    monkeypatch.setattr(
+        os, "access", lambda path, how: str(path) != str(folder) and allowed(path, how)
+    )
+    assert read("law", "key") == b"code"
+    write("law", "new", b"more")
+    assert len(list(folder.iterdir())) == 1
+    assert len(list((tmp_path / "own").iterdir())) == 1
+    assert read("law", "new") == b"more"
+
+
+def test_a_full_disk_is_one_line_and_no_cache(folder, monkeypatch):
+    def full(*words, **more):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(disk_cache, "replace", full)
+    with pytest.warns(UserWarning, match=r"no compiled code is kept: .*No space left") as caught:
+        assert answer() == 7.0
+        write("law", "key", b"code")
+    assert len(said(caught)) == 1
+
+
+def test_many_writers_at_once_leave_one_whole_file(folder):
+    data = os.urandom(200_000)
+    threads = [threading.Thread(target=write, args=("law", "key", data)) for _ in range(8)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert read("law", "key") == data
+    assert only_file(folder).name == file_name("law", "key")
+
+
+def test_what_killed_writers_have_left_is_removed_in_the_end(folder):
+    folder.mkdir()
+    old, new = (folder / f".{name}{disk_cache.UNFINISHED}" for name in ("old", "new"))
+    for path in (old, new):
+        path.write_bytes(b"half")
+    os.utime(old, (0, time.time() - 2 * disk_cache.ABANDONED))
+    write("law", "key", b"code")
+    assert new.exists() and not old.exists()
+
+
+RUN = """\
+from flocsim.compiler.composer import compose
+
+def inner(x):
+    return 3.0 * x
+
+def entry(x):
+    return inner(x) + 1.0
+
+print(compose(entry, {})(2.0))
+"""
+
+
+def test_another_process_finds_the_code_and_a_damaged_one_is_no_trouble(folder, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(RUN)
+
+    def run():
+        done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "7.0\n", "")
+
+    run()
+    path = only_file(folder)
+    before = path.stat().st_mtime_ns
+    run()
+    assert path.stat().st_mtime_ns == before
+    path.write_bytes(path.read_bytes()[:-1000])
+    run()
+    assert path.stat().st_mtime_ns != before
