@@ -34,7 +34,11 @@ ROWS = [
 
 # The same inside a room: its sub-rooms and files. A room's own __init__ may import all of them.
 INNER_ROWS = {
-    "compiler": [["composer"], ["fingerprint", "numba_internals"], ["disk_cache"]],
+    "compiler": [
+        ["composer"],
+        ["interpreter_calls", "numba_internals"],
+        ["fingerprint", "disk_cache"],
+    ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

@@ -68,3 +68,29 @@ def test_a_second_signal_ends_it_at_once():
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
     assert process.returncode == 130
+
+
+ENDLESS = """\
+from flocsim import interruption
+interruption.install()
+from flocsim.compiler.composer import compose
+def inner(x):
+    while x > 0.0:
+        x = x + 1.0 if x < 9.0 else x - 1.0
+    return x
+def entry(x):
+    return inner(x)
+run = compose(entry, {}, jit=JIT)
+run(-1.0)
+print("ready", flush=True)
+run(1.0)
+"""
+
+
+@pytest.mark.parametrize("jit", [True, False])
+def test_a_kernel_that_never_ends_is_ended_by_a_signal(jit):
+    process = started(ENDLESS.replace("JIT", str(jit)))
+    time.sleep(0.2)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")

@@ -1,6 +1,7 @@
 """From plain Python functions to machine code that is warm from disk and never stale.
 
 ``composer``: engines and laws compiled and kept.  ``fingerprint``: what a function does, as a hash.
+``interpreter_calls``: what of Python compiled code cannot call.
 ``disk_cache``: compiled code on disk, and what of it is to be trusted.
 ``numba_internals``: all that leans on numba's private parts.  Imports errors only.
 """

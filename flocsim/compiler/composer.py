@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
+from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.errors import KernelError
 
 INLINED_SIZE = 1200
@@ -156,6 +157,8 @@ def compose(
     ``allocates``, whether any of the functions makes an array.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
+    if jit:
+        refuse_interpreter(entry, fillings)
     key = (fingerprint(entry, fillings, options_text(allocates)), jit)
     if key not in _composed:
         name = f"flocsim_scene_{key[0]}"
@@ -181,6 +184,7 @@ def compile_law(law: Callable, signature: Any) -> int:
         quick_typing,
     )
 
+    refuse_interpreter(law)
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
         name = f"flocsim_law_{key[0]}"

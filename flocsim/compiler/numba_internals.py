@@ -33,6 +33,10 @@ WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 NO_COUNTING = {"_nrt": False}
 """Options of numba.njit for functions that allocate nothing."""
 
+PYTHON_CALLS = ("numba_gil_ensure", "__excinfo_unwrap_args")
+"""How the names begin of what compiled code has in it where it calls Python, or raises an exception
+with numbers in it. Functions that are only linked into others have nothing to do that with."""
+
 _one_at_a_time = threading.RLock()
 
 
@@ -194,6 +198,11 @@ def linked_library(base):
     return LinkedLibrary
 
 
+def calls_python(library: Any) -> bool:
+    """Whether a library's own code takes the interpreter's lock, or makes Python objects."""
+    return any(each.name.startswith(PYTHON_CALLS) for each in library._final_module.functions)
+
+
 @functools.cache
 def inner_compiler() -> dict[str, Any]:
     """{option: value} of numba.njit for functions that are only linked into others."""
@@ -202,6 +211,7 @@ def inner_compiler() -> dict[str, Any]:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
+    from numba.core.errors import UnsupportedError
     from numba.core.typed_passes import NativeLowering
 
     library_class = linked_library(JITCodeLibrary)
@@ -215,7 +225,13 @@ def inner_compiler() -> dict[str, Any]:
         def run_pass(self, state):
             name = state.func_id.func_qualname
             state.library = library_class(state.targetctx.codegen(), name)
-            return super().run_pass(state)
+            changed = super().run_pass(state)
+            if calls_python(state.library):
+                raise UnsupportedError(
+                    "it calls Python while it runs, or raises an exception with numbers in it",
+                    state.func_ir.loc,
+                )
+            return changed
 
     class InnerCompiler(CompilerBase):
         """numba's usual passes with another last one."""

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.encounter import Encounter, make_encounter
+from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
@@ -15,6 +16,7 @@ from flocsim.forces import ContactForce
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.integrators.loop.driver import advance
 from flocsim.io.files import check_writable
 from flocsim.system import System
 
@@ -42,8 +44,16 @@ def check_study(config: Config) -> None:
         )
     for name, pair in sphere_pairs(config):
         check_approach(config, name, pair)
+        check_compilable(pair.system)
     if config.shapes.source == "library":
         read_flocs(config.shapes)
+
+
+def check_compilable(system: System) -> None:
+    """KernelError where a kernel calls what compiled code cannot, as print."""
+    for law in system.pieces.laws.values():
+        refuse_interpreter(law)
+    refuse_interpreter(advance, system.fillings(OBSERVER))
 
 
 def check_approach(config, name, pair):

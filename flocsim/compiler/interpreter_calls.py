@@ -1,0 +1,65 @@
+"""Calls of Python out of compiled code: refused before anything is compiled, with file and line.
+
+Kernels run without the interpreter's lock. Inner functions have no environment in which numba's
+``print`` finds what it needs of Python: it fails while it holds the lock, never gives it back, and
+the process hangs with all of its threads, deaf to signals.
+"""
+
+import builtins
+import dis
+import sys
+import types
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from flocsim.compiler.fingerprint import reached, where
+from flocsim.errors import KernelError
+
+OBJECT_MODE = "objmode"
+"""numba's name for a way back into Python."""
+
+
+def interpreter_call(function: types.FunctionType) -> tuple[str, int] | None:
+    """(name, line) of the first call of Python in a function's own code; None without one."""
+    known = {**vars(builtins), **function.__globals__}
+    numba = sys.modules.get("numba")  # where it is not loaded, nothing of it can be called
+    forbidden = [print, getattr(numba, OBJECT_MODE, print)]
+    for instruction, line in instructions(function.__code__):
+        name = instruction.argval
+        if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            if any(known.get(name) is each for each in forbidden):
+                return name, line
+        elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD") and name == OBJECT_MODE:
+            return name, line
+    return None
+
+
+def instructions(code: types.CodeType) -> Iterator[tuple[dis.Instruction, int]]:
+    """(instruction, line) of a code and the codes in it."""
+    for each in dis.get_instructions(code):
+        yield each, (each.positions.lineno if each.positions else None) or code.co_firstlineno
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from instructions(constant)
+
+
+def refuse_interpreter(entry: Any, fillings: Mapping[Callable, Callable] | None = None) -> None:
+    """KernelError where a function, or one that it reaches, calls Python while it runs compiled.
+
+    ``fillings`` {hook: function}: what stands in the place of hooks.
+    """
+    fillings = fillings or {}
+    pending, seen = [entry], set()
+    while pending:
+        function = fillings.get(pending[-1], pending[-1])
+        pending.pop()
+        if function in seen or not isinstance(function, types.FunctionType):
+            continue
+        seen.add(function)
+        pending += [each for each in reached(function).values() if callable(each)]
+        if (found := interpreter_call(function)) is not None:
+            name, line = found
+            raise KernelError(
+                f"kernel {where(function)} calls {name} in line {line}: compiled code cannot call "
+                "Python while it runs; take it out (to look into a kernel, call it from Python)"
+            )

@@ -1,0 +1,149 @@
+"""What would call Python out of compiled code is refused, by name and line: it used to hang."""
+
+import builtins
+
+import attrs
+import numba
+import pytest
+
+from flocsim import Body, Sphere, System
+from flocsim.compiler.composer import compile_law, compose
+from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.preflight import check_study
+from flocsim.errors import KernelError
+from flocsim.forces import CentreForce
+from tests.helpers.small_study import SMALL, write_small
+
+say = print
+
+
+def printing(x):
+    y = 2.0 * x
+    print(y)
+    return y
+
+
+def printing_by_another_name(x):
+    say(x)
+    return x
+
+
+def printing_by_a_module(x):
+    builtins.print(x)
+    return x
+
+
+def going_back(x):
+    with numba.objmode(y="float64"):
+        y = x + 1.0
+    return y
+
+
+def calling(x):
+    return printing(x) + 1.0
+
+
+def hooked(x):
+    return x
+
+
+def with_hook(x):
+    return hooked(x)
+
+
+def raising(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x
+
+
+def raising_numbers(x):
+    raise ValueError(f"below {int(x)}")
+    return x
+
+
+@pytest.mark.parametrize(
+    ("function", "line", "name"),
+    [
+        (printing, 2, "print"),
+        (calling, None, "print"),
+        (printing_by_another_name, 1, "say"),
+        (going_back, 1, "objmode"),
+    ],
+)
+def test_a_call_of_python_is_refused_by_file_and_line(function, line, name):
+    first = (printing if line is None else function).__code__.co_firstlineno
+    with pytest.raises(KernelError, match=rf"\({__file__}:\d+\) calls {name} in line ") as caught:
+        compose(function, {})
+    assert f"in line {first + (line or 2)}:" in str(caught.value)
+
+
+@pytest.mark.parametrize("function", [printing_by_a_module, raising_numbers])
+def test_what_the_names_do_not_tell_the_compiled_code_does(function):
+    where = rf"test_interpreter_calls\.py:{function.__code__.co_firstlineno}: it calls Python while it runs"
+    with pytest.raises(KernelError, match=where):
+        compose(calling_of(function), {}, allocates=True)(1.0)
+
+
+def calling_of(function):
+    known = {"function": function, "__name__": __name__}
+    exec("def entry(x):\n    return function(x)\n", known)
+    return known["entry"]
+
+
+def test_a_law_and_what_stands_in_for_a_hook_are_looked_at_too():
+    with pytest.raises(KernelError, match="calls print"):
+        compile_law(printing, numba.float64(numba.float64, numba.float64[::1]))
+    compose(with_hook, {}, jit=False)
+    with pytest.raises(KernelError, match="calls print"):
+        compose(with_hook, {hooked: printing})
+
+
+def test_uncompiled_functions_may_print(capsys):
+    assert compose(calling, {}, jit=False)(1.0) == 3.0
+    assert capsys.readouterr().out == "2.0\n"
+
+
+def test_an_exception_without_numbers_is_raised_as_before():
+    refuse_interpreter(raising)
+    checked = compose(calling_of(raising), {})
+    assert checked(1.0) == 1.0
+    with pytest.raises(ValueError, match="below zero"):
+        checked(-1.0)
+
+
+@attrs.frozen
+class Loud(CentreForce):
+    @staticmethod
+    def kernel(pair):
+        print(pair.gap)
+        return 0.0
+
+
+def test_a_force_that_prints_is_refused_before_anything_is_compiled():
+    system = System([Body(Sphere(5e-6), density=2650.0)] * 2, [Loud()])
+    with pytest.raises(KernelError, match=r"kernel Loud\.kernel \(.*\) calls print in line \d+"):
+        system.scene()
+    assert system.scene(jit=False).laws
+
+
+LOUD = """\
+import attrs
+from flocsim.forces import CentreForce
+
+
+@attrs.frozen
+class Loud(CentreForce):
+    @staticmethod
+    def kernel(pair):
+        print(pair.gap)
+        return 0.0
+"""
+
+
+def test_a_study_whose_force_prints_is_refused_before_it_begins(tmp_path):
+    (tmp_path / "loud.py").write_text(LOUD)
+    config = load_config(write_small(tmp_path, SMALL + '[forces.loud]\nclass = "loud:Loud"\n'))
+    with pytest.raises(KernelError, match=r"loud\.py:7\) calls print in line 9: compiled code"):
+        check_study(config)
