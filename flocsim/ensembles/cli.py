@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import io
+import math
 import sys
 import traceback
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from flocsim.ensembles.parallel.communicator import (
     find_communicator,
     launched_rank,
 )
+from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
 from flocsim.io.terminal import plain_warnings, tell
@@ -36,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
     )
+    parser.add_argument(
+        "--heartbeat", type=float, default=SECONDS, metavar="SECONDS",
+        help="end the job where a rank has not been heard of for so long, stopped or on a machine "
+        f"that is gone (default {SECONDS:g}; 0: wait without end)",
+    )  # fmt: skip
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument(
         "--resume", action="store_const", const="resume", default="new", dest="mode",
@@ -153,6 +160,7 @@ def end_all(comm: Communicator, text: str, code: int) -> int:
 
 def guarded(comm, arguments):
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
+    comm.watch(arguments.heartbeat)
     try:
         code = run_rank(comm, arguments)
         comm.close()
@@ -176,6 +184,8 @@ def guarded(comm, arguments):
 
 def join_ranks(arguments):
     """The ranks of the job: those that a launcher started, or --jobs processes."""
+    if not 0.0 <= arguments.heartbeat < math.inf:
+        raise UsageError(f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}")
     comm = find_communicator()
     if arguments.jobs == 1 or arguments.dry_run:
         return comm

@@ -81,7 +81,8 @@ def test_a_call_of_python_is_refused_by_file_and_line(function, line, name):
 
 @pytest.mark.parametrize("function", [printing_by_a_module, raising_numbers])
 def test_what_the_names_do_not_tell_the_compiled_code_does(function):
-    where = rf"test_interpreter_calls\.py:{function.__code__.co_firstlineno}: it calls Python while it runs"
+    line = function.__code__.co_firstlineno
+    where = rf"test_interpreter_calls\.py:{line}: it calls Python while it runs"
     with pytest.raises(KernelError, match=where):
         compose(calling_of(function), {}, allocates=True)(1.0)
 

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from flocsim.ensembles.parallel.heartbeat import Heartbeat
 from flocsim.errors import FlocsimError
 from flocsim.interruption import INTERRUPTION, LAUNCHER_RANKS, stop_requested
 
@@ -31,16 +32,25 @@ class Communicator:
     """Messages between rank 0 and the others, and what can be made of them.
 
     A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
-    job, and ``arrived()``, which yields (source, message) of all that has come in. ``threads``
-    says whether a thread of rank 0 may send and receive while the main one computes.
+    job, and ``arrived()``, which yields (source, message) of all that has come in; ``beat(sign)``
+    and ``signs()`` do the same for signs of life (flocsim.ensembles.parallel.heartbeat), and never
+    wait. ``threads`` says whether a thread of rank 0 may send and receive while the main one
+    computes, ``concurrent`` whether two may at once; ``ends_all``, whether ``abort`` ends the other
+    ranks as well where it is not rank 0 that calls it. ``called``: the rank that a call of the
+    library is for, which may not return, and ``calls`` how many there were.
     """
 
     rank: int
     size: int
     threads = True
+    concurrent = True
+    ends_all = True
+    calls = 0
+    called: int | None = None
 
     def __init__(self) -> None:
         self.inbox: dict[int, collections.deque] = collections.defaultdict(collections.deque)
+        self.heartbeat: Heartbeat | None = None
 
     def send(self, to: int, message: Any) -> None:
         raise NotImplementedError
@@ -51,8 +61,28 @@ class Communicator:
     def abort(self, code: int) -> None:
         raise NotImplementedError
 
+    def beat(self, sign: bytes) -> None:
+        """Give a sign of life to rank 0, or from there to all others."""
+
+    def signs(self) -> Iterable[tuple[int, bytes]]:
+        """(source, sign) of all that have come."""
+        return ()
+
+    def watch(self, seconds: float) -> None:
+        """From now on end the job where a rank gives no sign of life for so long; 0: never."""
+        if self.size > 1 and seconds > 0.0:
+            self.heartbeat = Heartbeat(self, seconds)
+            self.heartbeat.start()
+
+    def unwatch(self) -> None:
+        """Leave off: this rank is about to go."""
+        if self.heartbeat is not None:
+            self.heartbeat.stop()
+
     def take_in(self) -> None:
         """Put what has come into the inbox."""
+        if self.heartbeat is not None and not self.concurrent:
+            self.heartbeat.turn()
         for source, message in self.arrived():
             self.inbox[source].append(message)
 
@@ -102,6 +132,7 @@ class Communicator:
 
     def close(self) -> None:
         """The work is done: let the others go."""
+        self.unwatch()
 
 
 class SerialCommunicator(Communicator):

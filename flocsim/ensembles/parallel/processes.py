@@ -24,14 +24,17 @@ class LostRank(FlocsimError):
 class ProcessCommunicator(Communicator):
     """One process of several, with a pipe to rank 0 or, on rank 0, to each of the others."""
 
+    ends_all = False
+
     def __init__(
         self, rank: int, size: int, pipes: Mapping[int, Connection],
-        others: Sequence[BaseProcess] = (),
+        others: Sequence[BaseProcess] = (), life: Mapping[int, Connection] | None = None,
     ) -> None:  # fmt: skip
-        """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started."""
+        """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started;
+        ``life``: {rank: connection} for signs of life, which get by themselves."""
         super().__init__()
         self.rank, self.size = rank, size
-        self.pipes = pipes
+        self.pipes, self.life = pipes, dict(life or {})
         self.others = others
 
     def send(self, to: int, message: Any) -> None:
@@ -50,6 +53,19 @@ class ProcessCommunicator(Communicator):
             except (EOFError, OSError):
                 self.lose(ranks[pipe])
 
+    def beat(self, sign: bytes) -> None:
+        for pipe in self.life.values():
+            with contextlib.suppress(OSError):  # who has gone is found out by `arrived`
+                pipe.send_bytes(sign)
+
+    def signs(self) -> Iterator[tuple[int, bytes]]:
+        for rank, pipe in list(self.life.items()):
+            try:
+                while pipe.poll():
+                    yield rank, pipe.recv_bytes()
+            except (EOFError, OSError):
+                del self.life[rank]
+
     def lose(self, rank):
         """A process has gone: without rank 0 there is nobody to tell."""
         if self.rank > 0:
@@ -65,6 +81,7 @@ class ProcessCommunicator(Communicator):
 
     def close(self) -> None:
         """Wait for the other processes, which have nothing more to do."""
+        self.unwatch()
         for process in self.others:
             process.join(LAST_SECONDS)
         self.end_others()
@@ -87,22 +104,25 @@ def start_processes(
     """Start ``jobs`` − 1 processes that call ``target(communicator, arguments)``; rank 0's own."""
     context = multiprocessing.get_context("spawn")
     pipes: dict[int, Connection] = {}
+    life: dict[int, Connection] = {}
     others: list[BaseProcess] = []
     for rank in range(1, jobs):
         pipes[rank], far_end = context.Pipe()
+        life[rank], far_life = context.Pipe()
         process = context.Process(
-            target=join_job, args=(target, rank, jobs, far_end, arguments), daemon=True
+            target=join_job, args=(target, rank, jobs, far_end, far_life, arguments), daemon=True
         )
         process.start()
         far_end.close()
+        far_life.close()
         others.append(process)
-    comm = ProcessCommunicator(0, jobs, pipes, others)
+    comm = ProcessCommunicator(0, jobs, pipes, others, life)
     INTERRUPTION.leave = comm.abort
     return comm
 
 
-def join_job(target, rank, jobs, pipe, arguments):
+def join_job(target, rank, jobs, pipe, life, arguments):
     """Where a process that rank 0 has started begins."""
     install()
     INTERRUPTION.speaks = False
-    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}), arguments))
+    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}, life={0: life}), arguments))
