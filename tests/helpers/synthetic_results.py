@@ -35,7 +35,8 @@ def make_results(
     shape = (len(types), len(vertices), len(delta), count)
     outcome, inside = draw_outcomes(rng, shape)
     collided = inside != NOT_APPLICABLE
-    lengths = np.where(collided, rng.uniform(30e-6, 50e-6, (3, *shape)), np.nan)
+    drawn = rng.uniform(30e-6, 50e-6, (3, *shape))
+    lengths = np.where(collided, drawn, np.nan)
     times = np.where(collided, rng.uniform(0.0, 0.1, shape), np.nan)
     failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
     replicates = {
@@ -46,7 +47,7 @@ def make_results(
         "crossed_zone": np.where(collided, rng.integers(0, 2, shape), NOT_APPLICABLE),
         "d_c_collision": lengths[0],
         "d_c_max": lengths[1],
-        "d_c_last": lengths[2],
+        "d_c_last": drawn[2],
         "t_collision": times,
         "t_end": rng.uniform(0.1, 2.0, shape),
         "steps": rng.integers(100, 3000, shape),

@@ -25,6 +25,14 @@ import numpy as np
 
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import checked_sealed, replace_by_blocks
+from flocsim.io.hdf5.structure import structure_of
+from flocsim.io.results.checks import (
+    CODED,
+    check_codes,
+    check_rows,
+    check_structure,
+    check_tables,
+)
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION, frame_of, numbers
 from flocsim.io.results.schema import (
     CLASSES,
@@ -85,7 +93,7 @@ def read_results(path: str | Path, replicates: bool = True) -> Results:
     """
     with opened(path) as file:
         table, rows = file["probabilities"], file["replicates"]
-        return Results(
+        results = Results(
             types=table["type"].asstr()[()],
             vertices=table["vertices"][()],
             delta=table["delta"][()],
@@ -98,6 +106,10 @@ def read_results(path: str | Path, replicates: bool = True) -> Results:
             differences=read_group(file, "differences", DIFFERENCES),
             count=len(rows["replicate"]),
         )
+        check_tables(results)
+        if replicates:
+            check_rows(results.replicates.__getitem__, len(results.failures), len(results.flocs))
+        return results
 
 
 def read_group(file, name, schema):
@@ -141,34 +153,59 @@ def replicate_totals(path: str | Path) -> Totals:
         for place in np.ndindex(*shape):
             for first in range(0, count, BLOCK):
                 part = (*place, slice(first, first + BLOCK))
-                columns = (rows[name][part] for name in ("outcome", "failure", "steps", "rejected"))
-                totals.add(*columns)
+                columns = {name: rows[name][part] for name in CODED}
+                check_codes(columns, reasons)
+                totals.add(*columns.values())
         return totals
 
 
 @contextlib.contextmanager
 def opened(path: str | Path) -> Iterator[Any]:
-    """An open h5py file of a known schema, once the checksum over all of it was found right."""
+    """An open h5py file of a known schema, once the checksum over all of it was found right.
+
+    And once its structure was found to be one that flocsim writes: HDF5 sees no other.
+    """
     import h5py
 
-    with checked_sealed(path) as (data, _):
+    with checked_sealed(path) as (data, size):
         try:
+            nodes = structure_of(data, size)
+            known = nodes[""].attributes
+            data.seek(0)
             with h5py.File(data, "r") as file:
-                if file.attrs.get("format") != FORMAT:
+                if known.get("format") != ("text", ()) or file.attrs["format"] != FORMAT:
                     raise FileError(
                         f"{path} is not a results file: name one that flocsim ensemble wrote"
                     )
-                version = file.attrs.get("schema_version")
+                version = read_version(file, known)
                 if version != SCHEMA_VERSION:
                     raise FileError(
                         f"{path} has results of schema version {version}, this flocsim reads "
                         f"{SCHEMA_VERSION}: read it with the version that wrote it"
                     )
+                check_structure(nodes)
                 yield file
         except FileError:
             raise
-        except (OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError) as error:
-            raise FileError(f"{path} holds no readable results: {error}; run it again") from error
+        except UNREADABLE as error:
+            reason = " ".join(str(error).split())
+            raise FileError(f"{path} holds no readable results: {reason}; run it again") from error
+
+
+UNREADABLE = (
+    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
+    OverflowError, IndexError, EOFError,
+)  # fmt: skip
+"""What h5py raises for what it cannot read."""
+
+
+def read_version(file, known):
+    """The schema version of an open file; "unknown" where it is no number or word."""
+    if known.get("schema_version") not in (("i8", ()), ("text", ())):
+        return "unknown"
+    return str(file.attrs["schema_version"])[:20] if known["schema_version"][0] == "text" else (
+        int(file.attrs["schema_version"])
+    )
 
 
 def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:

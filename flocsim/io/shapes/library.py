@@ -20,8 +20,9 @@ for every N, so that between conditions nothing changes but N.  Every dataset ha
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
 
+import contextlib
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,13 +33,19 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-from flocsim.io.files import read_sealed, replace_file, seal
+from flocsim.io.files import checked_sealed, replace_file, seal
+from flocsim.io.hdf5.expected import Column, hold_against
+from flocsim.io.hdf5.structure import Node, structure_of
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
 
 KIND = "flocsim shape library"
 SCHEMA_VERSION = 1
+MOST_VERTICES = 10_000
+LARGEST = 1.0
+"""Metres beyond which nothing of a floc lies."""
+MOST_PIXELS = 1e12
 
 FLOC_COLUMNS = {
     # name: (attribute of ShapeEntry, type, units, long name)
@@ -169,75 +176,135 @@ def _write_column(group, name, values, units, long_name):
 
 def is_library(path: str | Path) -> bool:
     """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
-    import h5py
-
-    try:
-        with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
-            return file.attrs.get("kind") == KIND
-    except OSError:
-        return False
+    with opened(path) as (file, nodes):
+        return kind_of(file, nodes) == KIND
 
 
 def read_settings(path: str | Path) -> dict[str, Any]:
     """{name: value} of what the fits of a shape library were made with."""
-    import h5py
-
-    with h5py.File(io.BytesIO(read_sealed(path)), "r") as file:
-        return {k: v for k, v in file.attrs.items() if k not in ("kind", "schema_version")}
+    with opened(path) as (file, _):
+        return {
+            name: value.item() if isinstance(value, np.generic) else value
+            for name, value in file.attrs.items()
+            if name not in ("kind", "schema_version")
+        }
 
 
 def read_library(path: str | Path) -> list[ShapeEntry]:
     """The flocs of a shape library, in the order of writing.
 
-    Raises FileError for a file that is missing, damaged, of another kind or another version.
+    Raises FileError for a file that is missing, damaged, of another kind or another version, or
+    that holds what cannot be.
     """
+    with opened(path) as (file, nodes):
+        if kind_of(file, nodes) != KIND:
+            raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
+        version = nodes[""].attributes.get("schema_version") == ("i8", ()) and int(
+            file.attrs["schema_version"]
+        )
+        if version != SCHEMA_VERSION:
+            raise FileError(
+                f"{path} has schema version {version or 'unknown'}, this flocsim reads "
+                f"{SCHEMA_VERSION}: make it again with flocsim fit"
+            )
+        check_structure(nodes)
+        entries = _entries(file)
+    return entries
+
+
+def kind_of(file, nodes):
+    """What an open file says that it is; "" where it says nothing."""
+    known = nodes[""].attributes.get("kind")
+    return str(file.attrs["kind"]) if known == ("text", ()) else ""
+
+
+@contextlib.contextmanager
+def opened(path: str | Path) -> Iterator[tuple[Any, dict[str, Node]]]:
+    """(open h5py file, its structure), once checksum and structure were found right."""
     import h5py
 
-    content = read_sealed(path)
-    try:
-        with h5py.File(io.BytesIO(content), "r") as file:
-            kind, version = file.attrs.get("kind"), file.attrs.get("schema_version")
-            if kind != KIND:
-                raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
-            if version != SCHEMA_VERSION:
-                raise FileError(
-                    f"{path} has schema version {version}, this flocsim reads {SCHEMA_VERSION}: "
-                    "make it again with flocsim fit"
-                )
-            return _entries(file)
-    except FileError:
-        raise
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError) as problem:
-        reason = " ".join(str(problem).split())
-        raise FileError(
-            f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
-        ) from problem
+    with checked_sealed(path) as (data, size):
+        try:
+            nodes = structure_of(data, size)
+            data.seek(0)
+            with h5py.File(data, "r") as file:
+                yield file, nodes
+        except FileError:
+            raise
+        except (
+            OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, OverflowError
+        ) as problem:  # fmt: skip
+            reason = " ".join(str(problem).split())
+            raise FileError(
+                f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
+            ) from problem
+
+
+def check_structure(nodes: Mapping[str, Node]) -> None:
+    """ValueError unless the groups and datasets of a file are those of a shape library."""
+    kinds = {str: "text", float: "f8", np.int64: "i8"}
+    columns = {
+        name: Column(kinds[kind], ("floc", 2) if name == "centroid" else ("floc",))
+        for name, (_, kind, *_) in FLOC_COLUMNS.items()
+    }
+    groups: dict[str, dict[str, Column]] = {"flocs": columns, "fits": {}}
+    for path in nodes:
+        group, _, count = path.rpartition("/")
+        if group == "fits":
+            if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
+                raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
+            groups[path] = {
+                name: Column("f8", ("floc", int(count), 2) if name == "vertices" else ("floc",))
+                for name in FIT_COLUMNS
+            }
+    lengths = hold_against(nodes, groups, groups)
+    if lengths["floc"] < 1 or len(groups) < 3:
+        raise ValueError("there are no flocs")
+    for name, (kind, shape) in nodes[""].attributes.items():
+        if shape != () or kind not in ("text", "flag", "i8", "f8"):
+            raise ValueError(f"its attribute {name} is no text or number")
 
 
 def _entries(file):
-    """The ShapeEntries of an open library; ValueError for vertices that cannot be."""
+    """The ShapeEntries of an open library; ValueError for values that cannot be."""
     flocs = {}
     for name, (attribute, kind, *_) in FLOC_COLUMNS.items():
         dataset = file["flocs"][name]
         if kind is str:
             flocs[attribute] = [str(text) for text in dataset.asstr()[()]]
         else:
-            flocs[attribute] = dataset[()].tolist()
+            values = dataset[()]
+            least = -MOST_PIXELS if name == "centroid" else 0.0
+            most = LARGEST if name == "pixel_size" else MOST_PIXELS
+            inside = (values >= least) & (values <= most) & (values != 0 if least == 0.0 else True)
+            if not inside.all():
+                raise ValueError(f"flocs/{name} holds values that are no numbers of a floc's")
+            flocs[attribute] = values.tolist()
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
-    fits = {
-        int(count): {name: group[name][()] for name in FIT_COLUMNS}
-        for count, group in file["fits"].items()
-    }
+    if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
+        raise ValueError("two flocs have one id")
+    fits = {int(count): _fits(int(count), group) for count, group in file["fits"].items()}
     entries = []
     for row in range(len(flocs["floc_id"])):
-        stored = {}
-        for count, columns in sorted(fits.items()):
-            vertices, radius, error = (columns[name][row] for name in FIT_COLUMNS)
-            if vertices.shape != (count, 2) or not np.isfinite(vertices).all():
-                raise ValueError(
-                    f"vertices of floc {row} at N = {count} have shape {vertices.shape}"
-                )
-            stored[count] = StoredFit(vertices, float(radius), float(error))
+        stored = {
+            count: StoredFit(vertices[row], float(radius[row]), float(error[row]))
+            for count, (vertices, radius, error) in sorted(fits.items())
+        }
         values = {attribute: column[row] for attribute, column in flocs.items()}
         entries.append(ShapeEntry(**values, fits=stored))
     return entries
+
+
+def _fits(count, group):
+    """(vertices, radius, relative error) of all flocs at N = ``count``."""
+    vertices, radius, error = (group[name][()] for name in FIT_COLUMNS)
+    for name, values, most in (
+        ("vertices", np.abs(vertices), LARGEST),
+        ("radius", radius, LARGEST),
+        ("relative_error", error, np.inf),
+    ):
+        if not (np.isfinite(values).all() and np.all(values >= 0.0) and np.all(values <= most)):
+            raise ValueError(f"fits/{count}/{name} holds values that are no numbers of a floc's")
+    if count == 1 and not np.all(radius > 0.0):
+        raise ValueError("fits/1/radius holds circles without a size")
+    return vertices, radius, error

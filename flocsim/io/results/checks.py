@@ -1,0 +1,151 @@
+"""What a results file must hold: its groups and datasets, and values that can be."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from flocsim.io.hdf5.expected import Column, hold_against
+from flocsim.io.hdf5.structure import Node
+from flocsim.io.results.schema import (
+    AXES,
+    CLASSES,
+    DIFFERENCES,
+    EVENTS,
+    NOT_APPLICABLE,
+    OUTCOMES,
+    POOLED,
+    REPLICATES,
+    TABLE,
+    Results,
+)
+
+TYPE, VERTICES, DELTA = (Column(kind, (axis,)) for kind, axis in zip(
+    ("text", "i8", "f8"), AXES, strict=True))  # fmt: skip
+STUDY = {"type": TYPE, "vertices": VERTICES, "delta": DELTA}
+OPTIONAL = ("pooled", "differences", "flocs")
+MOST_CONDITIONS = 1_000_000
+RUN_TYPES = ("text", "i8", "f8")
+FAILED = OUTCOMES.index("failed")
+ROUNDING = 1e-9
+"""By which a bound of a probability may miss 0 or 1."""
+
+INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
+
+
+def columns_of(schema, axes, more=()):
+    """{name: Column} of the arrays of a schema; those of classes have one axis more."""
+    return {
+        name: Column(kind, (*axes, len(CLASSES)) if "class" in name and "class" in more else axes)
+        for name, (kind, _, _) in schema.items()
+    }
+
+
+def check_structure(nodes: Mapping[str, Node]) -> None:
+    """ValueError unless the groups and datasets of a file are those of results."""
+    run = {
+        path.removeprefix("run/"): Column(node.type)
+        for path, node in nodes.items()
+        if path.startswith("run/") and node.type in RUN_TYPES
+    }
+    groups = {
+        "probabilities": columns_of(TABLE, AXES, ("class",))
+        | STUDY | {"class": Column("text", (len(CLASSES),))},
+        "pooled": columns_of(POOLED, AXES[:2]) | {"type": TYPE, "vertices": VERTICES},
+        "differences": columns_of(DIFFERENCES, (len(AXES), len(EVENTS), *AXES))
+        | STUDY
+        | {"against": Column("text", (len(AXES),)), "event": Column("text", (len(EVENTS),))},
+        "replicates": columns_of(REPLICATES, (*AXES, "replicate"))
+        | STUDY | {"replicate": Column("i8", ("replicate",))},
+        "flocs": {"floc": Column("text", ("floc",))},
+        "run": run,
+    }  # fmt: skip
+    lengths = hold_against(nodes, groups, groups.keys() - set(OPTIONAL))
+    if not 0 < lengths["type"] * lengths["vertices"] * lengths["delta"] <= MOST_CONDITIONS:
+        raise ValueError(f"there are no conditions, or more than {MOST_CONDITIONS}")
+    kinds = {"flag_meanings": ("text", ()), "flag_values": ("u1", None)}
+    for name, (kind, shape) in kinds.items():
+        found = nodes["replicates/failure"].attributes.get(name)
+        if found is None or found[0] != kind or shape not in (None, found[1]):
+            raise ValueError(f"replicates/failure has no attribute {name}")
+
+
+def check_tables(results: Results) -> None:
+    """ValueError for names, counts or probabilities that cannot be."""
+    refuse(len(set(results.types)) < len(results.types), "types that are the same")
+    refuse(np.unique(results.vertices).size < results.vertices.size, "vertices that are the same")
+    refuse(np.any(results.vertices < 1), "vertices below 1")
+    refuse(not np.isfinite(results.delta).all(), "delta that are no numbers")
+    refuse(np.unique(results.delta).size < results.delta.size, "delta that are the same")
+    table = results.probabilities
+    for name in TABLE:
+        if name.startswith("n_"):
+            refuse(np.any(table[name] < 0), f"negative numbers in probabilities/{name}")
+        else:
+            refuse(beyond(table[name], 0.0, 1.0), f"values outside [0, 1] in probabilities/{name}")
+    ends = sum(table[name] for name in ("n_missed", "n_undecided", "n_failed"))
+    refuse(
+        np.any(table["n_total"] != results.count)
+        or np.any(ends + table["n_class"].sum(axis=-1) != results.count)
+        or np.any(table["n_collided"] > results.count)
+        or np.any(table["n_inside"] > table["n_collided"]),
+        "counts that contradict each other",
+    )
+    for name, values in results.pooled.items():
+        most = np.inf if name.startswith("n_") else 1.0
+        refuse(beyond(values, 0.0, most), f"values out of range in pooled/{name}")
+    for name, values in results.differences.items():
+        least, most = (0, np.inf) if name.startswith("n_") else (-1.0, 1.0)
+        refuse(beyond(values, least, most), f"values outside [-1, 1] in differences/{name}")
+    refuse(len(results.failures) > 256, "too many reasons")
+
+
+def refuse(wrong, text):
+    if wrong:
+        raise ValueError(f"there are {text}")
+
+
+def beyond(values, least, most):
+    """Whether a value lies outside; NaN, where there was no event, does not."""
+    return bool(np.any((values < least - ROUNDING) | (values > most + ROUNDING)))
+
+
+def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -> None:
+    """ValueError for rows of replicates that no run can have given.
+
+    ``column(name)`` gives the values of a column, all of one shape; ``failures``, ``flocs``: how
+    many words and flocs the codes may stand for, no flocs where that is unknown.
+    """
+    outcome, inside = column("outcome"), column("inside")
+    check_codes({name: column(name) for name in CODED}, failures)
+    for name in ("inside", "crossed_zone"):
+        codes = column(name)
+        refuse_row((codes > 1) & (codes != NOT_APPLICABLE), name)
+    decided = outcome < len(CLASSES)
+    of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
+    refuse_row(decided & (inside != of_class), "inside")
+    for name in ("floc_i", "floc_j"):
+        places = column(name)
+        refuse_row((places < -1) | (places >= (flocs or 2**31)), name)
+    ended = outcome != FAILED
+    for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
+        refuse_row(ended & ~np.isfinite(column(name)), name)
+    touched = ended & (inside != NOT_APPLICABLE)
+    for name in ("d_c_collision", "d_c_max", "t_collision"):
+        refuse_row(touched & ~np.isfinite(column(name)), name)
+
+
+CODED = ("outcome", "failure", "steps", "rejected")
+
+
+def check_codes(columns: Mapping[str, np.ndarray], failures: int) -> None:
+    """ValueError for codes without a word, or negative numbers, in columns of CODED."""
+    refuse_row(columns["outcome"] >= len(OUTCOMES), "outcome")
+    refuse_row(columns["failure"] >= failures, "failure")
+    for name in ("steps", "rejected"):
+        refuse_row(columns[name] < 0, name)
+
+
+def refuse_row(wrong, name):
+    count = int(np.count_nonzero(wrong))
+    if count:
+        raise ValueError(f"{count} values of replicates/{name} are impossible")
