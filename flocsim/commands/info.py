@@ -3,13 +3,15 @@
 import json
 import math
 import sys
-import tomllib
 from argparse import Namespace
 from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.report import format_table
-from flocsim.errors import FileError
+from flocsim.ensembles.storage.cpu_kind import describe_kind
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.errors import ConfigError, FileError
 from flocsim.io.results.file import OUTCOMES, read_results, replicate_totals
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
@@ -62,11 +64,14 @@ def library_text(path):
 
 
 def results_text(path, results, totals):
-    facts = conditions(results) + outcomes(results, totals) + origin(results.run)
+    try:
+        facts = conditions(results) + outcomes(results, totals) + origin(results.run)
+        notes = stored(results.run, "failed")
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable results: {error}; run it again") from error
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
-    notes = json.loads(results.run.get("failed", "[]"))
     if notes:
         lines += ["", *(f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES])]
     if len(notes) > MOST_FAILURES:
@@ -85,7 +90,7 @@ def conditions(results):
         ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
         ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
     ]
-    over = json.loads(results.run.get("overrides", "{}"))
+    over = stored(results.run, "overrides")
     return [*facts, ("over the config", json.dumps(over))] if over else facts
 
 
@@ -93,8 +98,8 @@ def preset(run):
     if "preset" in run:
         return run["preset"] or "none named"
     try:
-        return tomllib.loads(run.get("config", "")).get("preset", "none named")
-    except tomllib.TOMLDecodeError:
+        return str(parse("config", str(run.get("config", ""))).get("preset", "none named"))
+    except ConfigError:
         return "unknown, the config cannot be read"
 
 
@@ -114,8 +119,6 @@ def outcomes(results, totals):
 
 def origin(run):
     """[(name, value)] of all that the group ``run`` knows and a person wants to."""
-    from flocsim.ensembles.storage.cpu_kind import describe_kind
-
     facts = []
     for name, value in run.items():
         if name in APART or value == "":
@@ -123,6 +126,6 @@ def origin(run):
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
         facts.append((name.replace("_", " "), str(value)))
-    kinds = json.loads(run.get("cpus", "[]"))
+    kinds = stored(run, "cpus")
     names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
     return [*facts, ("kind of CPU", "; ".join(names))] if names else facts

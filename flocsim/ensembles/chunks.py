@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flocsim.io.journal.records import CHUNK, encode
+from flocsim.io.json_text import matches
 from flocsim.io.results.schema import REPLICATES, ROW_SIZE
 
 MOST_ROWS = 16_384
@@ -22,6 +23,16 @@ COLUMNS = tuple(REPLICATES)
 SIZES = [ROW[name].itemsize for name in COLUMNS]
 STARTS = {name: sum(SIZES[:place]) for place, name in enumerate(COLUMNS)}
 """Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
+
+NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
+"""What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
+
+DESCRIPTION = {
+    "type": str, "vertices": int, "delta": float, "first": int, "count": int, "identity": str
+}  # fmt: skip
+"""A chunk's, as a pattern."""
+
+LARGEST_REPLICATE = 2**40
 
 Interval = tuple[int, int]
 
@@ -59,10 +70,23 @@ def condition_of(description: dict) -> Condition:
     return Condition(description["type"], description["vertices"], description["delta"])
 
 
+def is_chunk(description: dict | None) -> bool:
+    """Whether a record's description, whoever wrote it, can be that of a chunk."""
+    if not matches(description, DESCRIPTION):
+        return False
+    assert description is not None, "it has keys"
+    first, count = description["first"], description["count"]
+    return (
+        0 <= first < first + count <= LARGEST_REPLICATE
+        and matches(description.get("notes", []), [NOTE])
+    )  # fmt: skip
+
+
 def named(description: dict | None) -> str:
     """A chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
-    if description is None or "first" not in description:
+    if not is_chunk(description):
         return "what it held is unknown"
+    assert description is not None, "it is a chunk's"
     last = description["first"] + description["count"] - 1
     return (
         f"type {description['type']}, N = {description['vertices']}, delta "
@@ -71,8 +95,16 @@ def named(description: dict | None) -> str:
 
 
 def fits(description: dict, length: int) -> bool:
-    """Whether a chunk's data are as long as its description says."""
-    return length == description["count"] * ROW_SIZE
+    """Whether a description is that of a chunk, and its data are as long as it says."""
+    return is_chunk(description) and length == description["count"] * ROW_SIZE
+
+
+def rows_of(data: bytes) -> dict[str, np.ndarray]:
+    """{column: values} of a chunk's data."""
+    count = len(data) // ROW_SIZE
+    return {
+        name: np.frombuffer(data, ROW[name], count, count * STARTS[name]) for name in COLUMNS
+    }
 
 
 def layout() -> str:

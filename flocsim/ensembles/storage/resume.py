@@ -1,7 +1,6 @@
 """Where a study begins: with nothing, or with what a journal and an older results file hold."""
 
 import contextlib
-import json
 import os
 import shlex
 import sys
@@ -11,15 +10,28 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.chunks import Condition, Interval, condition_of, fits, layout, named
+from flocsim.ensembles.chunks import (
+    Condition,
+    Interval,
+    condition_of,
+    fits,
+    layout,
+    named,
+    rows_of,
+)
+from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore
+from flocsim.ensembles.storage.stored_json import is_session, stored
 from flocsim.ensembles.study import Study
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, SESSION, encode
 from flocsim.io.provenance import now
+from flocsim.io.results.checks import check_rows
+from flocsim.io.results.file import BLOCK, UNREADABLE, opened, read_scalar
+from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, throw it away."""
@@ -36,7 +48,8 @@ class Beginning:
     ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
     ``history`` has date and command of the runs before; ``complete`` is what an older results
     file holds, (conditions, replicates of each), where nothing else was found. ``cpus_now`` are
-    the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of.
+    the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of;
+    ``flocs``: how many flocs its rows may be of.
     """
 
     store: RowStore
@@ -47,6 +60,7 @@ class Beginning:
     complete: tuple[tuple[Condition, ...], int] | None = None
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
+    flocs: int = 0
     resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
     @property
@@ -81,6 +95,7 @@ def begin(
             os.unlink(path)
     journal = Journal(path)
     start = Beginning(RowStore(journal, study.conditions), identity, cpus_now=list(cpus))
+    start.flocs = len(study.flocs)
     start.resources.callback(journal.close)
     try:
         take_journal(start)
@@ -105,6 +120,8 @@ def take_journal(start: Beginning) -> None:
             f"{journal.path} is no journal of flocsim, or damaged from its start: move it away"
         )
     sessions = [record.description for record in journal.records if record.kind == SESSION]
+    if not all(is_session(each) for each in sessions):
+        raise FileError(f"{journal.path} was begun by no flocsim: move it away")
     start.history += [{key: each[key] for key in HISTORY} for each in sessions]
     for description in sessions:
         refuse_other(start, journal.path, description["identity"])
@@ -151,6 +168,12 @@ def take_chunk(start, record, known, places, cpus):
         return
     place = places.get(condition_of(about))
     if place is not None:
+        rows = rows_of(start.journal.read(record.offset, record.length))
+        try:
+            check_rows(rows.__getitem__, len(FAILURES), start.flocs)
+        except ValueError as error:
+            start.remarks.append(f"{start.journal.path}: {named(about)}: {error}: computed again")
+            return
         first = about["first"]
         start.store.add(place, first, first + about["count"], record.offset)
         start.notes += about.get("notes", [])
@@ -162,20 +185,45 @@ def take_results(start, output):
 
     With rows in the journal, the old file may be of another study: it will be replaced.
     """
-    from flocsim.io.results.file import opened
-
     begun = any(start.store.counts)
     try:
         file = start.resources.enter_context(opened(output))
-        if "identity" not in file["run"]:
+        run = {name: read_scalar(dataset) for name, dataset in file["run"].items()}
+        if "identity" not in run:
             raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
-        refuse_other(start, output, stored(file, "identity", None))
+        try:
+            refuse_other(start, output, stored(run, "identity"))
+            found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
+            rows, places, count = old_rows(start, file)
+        except UNREADABLE as error:
+            if isinstance(error, FlocsimError):
+                raise
+            raise FileError(f"{output} holds no readable results: {error}; {REMEDY}") from error
     except (FileError, UsageError) as error:
         if not begun:
             raise
         start.remarks.append(f"not used: {error}")
         return
+    for place, condition in enumerate(start.store.conditions):
+        if condition in places and count:
+            start.store.add(place, 0, count, -1)
+    start.store.old = OldTable(rows, places)
+    start.notes += found["failed"]
+    start.cpus_found = distinct([*found["cpus"], *start.cpus_found])
+    earlier = {key: run[key] for key in HISTORY if key in run}
+    start.history = [*found["history"], earlier, *start.history]
+    if not begun:
+        start.complete = (tuple(places), count)
+
+
+def old_rows(start, file):
+    """(table of replicates, {Condition: place in it}, replicates of each) of a results file.
+
+    Raises ValueError for rows that no run can have given.
+    """
     rows = file["replicates"]
+    if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
+        raise ValueError("its codes of failures have other words")
     axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
     places = {
         Condition(str(name), int(n), float(share)): (t, v, d)
@@ -184,18 +232,8 @@ def take_results(start, output):
         for d, share in enumerate(axes[2])
     }
     count = len(rows["replicate"])
-    for place, condition in enumerate(start.store.conditions):
-        if condition in places and count:
-            start.store.add(place, 0, count, -1)
-    start.store.old = OldTable(rows, places)
-    start.notes += stored(file, "failed", [])
-    start.cpus_found = distinct([*stored(file, "cpus", []), *start.cpus_found])
-    earlier = {key: file[f"run/{key}"].asstr()[()] for key in HISTORY if key in file["run"]}
-    start.history = [*stored(file, "history", []), earlier, *start.history]
-    if not begun:
-        start.complete = (tuple(places), count)
-
-
-def stored(file, name, default):
-    """What a results file holds as JSON."""
-    return json.loads(file[f"run/{name}"].asstr()[()]) if name in file["run"] else default
+    for condition in start.store.conditions:
+        for first in range(0, count if condition in places else 0, BLOCK):
+            part = (*places[condition], slice(first, first + BLOCK))
+            check_rows(lambda name, part=part: rows[name][part], len(FAILURES), start.flocs)
+    return rows, places, count

@@ -1,15 +1,29 @@
 """Masks that are given directly: PNG, TIFF, BMP or JPEG pictures, NumPy .npy and .npz files."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from flocsim.errors import ImageError
+from flocsim.io.images.limits import (
+    MOST_LABELS,
+    MOST_PIXELS,
+    check_array,
+    check_entries,
+    check_file,
+    check_shape,
+    check_spread,
+    read_array,
+)
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import SUFFIXES, read_pixels
 from flocsim.io.images.regions import EIGHT, Filters, filled, sorted_out
 
 ARRAYS = (".npy", ".npz")
+MOST_BYTES = 32 * MOST_PIXELS
+"""Of all masks of a file."""
+
 MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)
 """Endings that are taken for masks when a folder is given."""
 
@@ -35,28 +49,60 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
 
 def _arrays(path):
     """[(key, array)] of an .npy or .npz file."""
-    if not path.is_file():
-        raise ImageError(f"{path}: no such file of masks; check the path")
+    check_file(path, "file of masks")
     try:
-        content = np.load(path, allow_pickle=False)
         if path.suffix.lower() == ".npy":
-            return [("", content)]
-        arrays = {key: content[key] for key in sorted(content.files)}
+            with open(path, "rb") as file:
+                return [("", read_array(file, path.stat().st_size, str(path)))]
+        with zipfile.ZipFile(path) as archive:
+            check_entries(path, archive.infolist())
+            arrays = dict(_members(path, archive))
+        return _unpacked(path, arrays) if "shapes" in arrays else list(arrays.items())
+    except ImageError:
+        raise
     except Exception as problem:
-        reason = " ".join(str(problem).split())[:120]
+        reason = " ".join(str(problem).split())[:120] or type(problem).__name__
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
-    if "shapes" not in arrays:
-        return list(arrays.items())
+
+
+def _members(path, archive):
+    """(key, array) of each file of an open archive, in the order of their names."""
+    left = MOST_BYTES
+    for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
+        left -= entry.file_size
+        if left < 0:
+            raise ImageError(f"{path}: would be more than {MOST_BYTES} bytes unpacked")
+        key = entry.filename.removesuffix(".npy")
+        with archive.open(entry) as file:
+            yield key, read_array(file, entry.file_size, f"{path} {key}")
+
+
+def _unpacked(path, arrays):
+    """[(key, array)] of masks that are stored as bits."""
     shapes = arrays.pop("shapes")
-    return [
-        (key, np.unpackbits(bits)[: int(shape.prod())].reshape(shape))
-        for (key, bits), shape in zip(arrays.items(), shapes, strict=True)
-    ]
+    if shapes.dtype.kind not in "iu" or shapes.shape != (len(arrays), 2):
+        raise ImageError(
+            f"{path}: its shapes must be whole numbers ({len(arrays)}, 2), one row for each array, "
+            f"found {shapes.shape} of type {shapes.dtype}"
+        )
+    masks = []
+    for (key, bits), (height, width) in zip(arrays.items(), shapes.tolist(), strict=True):
+        size = height * width
+        if bits.dtype != np.uint8 or bits.ndim != 1 or not 0 < size <= 8 * bits.size:
+            raise ImageError(f"{path} {key}: has not the bits of {height} × {width} pixels")
+        if min(height, width) < 1:
+            raise ImageError(f"{path} {key}: {height} × {width} is no size of a mask")
+        masks.append((key, np.unpackbits(bits)[:size].reshape(height, width)))
+    return masks
 
 
 def _mask(array, name):
+    from scipy.ndimage import find_objects
+
     if array.ndim != 2 or array.size == 0:
         raise ImageError(f"{name}: a mask is an (h, w) array, found shape {array.shape}")
+    check_shape(name, array.shape)
+    check_array(name, array)
     if array.dtype == bool:
         return array.astype(np.int64)
     values = np.unique(array)
@@ -67,7 +113,12 @@ def _mask(array, name):
             f"{name}: a mask holds two values, or labels from 0; found {len(values)} values of "
             f"type {array.dtype}"
         )
-    return array.astype(np.int64)
+    if len(values) > MOST_LABELS:
+        raise ImageError(f"{name}: holds {len(values)} labels, more than {MOST_LABELS}")
+    # Numbered anew from 1: a label may be any number, and a table as long as the largest is made.
+    labels = np.searchsorted(values, array) + (values[0] > 0)
+    check_spread(name, array.shape, find_objects(labels))
+    return labels.astype(np.int64)
 
 
 def segment_mask(

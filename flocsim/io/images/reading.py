@@ -6,9 +6,22 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.errors import ImageError
+from flocsim.io.images.limits import (
+    MOST_PIXELS,
+    check_array,
+    check_deflated,
+    check_file,
+    check_shape,
+)
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 """Endings that are taken for pictures when a folder is given."""
+
+FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
+"""What Pillow may take a file for, whatever its ending."""
+
+PLAIN, DEFLATED = (1, 32773), (8, 32946)
+"""How a TIFF may be packed that Pillow cannot read: not or by runs; deflated."""
 
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
@@ -29,11 +42,12 @@ def read_grey(path: str | Path) -> np.ndarray:
 def read_pixels(path: str | Path) -> np.ndarray:
     """The pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
     path = Path(path)
-    if not path.is_file():
-        raise ImageError(f"{path}: no such picture file; check the path")
+    check_file(path, "picture file")
     pixels = _decode(path)
-    if pixels.size == 0 or not np.all(np.isfinite(pixels)):
-        raise ImageError(f"{path}: the picture is empty or holds values that are not numbers")
+    if pixels.size == 0:
+        raise ImageError(f"{path}: the picture is empty")
+    check_shape(path, pixels.shape)
+    check_array(path, pixels)
     return pixels
 
 
@@ -58,7 +72,9 @@ def _decode(path):
 def _decode_with_pillow(path):
     from PIL import Image, ImageOps
 
-    with Image.open(path) as image:
+    # Only these: others run programs on what they read (EPS: Ghostscript).
+    with Image.open(path, formats=FORMATS) as image:
+        check_shape(path, (*image.size[::-1], len(image.getbands())))
         if getattr(image, "n_frames", 1) > 1:
             raise ImageError(
                 f"{path}: holds {image.n_frames} pictures; save the wanted one to its own file"
@@ -76,7 +92,11 @@ def _decode_with_tifffile(path):
     import tifffile
 
     try:
-        return np.asarray(tifffile.imread(path))
+        with tifffile.TiffFile(path) as tiff:
+            check_tiff(path, tiff)
+            return np.asarray(tiff.asarray())
+    except ImageError:
+        raise
     except Exception as problem:
         raise ImageError(
             f"{path}: cannot be read as a TIFF ({_one_line(problem)}); "
@@ -84,9 +104,35 @@ def _decode_with_tifffile(path):
         ) from problem
 
 
+def check_tiff(path, tiff):
+    """ImageError for a TIFF that is a stack, too large, or unpacks to more than its pixels."""
+    if len(tiff.pages) != 1:
+        raise ImageError(
+            f"{path}: holds {len(tiff.pages)} pictures; save the wanted one to its own file"
+        )
+    page = tiff.pages[0]
+    check_shape(path, page.shape)
+    check_shape(path, (page.imagelength, page.imagewidth))
+    if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
+        raise ImageError(
+            f"{path}: its packing {page.compression!s:.40} is unknown; save it uncompressed, or as "
+            "PNG"
+        )
+    rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
+    wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
+    if wanted > 64 * MOST_PIXELS:
+        raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
+    places = zip(page.dataoffsets, page.databytecounts, strict=True)
+    if page.compression in DEFLATED:
+        pieces = ((offset, length, wanted) for offset, length in places)
+        check_deflated(path, tiff.filehandle, pieces)
+
+
 def _one_line(problem):
     if type(problem).__name__ == "UnidentifiedImageError":
         return "its content is of no known picture format"
+    if isinstance(problem, MemoryError):
+        return "out of memory"
     return " ".join(str(problem).split())[:120] or type(problem).__name__
 
 

@@ -17,6 +17,8 @@ from typing import Any, BinaryIO
 
 import attrs
 
+from flocsim.io.json_text import read_json
+
 MARK = b"\x93FLOCREC"
 HEAD = struct.Struct("<8sIIQ16s8s")
 CHECKED = HEAD.size - 8
@@ -69,7 +71,10 @@ def read_head(file, offset):
     words = file.read(words_length)
     if digest(head[:CHECKED] + words, 8) != head_digest:
         return None
-    description = json.loads(words.decode("utf-8"))
+    try:
+        description = read_json(words, {})
+    except ValueError:
+        return None  # its checksum is right, but no flocsim has written it
     return kind, description, offset + HEAD.size + words_length, length, data_digest
 
 

@@ -1,6 +1,7 @@
 """What a results file must hold: its groups and datasets, and values that can be."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -67,6 +68,18 @@ def check_structure(nodes: Mapping[str, Node]) -> None:
         found = nodes["replicates/failure"].attributes.get(name)
         if found is None or found[0] != kind or shape not in (None, found[1]):
             raise ValueError(f"replicates/failure has no attribute {name}")
+
+
+def check_coordinates(file: Any) -> None:
+    """ValueError where two groups of an open file have coordinates that differ."""
+    first = file["probabilities"]
+    for group in file.values():
+        for axis in {*AXES} & group.keys():
+            if group[axis][()].tolist() != first[axis][()].tolist():
+                raise ValueError(f"{group.name.strip('/')}/{axis} is not probabilities/{axis}")
+    for path, words in (("probabilities/class", CLASSES), ("differences/event", EVENTS)):
+        if path in file and tuple(file[path].asstr()[()]) != words:
+            raise ValueError(f"{path} holds other words than {', '.join(words)}")
 
 
 def check_tables(results: Results) -> None:

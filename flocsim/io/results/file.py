@@ -30,6 +30,7 @@ from flocsim.io.results.checks import (
     CODED,
     check_codes,
     check_rows,
+    check_coordinates,
     check_structure,
     check_tables,
 )
@@ -184,6 +185,7 @@ def opened(path: str | Path) -> Iterator[Any]:
                         f"{SCHEMA_VERSION}: read it with the version that wrote it"
                     )
                 check_structure(nodes)
+                check_coordinates(file)
                 yield file
         except FileError:
             raise
