@@ -1,7 +1,6 @@
 """The command `flocsim`, also `python -m flocsim`: one subcommand for each thing to do."""
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 
@@ -13,8 +12,8 @@ if "ensemble" in sys.argv[1:2]:
 
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
 from flocsim.ensembles.cli import silent_unless_first
-from flocsim.errors import FlocsimError
-from flocsim.io.terminal import plain_warnings
+from flocsim.errors import FileError, FlocsimError
+from flocsim.io.terminal import output_problem, plain_streams, plain_warnings
 
 COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
 
@@ -31,19 +30,22 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def tolerant_streams() -> None:
-    """Print on any terminal: a letter that it does not know must not end a command."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; the exit code. Errors are one line on stderr."""
-    tolerant_streams()
-    plain_warnings()
-    with silent_unless_first():
-        arguments = make_parser().parse_args(argv)
+    with plain_streams():
+        plain_warnings()
+        with silent_unless_first():
+            arguments = make_parser().parse_args(argv)
+        code = run(arguments)
+        problem = output_problem()
+        if problem:
+            print(f"flocsim: {problem}", file=sys.stderr)
+        # The results of a study are whole, whether anybody reads its table or not.
+        needed = arguments.command != "ensemble" or arguments.dry_run
+        return FileError.exit_code if problem and needed and code == 0 else code
+
+
+def run(arguments: argparse.Namespace) -> int:
     try:
         return arguments.run(arguments)
     except FlocsimError as error:
@@ -52,9 +54,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("flocsim: interrupted", file=sys.stderr)
         return 130
+    except MemoryError:
+        print("flocsim: out of memory", file=sys.stderr)
+        return FlocsimError.exit_code
     except BrokenPipeError:
         # The reader of our output has gone (`| head`): not an error, but nothing more to say.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
 
 

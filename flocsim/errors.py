@@ -3,11 +3,34 @@
 A message is one line: what was found, where, and what to do about it.
 """
 
+import re
+
+UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Letters that steer a terminal, turn the direction of what follows, or are no letters."""
+
+
+def visible(text: str, keep: str = "\n\t") -> str:
+    """A text with the letters that no terminal should get written out, as in Python: \\x1b.
+
+    Names of files, of flocs and of types come from others. ``keep``: those that stay.
+    """
+
+    def written_out(found):
+        letter = found[0]
+        return letter if letter in keep else ascii(letter)[1:-1]
+
+    return UNSEEN.sub(written_out, text)
+
 
 class FlocsimError(Exception):
     """The root of all flocsim's errors; the command line prints its message and no traceback."""
 
     exit_code = 70
+    keep = ""
+    """Letters beyond the printable ones that its message may have."""
+
+    def __str__(self) -> str:
+        return visible(super().__str__(), self.keep)
 
 
 class UsageError(FlocsimError):
@@ -18,6 +41,8 @@ class UsageError(FlocsimError):
 
 class ConfigError(UsageError):
     """Wrong entries of a config file; each line names the key, the finding, the remedy."""
+
+    keep = "\n"
 
 
 class RangeError(UsageError, ValueError):

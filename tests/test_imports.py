@@ -63,7 +63,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal"],
-        ["files", "provenance", "confidence", "markdown", "terminal"],
+        ["files", "hdf5", "json_text", "provenance", "confidence", "markdown", "terminal"],
     ],
 }
 

@@ -11,7 +11,7 @@ from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.report import format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
-from flocsim.errors import ConfigError, FileError
+from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io.results.file import OUTCOMES, read_results, replicate_totals
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
@@ -57,7 +57,10 @@ def library_text(path):
     facts = [
         ("shapes", f"{len(entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
-        *((name.replace("_", " "), str(value)) for name, value in read_settings(path).items()),
+        *(
+            (name.replace("_", " "), visible(str(value), ""))
+            for name, value in read_settings(path).items()
+        ),
     ]
     lines = [f"{name:<14} {value}" for name, value in facts]
     return "\n".join([f"{path}: a shape library", "", *lines, "", format_errors(entries)])
@@ -73,7 +76,10 @@ def results_text(path, results, totals):
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
     if notes:
-        lines += ["", *(f"failed: {describe_note(note)}" for note in notes[:MOST_FAILURES])]
+        lines += [
+            "",
+            *(f"failed: {visible(describe_note(note), '')}" for note in notes[:MOST_FAILURES]),
+        ]
     if len(notes) > MOST_FAILURES:
         lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
@@ -125,7 +131,7 @@ def origin(run):
             continue
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
-        facts.append((name.replace("_", " "), str(value)))
+        facts.append((visible(name.replace("_", " "), ""), visible(str(value), "")))
     kinds = stored(run, "cpus")
     names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
     return [*facts, ("kind of CPU", "; ".join(names))] if names else facts

@@ -103,8 +103,15 @@ def linked_module(entry, fillings, name, options):
 
 def options_of(allocates):
     """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
+    from numba import config
+
     from flocsim.compiler.numba_internals import NO_COUNTING
 
+    if config.DISABLE_JIT:
+        raise KernelError(
+            "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs compiled "
+            "code only: unset it (in Python, jit=False runs a scene uncompiled)"
+        )
     return {"nogil": True, "error_model": "numpy", **({} if allocates else NO_COUNTING)}
 
 

@@ -102,9 +102,7 @@ def fits(description: dict, length: int) -> bool:
 def rows_of(data: bytes) -> dict[str, np.ndarray]:
     """{column: values} of a chunk's data."""
     count = len(data) // ROW_SIZE
-    return {
-        name: np.frombuffer(data, ROW[name], count, count * STARTS[name]) for name in COLUMNS
-    }
+    return {name: np.frombuffer(data, ROW[name], count, count * STARTS[name]) for name in COLUMNS}
 
 
 def layout() -> str:

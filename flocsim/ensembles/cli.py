@@ -16,9 +16,9 @@ from flocsim.ensembles.parallel.communicator import (
     launched_rank,
 )
 from flocsim.ensembles.parallel.heartbeat import SECONDS
-from flocsim.errors import FlocsimError, UsageError
+from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
-from flocsim.io.terminal import plain_warnings, tell
+from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
 INTERNAL = 70
 
@@ -228,6 +228,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
     )
-    with silent_unless_first():
-        arguments = add_arguments(parser).parse_args(argv)
-    return run_command(arguments)
+    with plain_streams():
+        with silent_unless_first():
+            arguments = add_arguments(parser).parse_args(argv)
+        code = run_command(arguments)
+        problem = output_problem()
+        if problem:
+            tell(f"flocsim: {problem}", sys.stderr)
+        return FileError.exit_code if problem and arguments.dry_run and code == 0 else code

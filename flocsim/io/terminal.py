@@ -1,10 +1,20 @@
-"""What a person sees while a command works: its lines, its warnings, and how far it has come."""
+"""What a person sees while a command works: its lines, its warnings, and how far it has come.
 
+All that a command prints goes through a PlainStream: letters that steer a terminal are written
+out, since names of files and what files hold come from others, and a stream that is closed or full
+costs what would be printed and nothing else.
+"""
+
+import contextlib
+import io
 import os
 import sys
 import time
 import warnings
-from typing import TextIO
+from collections.abc import Iterator
+from typing import Any, TextIO
+
+from flocsim.errors import visible
 
 LINE_SECONDS = 5.0
 """Seconds between two lines where the output is no terminal."""
@@ -32,16 +42,112 @@ def plain_warnings(silent: bool = False) -> None:
     warnings.showwarning = show
 
 
+class PlainStream(io.TextIOBase):
+    """Standard output or error: what is written to it is made visible, and may be lost.
+
+    ``problem``: the OSError by which it was lost, if it was.
+    """
+
+    def __init__(self, stream: Any, problem: OSError | None = None) -> None:
+        self.stream, self.problem = stream, problem
+
+    def write(self, text: str) -> int:
+        self.put(visible(text))
+        return len(text)
+
+    def put(self, text: str) -> None:
+        """Write a text as it is."""
+        self.guard(lambda: self.stream.write(text))
+
+    def flush(self) -> None:
+        self.guard(lambda: self.stream.flush())
+
+    def guard(self, work):
+        if self.problem is not None:
+            return
+        try:
+            work()
+        except (OSError, ValueError) as error:
+            self.problem = error if isinstance(error, OSError) else OSError(str(error))
+            # What is in the buffer goes nowhere, without another word at the end of the process.
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
+
+    def fileno(self) -> int:
+        return self.stream.fileno()
+
+    def isatty(self) -> bool:
+        return self.stream.isatty()
+
+    def writable(self) -> bool:
+        return True
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+@contextlib.contextmanager
+def plain_streams() -> Iterator[None]:
+    """Standard output and error as PlainStreams, also where they were closed; as before after."""
+    before = sys.stdout, sys.stderr
+    fill_descriptors()
+    if not isinstance(sys.stdout, PlainStream):
+        sys.stdout, sys.stderr = plain(sys.stdout), plain(sys.stderr)
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
+        # Closed ones stay what they became: the interpreter flushes them once more.
+        if None not in before:
+            sys.stdout, sys.stderr = before
+
+
+def fill_descriptors() -> None:
+    """Put nothing in the place of streams that are closed: else a file takes it, and the prints."""
+    with contextlib.suppress(OSError):
+        while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+            os.set_inheritable(number, True)
+        os.close(number)
+
+
+def plain(stream):
+    if stream is None:
+        return PlainStream(open(os.devnull, "w"), OSError(9, "it is closed"))
+    if hasattr(stream, "reconfigure"):
+        # A letter that a terminal does not know must not end a command.
+        stream.reconfigure(errors="replace")
+    return PlainStream(stream)
+
+
+def output_problem() -> str:
+    """Why standard output was lost, in words; "" where it was not, or its reader has just gone."""
+    sys.stdout.flush()
+    problem = getattr(sys.stdout, "problem", None)
+    if problem is None or isinstance(problem, BrokenPipeError):
+        return ""
+    return f"standard output could not be written: {problem.strerror or problem}"
+
+
 def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
 
     What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
     """
-    stream = stream or sys.stdout
+    stream = sys.stdout if stream is None else stream
     try:
         print(text, end=end, file=stream, flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def renew(text: str, stream: Any, end: str = "") -> None:
+    """Write a line over the last one of a terminal."""
+    write = stream.put if isinstance(stream, PlainStream) else stream.write
+    with contextlib.suppress(OSError):
+        write(f"\r{visible(text, keep=''):<70}{end}")
+        stream.flush()
 
 
 class Progress:
@@ -54,7 +160,7 @@ class Progress:
         self.total = self.todo = total
         self.quiet = quiet
         self.noun = noun
-        self.stream = stream or sys.stdout
+        self.stream = sys.stdout if stream is None else stream
         self.tty = self.stream.isatty()
         self.began = time.monotonic()
         self.printed = self.began
@@ -82,12 +188,12 @@ class Progress:
         text = f"{share:4.0%}  {self.total - missing} of {self.total} {self.noun}, "
         text += f"{duration(left)} left"
         if self.tty:
-            tell(f"\r{text:<70}", self.stream, end="")
+            renew(text, self.stream)
         else:
             tell(text, self.stream)
 
     def finish(self) -> float:
         """End the line that renews itself; the seconds since the start."""
         if self.tty and not self.quiet:
-            tell("\r" + " " * 70 + "\r", self.stream, end="")
+            renew("", self.stream, end="\r")
         return time.monotonic() - self.began

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from flocsim.ensembles.config.schema import ALTERNATIVES
+from flocsim.ensembles.config.text_limits import MOST_PARTS, text_problem
 from flocsim.ensembles.config.toml_text import DEEPEST_TABLE
 from flocsim.errors import ConfigError
 
@@ -38,9 +39,13 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     if not equals or not all(keys):
         raise ConfigError(f"--set {text!r}: write KEY=VALUE, e.g. --set scene.delta='[0.0, 0.5]'")
     value = value.strip()
+    beyond = text_problem(value)
+    if beyond is not None or len(keys) > MOST_PARTS:
+        what = beyond[1] if beyond else f"a key of more than {MOST_PARTS} parts"
+        raise ConfigError(f"--set {text[:40]!r}…: {what}: no config needs that")
     try:
         table = tomllib.loads(f"value = {value}\n")
-    except tomllib.TOMLDecodeError:
+    except ValueError:
         return keys, value
     return keys, table["value"] if len(table) == 1 else value
 

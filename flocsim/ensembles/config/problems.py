@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping
 import attrs
 
 from flocsim.ensembles.config.toml_text import key_lines
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, visible
 
 LONGEST_SHOWN = 60
+MOST_SHOWN = 50
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -42,6 +43,8 @@ def show(value: object) -> str:
 
 def suggestion(word: str, words: Iterable[str]) -> str:
     """ " (did you mean …?)", or "" where nothing is close."""
+    if len(word) > LONGEST_SHOWN:
+        return ""
     close = difflib.get_close_matches(word, words, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
@@ -83,11 +86,14 @@ class Problems:
             located = [(self.line_of(place, lines), text) for place, text in self.found]
             located.sort(key=lambda item: item[0])
             places = {-1: f"given over {self.file}", 0: self.file}
-            raise ConfigError(
-                "\n".join(
-                    f"{places.get(line, f'{self.file}:{line}')}: {text}" for line, text in located
-                )
-            )
+            shown = [
+                visible(f"{places.get(line, f'{self.file}:{line}')}: {text}", keep="")
+                for line, text in located[:MOST_SHOWN]
+            ]
+            if len(located) > MOST_SHOWN:
+                rest = len(located) - MOST_SHOWN
+                shown.append(visible(f"{self.file}: {rest} more unknown or wrong keys", keep=""))
+            raise ConfigError("\n".join(shown))
 
     def line_of(self, place, lines):
         """The line of the key or of the nearest table around it; else 0, and −1 if overridden."""

@@ -30,6 +30,9 @@ NUMBER = re.compile(
 UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)(?:(?:\^|\*\*)?([+-]?[0-9]))?")
 SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
 
+LONGEST = 100
+"""Letters of a number and its unit."""
+
 # Far more digits than a float has, so that the only rounding is the last one.
 DIGITS = 60
 
@@ -47,6 +50,8 @@ def read_quantity(text: str, unit: str) -> float:
     space, "*" or "·", divide by "/", and have whole exponents: "mPa s", "kg/m^3", "kg m-3", "m²".
     ValueError, with the reason, for text that is no quantity or has another dimension.
     """
+    if len(text) > LONGEST:
+        raise ValueError(f"more than {LONGEST} letters")
     match = NUMBER.fullmatch(text)
     if not match:
         raise ValueError("no number in front")

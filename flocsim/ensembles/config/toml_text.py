@@ -7,12 +7,12 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from flocsim.ensembles.config.text_limits import LARGEST_FILE, key_problem, text_problem
 from flocsim.errors import ConfigError
 
 DEEPEST_TABLE = 2
 """[forces.NAME] lies two keys deep; what is nested further is no table of the schema."""
 
-LARGEST_FILE = 10**6
 TOML_PLACE = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 MOST_ATTEMPTS = 300
 CLOSERS = ("]", "}", '"""', "'''")
@@ -26,7 +26,9 @@ def read_text_file(path: str | os.PathLike) -> str:
         if not Path(path).is_file():
             raise ConfigError(f"{path}: not an ordinary file; name a TOML config file")
         if Path(path).stat().st_size > LARGEST_FILE:
-            raise ConfigError(f"{path}: larger than 1 MB; name a TOML config file")
+            raise ConfigError(
+                f"{path}: larger than {LARGEST_FILE // 1000} kB; name a TOML config file"
+            )
         # A byte order mark is what some editors for Windows put in front.
         return Path(path).read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
@@ -39,9 +41,19 @@ def read_text_file(path: str | os.PathLike) -> str:
 
 
 def parse(path: str | os.PathLike, text: str) -> dict:
-    """The TOML tables; ConfigError with file and line where the text is not TOML."""
+    """The TOML tables; ConfigError with file and line where the text is not TOML.
+
+    So for a text beyond the limits of `flocsim.ensembles.config.text_limits`.
+    """
+    beyond = text_problem(text)
+    if beyond is not None:
+        place = f"{path}:{beyond[0]}" if beyond[0] else path
+        raise ConfigError(f"{place}: {beyond[1]}: no config needs that; name a TOML config file")
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
+        if wrong := key_problem(tables):
+            raise ConfigError(f"{path}: {wrong}: no config needs that")
+        return tables
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid TOML: nested too deeply") from error
     except ValueError as error:

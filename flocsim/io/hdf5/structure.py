@@ -225,7 +225,9 @@ class Walk:
             if mark != b"SNOD" or version != 1 or used > LEAF_SIZE:
                 raise Unfit("a group's list of names is damaged")
             for place in range(used):
-                name, header, kind, _, scratch = struct.unpack_from("<QQII16s", leaf, 8 + 40 * place)
+                name, header, kind, _, scratch = struct.unpack_from(
+                    "<QQII16s", leaf, 8 + 40 * place
+                )
                 yield name, header, kind, scratch
 
     def values_of(self, where, found):

@@ -85,6 +85,7 @@ def check_coordinates(file: Any) -> None:
 def check_tables(results: Results) -> None:
     """ValueError for names, counts or probabilities that cannot be."""
     refuse(len(set(results.types)) < len(results.types), "types that are the same")
+    refuse(not all(name.isprintable() for name in results.types), "types of unprintable names")
     refuse(np.unique(results.vertices).size < results.vertices.size, "vertices that are the same")
     refuse(np.any(results.vertices < 1), "vertices below 1")
     refuse(not np.isfinite(results.delta).all(), "delta that are no numbers")

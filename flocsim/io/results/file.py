@@ -29,8 +29,8 @@ from flocsim.io.hdf5.structure import structure_of
 from flocsim.io.results.checks import (
     CODED,
     check_codes,
-    check_rows,
     check_coordinates,
+    check_rows,
     check_structure,
     check_tables,
 )
@@ -205,8 +205,10 @@ def read_version(file, known):
     """The schema version of an open file; "unknown" where it is no number or word."""
     if known.get("schema_version") not in (("i8", ()), ("text", ())):
         return "unknown"
-    return str(file.attrs["schema_version"])[:20] if known["schema_version"][0] == "text" else (
-        int(file.attrs["schema_version"])
+    return (
+        str(file.attrs["schema_version"])[:20]
+        if known["schema_version"][0] == "text"
+        else (int(file.attrs["schema_version"]))
     )
 
 

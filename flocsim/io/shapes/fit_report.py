@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from flocsim.errors import visible
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
 from flocsim.io.shapes.library import ShapeEntry
@@ -26,7 +27,7 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
-    return f"{name}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
+    return f"{visible(name, keep='')}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
@@ -35,7 +36,7 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         coarse = sum(region.equivalent_radius <= radius for region in regions)
         if coarse:
             print(
-                f"flocsim: {name}: the spheroradius of {radius:g} px is not below r_eq of "
+                f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not below r_eq of "
                 f"{plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
                 file=sys.stderr,
             )

@@ -1,0 +1,278 @@
+"""Hostile files of every kind: each is read, or refused with one line; no crash, no hang.
+
+    python -m benchmarks.faults.fuzz_readers [--quick] [--markdown] [--only results …]
+                                             [--count N] [--seconds S]
+
+Valid files are changed through h5py, in their bytes, in their JSON, and sealed again
+(tests/helpers/hostile_files.py), from a fixed seed. They are read in processes of their own, with
+a limit on memory and 5 s for each file: a process that ends by a signal is a crash. What was
+accepted is looked at: NaN where there was none, codes without a word. Files that something was
+found with are kept in the folder /tmp/flocsim-fuzz.
+"""
+
+import math
+import multiprocessing
+import os
+import random
+import resource
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from flocsim.errors import ConfigError, FlocsimError
+from tests.helpers import hostile_files
+
+COUNT, QUICK = 5000, 250
+LONGEST = 5.0
+MEMORY = 6 * 2**30
+KEPT = Path(tempfile.gettempdir()) / "flocsim-fuzz"
+
+
+def read_results_file(path):
+    """Read it in all ways; the values that were believed are checked."""
+    from flocsim.commands.info import results_text
+    from flocsim.io.results.checks import check_rows
+    from flocsim.io.results.file import read_results, replicate_totals
+
+    found = read_results(path)
+    check_rows(found.replicates.__getitem__, len(found.failures), len(found.flocs))
+    assert np.isfinite(found.delta).all()
+    assert np.all(found.probabilities["n_total"] == found.count)
+    results_text("r.h5", found, replicate_totals(path))
+
+
+def read_library_file(path):
+    """Read it, and make the shapes."""
+    from flocsim.commands.info import library_text
+    from flocsim.io.shapes.library import read_library
+
+    for entry in read_library(path):
+        for fit in entry.fits.values():
+            assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
+            assert math.isfinite(fit.shape.area)
+        assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
+    library_text(path)
+
+
+def read_picture_file(path):
+    """Read it as a picture and as a mask, and look for flocs."""
+    from flocsim.io.images.masks import read_masks, segment_mask
+    from flocsim.io.images.pictures import read_grey, segment
+
+    try:
+        grey = read_grey(path)
+        assert np.isfinite(grey).all() and grey.min() >= 0.0 and grey.max() <= 1.0
+        if grey.size < 20_000:
+            segment(grey)
+    finally:
+        for _, mask in read_masks(path):
+            if mask.size < 20_000:
+                segment_mask(mask)
+
+
+def read_masks_file(path):
+    """Read the masks and look for flocs."""
+    from flocsim.io.images.masks import read_masks, segment_mask
+
+    for _, mask in read_masks(path):
+        assert mask.ndim == 2 and mask.min() >= 0
+        if mask.size < 20_000:
+            segment_mask(mask)
+
+
+def read_config_file(path):
+    """Load it, and take its text for a setting of the command line."""
+    from flocsim.ensembles.config.loader import load_config
+    from flocsim.ensembles.config.overrides import nested, parse_setting
+
+    text = path.read_bytes().decode("utf-8", "replace")
+    try:
+        load_config(path)
+    finally:
+        nested([parse_setting("scene.delta=" + text[:5000])])
+
+
+class JournalReader:
+    """Makes journals of one study, and takes what they hold as a resumed run does."""
+
+    def __init__(self, folder):
+        from flocsim.ensembles.config.loader import load_config
+        from flocsim.ensembles.storage.identity import short
+        from flocsim.ensembles.study import Study
+        from tests.helpers.small_study import write_small
+
+        path = write_small(folder, vertices="[1]")
+        self.study = Study(load_config(path), flocs=[])
+        self.identity = {"seed": 1, "kernels.spheres": "x"}
+        self.parts = hostile_files.journal_parts(self.identity, short(self.identity), self.rows())
+
+    def rows(self):
+        """Two good rows."""
+        from flocsim.ensembles.chunks import ROW
+
+        rows = np.zeros(2, ROW)
+        rows["inside"], rows["floc_i"], rows["floc_j"] = 1, -1, -1
+        return rows
+
+    def make(self, rng, folder):
+        """A hostile journal."""
+        return hostile_files.journal_file(rng, folder, self.parts)
+
+    def read(self, path):
+        """Take its rows and look at them."""
+        from flocsim.ensembles.chunks import ROW
+        from flocsim.ensembles.collision.failures import FAILURES
+        from flocsim.ensembles.storage.resume import Beginning, take_journal
+        from flocsim.ensembles.storage.row_store import RowStore
+        from flocsim.io.journal.journal import Journal
+        from flocsim.io.results.checks import check_rows
+
+        journal = Journal(path)
+        try:
+            start = Beginning(RowStore(journal, self.study.conditions), self.identity)
+            take_journal(start)
+            for place in range(len(self.study.conditions)):
+                for first, stop in start.store.intervals(place):
+                    rows = {n: start.store.read(place, n, first, stop) for n in ROW.names}
+                    check_rows(rows.__getitem__, len(FAILURES), 0)
+            assert all(remark.isprintable() for remark in start.remarks), start.remarks
+        finally:
+            journal.close()
+
+
+def reader(name, folder):
+    """(maker of hostile files, function that reads one) of a kind."""
+    if name == "journals":
+        journals = JournalReader(folder)
+        return journals.make, journals.read
+    return {
+        "results": (hostile_files.results_file, read_results_file),
+        "libraries": (hostile_files.library_file, read_library_file),
+        "pictures": (hostile_files.picture_file, read_picture_file),
+        "masks": (hostile_files.masks_file, read_masks_file),
+        "configs": (hostile_files.config_file, read_config_file),
+    }[name]
+
+
+KINDS = ("results", "libraries", "journals", "pictures", "masks", "configs")
+
+
+def outcome(read, path):
+    """("read" or "refused" or what is wrong, why) of one file."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            read(path)
+        return "read", ""
+    except AssertionError:
+        return "wrongly accepted", traceback.format_exc()
+    except FlocsimError as error:
+        lines = str(error).split("\n")
+        plain = all(line.isprintable() for line in lines)
+        if not plain or (len(lines) > 1 and not isinstance(error, ConfigError)):
+            return "not one plain line", repr(str(error))
+        return "refused", ""
+    except Exception:
+        return "traceback", traceback.format_exc()
+
+
+def work(name, first, count, folder, pipe):
+    """Read the files of numbers from ``first`` on, telling the parent about each."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 2)  # decoders speak there
+    folder.mkdir(parents=True, exist_ok=True)
+    make, read = reader(name, folder)
+    for number in range(first, count):
+        path = make(random.Random(f"{name} {number}"), folder)
+        pipe.send(("begin", str(path), ""))
+        pipe.send((*outcome(read, path), ""))
+    pipe.send(("end", "", ""))
+
+
+def throw(name, count, seconds, root):
+    """(Counter of outcomes, longest time [s], what was wrong) of so many files of a kind."""
+    context = multiprocessing.get_context("spawn")
+    counts, slowest, wrong, number = Counter(), 0.0, [], 0
+    until = time.monotonic() + seconds
+    while number < count and time.monotonic() < until:
+        receiving, sending = context.Pipe(duplex=False)
+        job = context.Process(target=work, args=(name, number, count, root / name, sending))
+        job.start()
+        sending.close()
+        path, began, ended = "", time.monotonic(), ""
+        while not ended:
+            # The first file waits for imports.
+            if not receiving.poll(LONGEST if path else 120.0):
+                ended = "hang"
+                break
+            try:
+                what, text, _ = receiving.recv()
+            except EOFError:
+                ended = "crash"
+                break
+            if what == "begin":
+                path, began = text, time.monotonic()
+            elif what == "end":
+                ended = "end"
+            else:
+                slowest = max(slowest, time.monotonic() - began)
+                counts[what] += 1
+                number += 1
+                if what not in ("read", "refused"):
+                    wrong.append((what, text))
+                    keep(path, f"{what}-{number}")
+                if time.monotonic() > until:
+                    ended = "time"
+        job.kill()
+        job.join()
+        if ended in ("hang", "crash"):
+            counts[ended] += 1
+            number += 1
+            wrong.append((ended, f"{path}: exit code {job.exitcode}"))
+            keep(path, f"{ended}-{number}")
+    return counts, slowest, wrong
+
+
+def keep(path, name):
+    """Keep a file that something was found with."""
+    if path:
+        KEPT.mkdir(exist_ok=True)
+        shutil.copy(path, KEPT / f"{name.replace(' ', '-')}-{Path(path).name}")
+
+
+def main():
+    """Print the table; exit code 1 where a file was neither read nor refused as it should be."""
+    most = {"type": float, "default": math.inf, "help": "seconds for each kind of file"}
+    arguments = parse_arguments(
+        __doc__, seconds=most, count={"type": int, "default": 0, "help": "files of each kind"},
+        only={"nargs": "+", "default": list(KINDS), "choices": KINDS},
+    )  # fmt: skip
+    print_heading(("h5py", "pillow", "tifffile"))
+    count = arguments.count or (QUICK if arguments.quick else COUNT)
+    columns = ("read", "refused", "traceback", "not one plain line", "wrongly accepted", "hang",
+               "crash")  # fmt: skip
+    table = Table("Hostile files", ("reader", "files", *columns, "slowest [s]"))
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        for kind in arguments.only:
+            counts, slowest, wrong = throw(kind, count, arguments.seconds, Path(name))
+            table.add(kind, counts.total(), *(counts[each] for each in columns), slowest)
+            found += wrong
+    table.print(arguments.markdown)
+    for (what, text), number in Counter(found).most_common(20):
+        print(f"{number} × {what}: {text}\n")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
