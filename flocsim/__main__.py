@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 from flocsim import __version__
 from flocsim.interruption import install
+from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 
 if "ensemble" in sys.argv[1:2]:
+    fill_descriptors()
     install()  # before anything slow is imported
 
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
 from flocsim.ensembles.cli import silent_unless_first
 from flocsim.errors import FileError, FlocsimError
-from flocsim.io.terminal import output_problem, plain_streams, plain_warnings
 
 COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
 

@@ -3,8 +3,11 @@
 import sys
 
 from flocsim.interruption import install
+from flocsim.io.terminal import fill_descriptors
 
 if __name__ == "__main__":
+    fill_descriptors()
+    fill_descriptors()
     install()  # before anything slow is imported
 
     from flocsim.ensembles.cli import main

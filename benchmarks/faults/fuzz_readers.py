@@ -184,6 +184,16 @@ def outcome(read, path):
         return "traceback", traceback.format_exc()
 
 
+def made(make, name, number, folder):
+    """The file of a number; a change that its library refuses to write is left out."""
+    for attempt in range(100):
+        try:
+            return make(random.Random(f"{name} {number} {attempt}"), folder)
+        except Exception:
+            continue
+    raise RuntimeError(f"no file of {name} could be made")
+
+
 def work(name, first, count, folder, pipe):
     """Read the files of numbers from ``first`` on, telling the parent about each."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
@@ -193,7 +203,7 @@ def work(name, first, count, folder, pipe):
     folder.mkdir(parents=True, exist_ok=True)
     make, read = reader(name, folder)
     for number in range(first, count):
-        path = make(random.Random(f"{name} {number}"), folder)
+        path = made(make, name, number, folder)
         pipe.send(("begin", str(path), ""))
         pipe.send((*outcome(read, path), ""))
     pipe.send(("end", "", ""))
@@ -233,6 +243,7 @@ def throw(name, count, seconds, root):
                     keep(path, f"{what}-{number}")
                 if time.monotonic() > until:
                     ended = "time"
+        job.join(20.0 if ended == "crash" else 0.0)
         job.kill()
         job.join()
         if ended in ("hang", "crash"):

@@ -76,10 +76,8 @@ def results_text(path, results, totals):
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
     if notes:
-        lines += [
-            "",
-            *(f"failed: {visible(describe_note(note), '')}" for note in notes[:MOST_FAILURES]),
-        ]
+        shown = [visible(describe_note(note), keep="") for note in notes[:MOST_FAILURES]]
+        lines += ["", *(f"failed: {note}" for note in shown)]
     if len(notes) > MOST_FAILURES:
         lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flocsim.errors import visible
 from flocsim.io.journal.records import CHUNK, encode
 from flocsim.io.json_text import matches
 from flocsim.io.results.schema import REPLICATES, ROW_SIZE
@@ -88,8 +89,9 @@ def named(description: dict | None) -> str:
         return "what it held is unknown"
     assert description is not None, "it is a chunk's"
     last = description["first"] + description["count"] - 1
+    name = visible(description["type"], keep="")
     return (
-        f"type {description['type']}, N = {description['vertices']}, delta "
+        f"type {name}, N = {description['vertices']}, delta "
         f"{description['delta']:g}, replicates {description['first']} to {last}"
     )
 

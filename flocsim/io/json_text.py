@@ -48,7 +48,7 @@ def check_inside(value):
     """ValueError for what is nested too deeply, and for letters that no file can hold."""
     row = [value]
     for _ in range(DEEPEST + 1):
-        inner: list = []
+        inner = []
         for each in row:
             if isinstance(each, dict):
                 inner += [*each, *each.values()]

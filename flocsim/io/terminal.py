@@ -171,7 +171,7 @@ class Progress:
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, quiet or not."""
-        tell(f"flocsim: {text}", sys.stderr)
+        tell(f"flocsim: {visible(text, keep='')}", sys.stderr)
 
     def start(self, todo: int) -> None:
         """The work begins now, and is so much of the total."""

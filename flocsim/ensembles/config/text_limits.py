@@ -15,8 +15,8 @@ DEEPEST = 6
 LONGEST_KEY = 100
 MOST_KEYS = 2_000
 
-# Strings and comments first, so that what is in them is not taken for keys or brackets. What opens a
-# string that has no end ends the search: tomllib gets no further either.
+# Strings and comments first, so that what is in them is not taken for keys or brackets. A quote
+# that has no end ends the search: tomllib gets no further either.
 TOKEN = re.compile(
     r"""(?P<text>'{3}.*?'{3}|"{3}[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"{3}"""
     r"""|"(?!"")[^"\\\n]*(?:\\.[^"\\\n]*)*"|'(?!'')[^'\n]*')|(?P<open>["'])"""

@@ -20,6 +20,7 @@ from flocsim.io.hdf5.types import size_of, type_name
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NOWHERE = 2**64 - 1
 SUPERBLOCK = struct.Struct("<8s8BHHI4Q2QII16s")
+LINK = struct.Struct("<QQII16s")
 LEAF_SIZE, NODE_SIZE = 8, 32
 """Entries of a leaf and of a node of a group's tree."""
 
@@ -63,7 +64,10 @@ def structure_of(file: BinaryIO, size: int) -> dict[str, Node]:
     No value of a dataset of numbers is read. Raises Unfit for all that flocsim does not write.
     """
     walk = Walk(file, size)
-    walk.begin()
+    try:
+        walk.begin()
+    except (struct.error, IndexError) as error:
+        raise Unfit("a header in it is cut short") from error
     walk.check_apart()
     return walk.nodes
 
@@ -225,9 +229,7 @@ class Walk:
             if mark != b"SNOD" or version != 1 or used > LEAF_SIZE:
                 raise Unfit("a group's list of names is damaged")
             for place in range(used):
-                name, header, kind, _, scratch = struct.unpack_from(
-                    "<QQII16s", leaf, 8 + 40 * place
-                )
+                name, header, kind, _, scratch = LINK.unpack_from(leaf, 8 + LINK.size * place)
                 yield name, header, kind, scratch
 
     def values_of(self, where, found):

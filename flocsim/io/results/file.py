@@ -108,7 +108,7 @@ def read_results(path: str | Path, replicates: bool = True) -> Results:
             count=len(rows["replicate"]),
         )
         check_tables(results)
-        if replicates:
+        if results.replicates is not None:
             check_rows(results.replicates.__getitem__, len(results.failures), len(results.flocs))
         return results
 

@@ -27,7 +27,8 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
-    return f"{visible(name, keep='')}: {', '.join(parts)}; foreground {100 * found.foreground_share:.2f} %"
+    share = 100 * found.foreground_share
+    return f"{visible(name, keep='')}: {', '.join(parts)}; foreground {share:.2f} %"
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
@@ -36,8 +37,8 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         coarse = sum(region.equivalent_radius <= radius for region in regions)
         if coarse:
             print(
-                f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not below r_eq of "
-                f"{plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
+                f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not "
+                f"below r_eq of {plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
                 file=sys.stderr,
             )
 
