@@ -132,6 +132,8 @@ class Walk:
         if path.count("/") > MOST_LEVELS:
             raise Unfit(f"its groups are nested more than {MOST_LEVELS} deep")
         where = path or "the root"
+        if kind not in (0, 1):
+            raise Unfit(f"{where} is a link: flocsim writes none")
         found, attributes = {}, {}
         for number, body in self.messages(where, address):
             if number == ATTRIBUTE:
@@ -145,14 +147,12 @@ class Walk:
                 found[number] = body
         if TABLE in found and len(found) == 1:
             self.nodes[path] = Node(None, (), attributes)
-            if kind not in (0, 1) or (kind == 1 and scratch != found[TABLE][:16]):
-                raise Unfit(f"{where} is a link: flocsim writes none")
+            if kind == 1 and scratch != found[TABLE][:16]:
+                raise Unfit(f"{where} is in two places")
             self.group(path, found[TABLE])
         elif found.keys() == {SPACE, TYPE, FILL, LAYOUT} and kind == 0 and path:
             type_, shape = self.values_of(where, found)
             self.nodes[path] = Node(type_, shape, attributes)
-        elif kind == 2:
-            raise Unfit(f"{where} is a link: flocsim writes none")
         else:
             raise Unfit(f"{where} is neither a group nor a dataset")
 

@@ -13,6 +13,9 @@ from flocsim.errors import ImageError
 MOST_PIXELS = 2**27
 """134 million: some 8 GB while its flocs are looked for."""
 
+PIXELS_PER_BYTE = 10_000
+"""More than any packing makes of a byte of the file: the pixels are not there."""
+
 LARGEST_FILE = 2**32
 MOST_LABELS = 100_000
 MOST_SPREAD = 20
@@ -47,6 +50,13 @@ def check_shape(name: object, shape: Sequence[int]) -> None:
             f"{name}: {sizes[:80]} pixels are more than the {MOST_PIXELS} that a picture may have; "
             "cut it into smaller ones"
         )
+
+
+def check_promise(path: Path, pixels: int) -> None:
+    """ImageError for a file that is far too small for the pixels that it promises."""
+    size = path.stat().st_size
+    if pixels > PIXELS_PER_BYTE * size:
+        raise ImageError(f"{path}: promises {pixels} pixels in {size} bytes: it is damaged")
 
 
 def check_array(name: object, array: np.ndarray) -> None:

@@ -21,7 +21,7 @@ from flocsim.io.images.reading import SUFFIXES, read_pixels
 from flocsim.io.images.regions import EIGHT, Filters, filled, sorted_out
 
 ARRAYS = (".npy", ".npz")
-MOST_BYTES = 32 * MOST_PIXELS
+MOST_BYTES = 8 * MOST_PIXELS
 """Of all masks of a file."""
 
 MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)

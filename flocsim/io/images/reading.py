@@ -11,6 +11,7 @@ from flocsim.io.images.limits import (
     check_array,
     check_deflated,
     check_file,
+    check_promise,
     check_shape,
 )
 
@@ -60,6 +61,11 @@ def _decode(path):
     except ImageError:
         raise
     except Exception as problem:
+        if type(problem).__name__ == "DecompressionBombError":
+            raise ImageError(
+                f"{path}: its pixels are more than the {MOST_PIXELS} that a picture may have; "
+                "cut it into smaller ones"
+            ) from problem
         # Decoders raise nearly anything on damaged files; all of it means one thing to the user.
         if path.suffix.lower() in (".tif", ".tiff"):
             return _decode_with_tifffile(path)
@@ -75,6 +81,7 @@ def _decode_with_pillow(path):
     # Only these: others run programs on what they read (EPS: Ghostscript).
     with Image.open(path, formats=FORMATS) as image:
         check_shape(path, (*image.size[::-1], len(image.getbands())))
+        check_promise(path, image.width * image.height)
         if getattr(image, "n_frames", 1) > 1:
             raise ImageError(
                 f"{path}: holds {image.n_frames} pictures; save the wanted one to its own file"
@@ -112,6 +119,7 @@ def check_tiff(path, tiff):
         )
     page = tiff.pages[0]
     check_shape(path, page.shape)
+    check_promise(path, int(np.prod(page.shape[:2])))
     check_shape(path, (page.imagelength, page.imagewidth))
     if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
         raise ImageError(

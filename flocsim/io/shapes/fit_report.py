@@ -38,7 +38,8 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         if coarse:
             print(
                 f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not "
-                f"below r_eq of {plural(coarse, 'floc')}, which it cannot follow; use a smaller --radius",
+                f"below r_eq of {plural(coarse, 'floc')}, which it cannot follow; use a smaller "
+                "--radius",
                 file=sys.stderr,
             )
 

@@ -1,0 +1,215 @@
+"""Pictures and masks from an enemy: sizes, labels, packings, names, what only looks like one."""
+
+import io
+import os
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flocsim.errors import ImageError
+from flocsim.io.images import limits, masks
+from flocsim.io.images.masks import read_masks, segment_mask
+from flocsim.io.images.reading import read_grey
+
+SQUARE = np.zeros((20, 30), "u1")
+SQUARE[4:16, 5:20] = 1
+
+
+def refused(path, match=None, reader=read_masks):
+    """The file is refused in one line that names it."""
+    with pytest.raises(ImageError, match=match) as caught:
+        reader(path)
+    assert path.name in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def saved(path, array):
+    np.save(path, array, allow_pickle=True)
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".tif"])
+@pytest.mark.parametrize("label", [2**62, 2**63 + 5])
+def test_labels_may_be_any_numbers(tmp_path, suffix, label):
+    """A table as long as the largest label ended the process."""
+    import tifffile
+
+    labels = np.zeros((20, 40), "u8")
+    labels[3:15, 3:15], labels[3:15, 20:36] = label, 7
+    path = tmp_path / f"m{suffix}"
+    np.save(path, labels) if suffix == ".npy" else tifffile.imwrite(path, labels)
+    [(_, mask)] = read_masks(path)
+    assert mask.max() == 2
+    assert sorted(region.area for region in segment_mask(mask).regions) == [144, 192]
+
+
+@pytest.mark.parametrize("kind", ["c16", "S3", "U2", "O", "M8[s]", "i4,f8"])
+def test_values_that_are_no_numbers_are_refused(tmp_path, kind):
+    refused(saved(tmp_path / "m.npy", np.zeros((4, 5), kind)), "not numbers or flags")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_numbers_that_are_not_finite_are_refused(tmp_path, value):
+    values = np.zeros((4, 5))
+    values[1, 1] = value
+    refused(saved(tmp_path / "m.npy", values), "not finite")
+
+
+def test_too_many_labels_and_scattered_ones_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(masks, "MOST_LABELS", 100)
+    refused(saved(tmp_path / "m.npy", np.arange(400).reshape(20, 20)), "more than 100")
+    monkeypatch.setattr(masks, "MOST_LABELS", 10**6)
+    scattered = np.arange(1500 * 1500).reshape(1500, 1500) % 5000
+    scattered[::-1][:50] = scattered[:50]
+    refused(saved(tmp_path / "m.npy", scattered), "scattered")
+
+
+def head(shape, descr="'|u1'"):
+    """The head of an .npy file of this shape."""
+    text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\0" + struct.pack("<H", len(text)) + text
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (head("(100000, 100000)"), "more than the"),
+        (head("(9223372036854775807, 2)"), "more than the"),
+        (head("(1000, 1000)"), "promises 1000000 bytes"),
+        (head("(-1, 5)"), "not numbers"),
+        (head("(2, 2)", "'|O'") + bytes(32), "not numbers"),
+        (head("(" * 400), "cannot be read"),
+        (head("(2, 2)") + b"\0", "promises|cut short"),
+        (b"", "cannot be read"),
+        (b"\x93NUMPY\x09\0", "unknown"),
+    ],
+)
+def test_heads_that_lie_are_refused(tmp_path, data, said):
+    (tmp_path / "m.npy").write_bytes(data)
+    refused(tmp_path / "m.npy", said)
+    with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
+        archive.writestr("a.npy", data)
+    refused(tmp_path / "m.npz", said)
+
+
+def npy(array):
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31m.npy", "a\nb.npy", "x" * 300, "folder/"])
+def test_names_that_no_array_has_are_refused(tmp_path, name):
+    with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
+        archive.writestr(name, npy(SQUARE))
+    refused(tmp_path / "m.npz", "name that none has|would be")
+
+
+def test_an_archive_is_read_where_it_lies(tmp_path):
+    """A name that leads out of the folder is a name; nothing is unpacked to the disk."""
+    with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
+        archive.writestr("../../x.npy", npy(SQUARE))
+    [(name, mask)] = read_masks(tmp_path / "m.npz")
+    assert (name, mask.sum()) == ("m.npz:../../x", SQUARE.sum())
+    assert [path.name for path in tmp_path.iterdir()] == ["m.npz"]
+
+
+def test_two_arrays_of_one_name_are_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
+        for name in ("a", "a.npy"):
+            archive.writestr(name, npy(SQUARE))
+    refused(tmp_path / "m.npz", "two arrays of one name")
+
+
+def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(masks, "MOST_BYTES", 10**6)
+    with zipfile.ZipFile(tmp_path / "m.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in "abc":
+            archive.writestr(name, npy(np.zeros((600, 600), "u1")))
+    refused(tmp_path / "m.npz", "unpacked")
+
+
+@pytest.mark.parametrize(
+    "shapes",
+    [np.zeros((1, 2)), np.array([[0, 5]]), np.array([[-3, -3]]), np.array([[10**6, 10**6]]),
+     np.array([[20, 30], [1, 1]]), np.array([20, 30])],
+)  # fmt: skip
+def test_shapes_of_bits_that_lie_are_refused(tmp_path, shapes):
+    np.savez(tmp_path / "m.npz", a=np.packbits(SQUARE), shapes=shapes)
+    refused(tmp_path / "m.npz")
+
+
+def png(width, height, data=b""):
+    """A PNG of 8-bit grey with right checksums."""
+
+    def chunk(kind, body):
+        sum_ = struct.pack(">I", zlib.crc32(kind + body))
+        return struct.pack(">I", len(body)) + kind + body + sum_
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+@pytest.mark.parametrize("reader", [read_grey, read_masks])
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [((100_000, 100_000), "more than the"), ((2**31 - 1, 1), "more than|cannot be read"),
+     ((0, 5), "cannot be read|empty"), ((10_000, 10_000), "it is damaged"),
+     ((50, 50), "cannot be read")],
+)  # fmt: skip
+def test_pictures_that_promise_too_much_are_refused(tmp_path, reader, size, said):
+    (tmp_path / "p.png").write_bytes(png(*size, zlib.compress(bytes(100))[:-6]))
+    refused(tmp_path / "p.png", said, reader)
+
+
+@pytest.mark.parametrize("ending", ["png", "tif", "jpg"])
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n",  # runs Ghostscript
+        b"P5 2 2 255\n\0\1\2\3", b"GIF89a\1\0\1\0\0\0\0;", b"RIFF\0\0\0\0WEBPVP8 ", b"", b"\0" * 99,
+    ],
+)  # fmt: skip
+def test_only_the_four_formats_are_opened(tmp_path, monkeypatch, ending, data):
+    monkeypatch.setattr("subprocess.Popen", None)  # no decoder runs a program
+    (tmp_path / f"p.{ending}").write_bytes(data)
+    refused(tmp_path / f"p.{ending}", "cannot be read", read_grey)
+
+
+def test_a_tiff_that_unpacks_to_more_than_its_pixels_is_refused(tmp_path):
+    import tifffile
+
+    path = tmp_path / "p.tif"
+    # Floats of half size, which Pillow does not read.
+    tifffile.imwrite(path, np.zeros((40, 50), "f2"), compression="zlib")
+    assert read_grey(path).shape == (40, 50)
+    with tifffile.TiffFile(path) as tiff:
+        page = tiff.pages[0]
+        counts, offsets = page.tags["StripByteCounts"], page.tags["StripOffsets"]
+        places = counts.valueoffset, offsets.valueoffset
+    bomb = zlib.compress(bytes(10**7))
+    data = path.read_bytes()
+    changed = bytearray(data + bomb)
+    struct.pack_into("<I", changed, places[1], len(data))
+    struct.pack_into("<I" if counts.dtype == 4 else "<H", changed, places[0], len(bomb))
+    path.write_bytes(changed)
+    refused(path, "unpacks to more", read_grey)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("name", ["p.png", "m.npy", "m.npz"])
+def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    refused(tmp_path / name, "not an ordinary file")
+    (tmp_path / "folder.png").mkdir()
+    refused(tmp_path / "folder.png", "not an ordinary file")
+
+
+def test_a_very_large_file_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "LARGEST_FILE", 100)
+    Image.fromarray(SQUARE).resize((200, 200)).save(tmp_path / "p.bmp")
+    refused(tmp_path / "p.bmp", "larger than", read_grey)
