@@ -38,12 +38,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         with silent_unless_first():
             arguments = make_parser().parse_args(argv)
         code = run(arguments)
-        problem = output_problem()
+        problem = output_problem() if code == 0 else ""
         if problem:
             print(f"flocsim: {problem}", file=sys.stderr)
         # The results of a study are whole, whether anybody reads its table or not.
         needed = arguments.command != "ensemble" or arguments.dry_run
-        return FileError.exit_code if problem and needed and code == 0 else code
+        return FileError.exit_code if problem and needed else code
 
 
 def run(arguments: argparse.Namespace) -> int:

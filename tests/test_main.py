@@ -1,5 +1,6 @@
 """The command `flocsim`: subcommands, exit codes, and output that nobody reads."""
 
+import os
 import subprocess
 import sys
 
@@ -7,7 +8,9 @@ import pytest
 
 from flocsim import __main__ as entry
 from flocsim.errors import ConfigError, FileError, FlocsimError
+from flocsim.io.results.file import read_results, write_results
 from tests.helpers.small_study import command, run_command, write_small
+from tests.helpers.synthetic_results import make_results
 
 NAMES = ("init", "fit", "ensemble", "trajectory", "plot", "info")
 
@@ -83,6 +86,60 @@ def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     assert (job.wait(timeout=60), errors) == (0, b"")
     # What was run is saved, whether anybody reads the table or not.
     assert (tmp_path / "a.h5").exists() == ("a.h5" in words)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A folder with a config of spheres and results of it."""
+    folder = tmp_path_factory.mktemp("study")
+    write_small(folder, vertices="[1]")
+    write_results(folder / "r.h5", make_results(types=("I",), vertices=(1,), delta=(0.0,), count=5))
+    return folder
+
+
+def in_shell(folder, line, **more):
+    """A finished shell command line; FLOCSIM stands for the program."""
+    program = f"{sys.executable} -m flocsim"
+    return subprocess.run(
+        ["bash", "-c", line.replace("FLOCSIM", program)], cwd=folder, capture_output=True,
+        text=True, timeout=120, env=os.environ | more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("line", "code", "said"),
+    [
+        ("FLOCSIM info r.h5 >&-", 74, "flocsim: standard output could not be written: it is"),
+        ("FLOCSIM info r.h5 >/dev/full", 74, "flocsim: standard output could not be written: No"),
+        ("FLOCSIM ensemble small.toml --dry-run >/dev/full", 74, "flocsim: standard output could"),
+        ("FLOCSIM info r.h5 2>&-", 0, ""),
+        ("FLOCSIM info no.h5 >&- 2>&-", 74, ""),
+        ("FLOCSIM info no.h5 <&- >&-", 74, "flocsim: no.h5 could not be read"),
+        ("FLOCSIM info $'\\e[31m\\n.h5'", 74, r"flocsim: \x1b[31m\n.h5 could not be read"),
+        ("FLOCSIM info r.h5 $'\\e[31m'", 2, r"flocsim: error: unrecognized arguments: \x1b[31m"),
+    ],
+)
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_streams_that_are_closed_or_full_cost_one_line(study, line, code, said):
+    done = in_shell(study, line)
+    assert done.returncode == code
+    lines = done.stderr.splitlines()
+    assert len(lines) == bool(said) + (code == 2)  # argparse tells the usage first
+    assert said in done.stderr
+
+
+def test_a_study_is_whole_whoever_reads_its_table(study):
+    done = in_shell(study, "FLOCSIM ensemble small.toml -o whole.h5 >&-")
+    assert (done.returncode, len(done.stderr.splitlines())) == (0, 1)
+    assert read_results(study / "whole.h5").count == 3
+
+
+def test_without_a_compiler_it_says_so(study):
+    for words in ("ensemble small.toml -o not.h5", "trajectory small.toml -o not.png"):
+        done = in_shell(study, f"FLOCSIM {words} >/dev/null", NUMBA_DISABLE_JIT="1")
+        assert done.returncode == 2
+        assert done.stderr.splitlines()[-1].startswith("flocsim: NUMBA_DISABLE_JIT is set")
+        assert len(done.stderr.splitlines()) == 1
 
 
 def test_importing_the_package_loads_nothing_heavy():

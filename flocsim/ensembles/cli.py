@@ -232,7 +232,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with silent_unless_first():
             arguments = add_arguments(parser).parse_args(argv)
         code = run_command(arguments)
-        problem = output_problem()
+        problem = output_problem() if code == 0 else ""
         if problem:
             tell(f"flocsim: {problem}", sys.stderr)
-        return FileError.exit_code if problem and arguments.dry_run and code == 0 else code
+        return FileError.exit_code if problem and arguments.dry_run else code

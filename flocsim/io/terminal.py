@@ -6,6 +6,7 @@ costs what would be printed and nothing else.
 """
 
 import contextlib
+import errno
 import io
 import os
 import sys
@@ -45,11 +46,12 @@ def plain_warnings(silent: bool = False) -> None:
 class PlainStream(io.TextIOBase):
     """Standard output or error: what is written to it is made visible, and may be lost.
 
-    ``problem``: the OSError by which it was lost, if it was.
+    ``problem``: the OSError by which something was lost, if it was; ``is_closed``: all will be.
     """
 
-    def __init__(self, stream: Any, problem: OSError | None = None) -> None:
-        self.stream, self.problem = stream, problem
+    def __init__(self, stream: Any, is_closed: bool = False) -> None:
+        self.stream, self.is_closed = stream, is_closed
+        self.problem: OSError | None = None
 
     def write(self, text: str) -> int:
         self.put(visible(text))
@@ -57,6 +59,8 @@ class PlainStream(io.TextIOBase):
 
     def put(self, text: str) -> None:
         """Write a text as it is."""
+        if self.is_closed:
+            self.problem = OSError(errno.EBADF, "it is closed")
         self.guard(lambda: self.stream.write(text))
 
     def flush(self) -> None:
@@ -114,7 +118,7 @@ def fill_descriptors() -> None:
 
 def plain(stream):
     if stream is None:
-        return PlainStream(open(os.devnull, "w"), OSError(9, "it is closed"))
+        return PlainStream(open(os.devnull, "w"), is_closed=True)
     if hasattr(stream, "reconfigure"):
         # A letter that a terminal does not know must not end a command.
         stream.reconfigure(errors="replace")

@@ -1,11 +1,13 @@
 """Progress: whole lines where nobody watches, one line that renews itself where somebody does."""
 
+import errno
 import io
+import os
 
 import pytest
 
 from flocsim.io import terminal
-from flocsim.io.terminal import Progress, duration
+from flocsim.io.terminal import Progress, duration, tell
 
 
 class Terminal(io.StringIO):
@@ -87,3 +89,86 @@ def test_other_things_than_replicates_are_counted(clock):
     clock[0] = 6.0
     report.report(3)
     assert stream.getvalue() == " 25%  1 of 4 flocs, 18 s left\n"
+
+
+def in_memory(monkeypatch):
+    """Standard output and error as text in memory; pytest puts its own back between fixtures."""
+    out, err = io.StringIO(), io.StringIO()
+    monkeypatch.setattr(terminal.sys, "stdout", out)
+    monkeypatch.setattr(terminal.sys, "stderr", err)
+    return out, err
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("\x1b[31mred\x07", "\\x1b[31mred\\x07"),
+        ("a\tb\nκ µ –", "a\tb\nκ µ –"),
+        ("over\rwritten\x08\x7f", "over\\rwritten\\x08\\x7f"),
+        ("\x9b31m", "\\x9b31m"),
+        ("right\u202eleft\u2066\u200f", "right\\u202eleft\\u2066\\u200f"),
+        ("line\u2028more\udcff", "line\\u2028more\\udcff"),
+    ],
+)
+def test_letters_that_steer_a_terminal_are_written_out(monkeypatch, text, shown):
+    streams = in_memory(monkeypatch)
+    with terminal.plain_streams():
+        print(text)
+        print(text, file=terminal.sys.stderr)
+        tell(text)
+    assert streams[0].getvalue() == 2 * (shown + "\n")
+    assert streams[1].getvalue() == shown + "\n"
+    assert terminal.sys.stdout is streams[0]
+
+
+def test_progress_still_renews_its_line(monkeypatch, clock):
+    streams = in_memory(monkeypatch)
+    streams[0].isatty = lambda: True
+    with terminal.plain_streams():
+        report = Progress(10, False)
+        clock[0] = 1.0
+        report.report(5)
+    assert streams[0].getvalue().startswith("\r 50%  5 of 10")
+
+
+class Broken(io.StringIO):
+    """A stream whose other end fails."""
+
+    def __init__(self, number):
+        super().__init__()
+        self.number = number
+
+    def write(self, text):
+        """Never works."""
+        raise OSError(self.number, os.strerror(self.number))
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC, errno.EBADF])
+def test_an_output_that_fails_is_noted_once(monkeypatch, number):
+    in_memory(monkeypatch)
+    monkeypatch.setattr(terminal.sys, "stdout", Broken(number))
+    with terminal.plain_streams():
+        print("lost")
+        print("lost too")
+        assert os.strerror(number) in terminal.output_problem()
+
+
+def test_a_reader_that_has_gone_is_no_problem(monkeypatch):
+    in_memory(monkeypatch)
+    monkeypatch.setattr(terminal.sys, "stdout", Broken(errno.EPIPE))
+    with terminal.plain_streams():
+        print("lost")
+        assert terminal.output_problem() == ""
+
+
+@pytest.mark.parametrize("name", ["stdout", "stderr"])
+def test_a_closed_stream_takes_what_it_is_given(monkeypatch, name):
+    streams = in_memory(monkeypatch)
+    monkeypatch.setattr(terminal.sys, name, None)
+    with terminal.plain_streams():
+        tell("hello")
+        Progress(3, False).warn("careful")
+        assert bool(terminal.output_problem()) == (name == "stdout")
+    shown = "".join(each.getvalue() for each in streams)
+    assert ("hello" in shown) == (name == "stderr")
+    assert ("careful" in shown) == (name == "stdout")

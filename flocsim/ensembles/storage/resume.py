@@ -135,6 +135,11 @@ def take_journal(start: Beginning) -> None:
             cpus = record.description.get("cpus", [])
         elif record.kind == CHUNK and fits(record.description, record.length):
             take_chunk(start, record, known, places, cpus)
+        elif record.kind == CHUNK:
+            start.remarks.append(
+                f"{journal.path}: {named(record.description)}: it is not as flocsim writes it: "
+                "computed again"
+            )
     for each in journal.damage:
         start.remarks.append(
             f"{journal.path}: damaged from byte {each.start} to {each.stop} "

@@ -131,7 +131,7 @@ def test_what_is_missing_is_said(tmp_path, text, said):
         (b"\x89HDF\r\n\x1a\n", "byte 0 is not UTF-8 text"),
         (b"a = " + b"[" * 10**4, "nested too deeply"),
         (b"a = " + b"1" * 5000, "not valid TOML"),
-        (b"#" * 2 * 10**6, "larger than 1 MB"),
+        (b"#" * 2 * 10**6, "larger than 100 kB"),
     ],
 )
 def test_a_file_that_is_no_config(tmp_path, content, said):

@@ -1,0 +1,171 @@
+"""What a resumed run takes from files that an enemy has written, with right checksums."""
+
+import io
+import json
+import random
+
+import h5py
+import numpy as np
+import pytest
+
+from benchmarks.faults.fuzz_readers import JournalReader
+from flocsim.ensembles.chunks import ROW, named
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.storage.resume import NEW, RESUME, Beginning, take_journal
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.errors import FileError, FlocsimError
+from flocsim.io.files import read_sealed, seal
+from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import CHUNK, SESSION
+from tests.helpers.hostile_files import encode_words
+from tests.helpers.small_study import small_config
+
+SPHERES = {"shapes": {"vertices": [1]}, "replicates": 3}
+
+
+@pytest.fixture(scope="module")
+def reader(tmp_path_factory):
+    """Makes journals of a study of spheres."""
+    return JournalReader(tmp_path_factory.mktemp("journals"))
+
+
+def taken(reader, folder, records):
+    """(Beginning, number of rows) of a journal of these (kind, description or words, data)."""
+    encoded = [
+        encode_words(kind, what if isinstance(what, bytes) else json.dumps(what).encode(), data)
+        for kind, what, data in records
+    ]
+    path = folder / "j.h5.journal"
+    path.write_bytes(b"".join(encoded))
+    journal = Journal(path)
+    try:
+        start = Beginning(RowStore(journal, reader.study.conditions), reader.identity)
+        take_journal(start)
+        return start, sum(stop - first for each in start.found(2**50) for first, stop in each)
+    finally:
+        journal.close()
+
+
+def test_a_sound_journal_is_taken(reader, tmp_path):
+    start, rows = taken(reader, tmp_path, reader.parts)
+    assert (rows, start.remarks, len(start.notes)) == (4, [], 2)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"first": -1}, {"first": "0"}, {"first": 2**62}, {"count": 0}, {"count": -2},
+        {"count": 2.0}, {"count": True}, {"count": 10**40}, {"type": 1}, {"type": None}, {"vertices": "1"},
+        {"delta": "0"}, {"delta": None}, {"delta": []}, {"identity": 5}, {"notes": 1},
+        {"notes": [1]}, {"notes": [{"why": 1}]}, {"notes": {"a": 1}},
+    ],
+)  # fmt: skip
+def test_a_chunk_of_another_form_is_passed_over(reader, tmp_path, change):
+    session, first, second = reader.parts
+    kind, description, data = first
+    start, rows = taken(reader, tmp_path, [session, (kind, description | change, data), second])
+    assert rows == 2
+    assert start.remarks and all(remark.isprintable() for remark in start.remarks)
+    assert named(description | change)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [b"[]", b"1", b"null", b"", b"{", b"\xff", b'{"a": NaN}', b'{"a": 1e999}', b"[" * 10**5,
+     b'{"a": ' * 500 + b"1" + b"}" * 500, b'{"type": "\\ud800"}',
+     b'{"first": ' + b"9" * 5000 + b"}"],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", [SESSION, CHUNK])
+def test_a_description_that_is_none_is_damage(reader, tmp_path, kind, words):
+    session, first, second = reader.parts
+    start, rows = taken(reader, tmp_path, [session, (kind, words, first[2]), second])
+    assert rows == 2
+    assert "computed again" in start.remarks[0]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"identity": []}, {"identity": None}, {"short": 1}, {"layout": 5}, {"date": None},
+     {"command": []}, {"cpus": 1}, {"cpus": [{}]}, {"cpus": [{"cpu": 1}]}],
+)  # fmt: skip
+def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
+    (kind, description, data), *chunks = reader.parts
+    with pytest.raises(FileError, match="begun by no flocsim"):
+        taken(reader, tmp_path, [(kind, description | change, data), *chunks])
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("outcome", 7), ("outcome", 255), ("inside", 0), ("inside", 9), ("crossed_zone", 3),
+     ("failure", 99), ("steps", -1), ("floc_i", -2), ("angle_i", np.nan), ("t_end", np.inf),
+     ("d_c_last", np.nan)],
+)  # fmt: skip
+def test_rows_that_no_run_has_given_are_computed_again(reader, tmp_path, column, value):
+    session, (kind, description, _), second = reader.parts
+    rows = reader.rows()
+    rows[column][1] = value
+    data = b"".join(rows[name].tobytes() for name in ROW.names)
+    start, count = taken(reader, tmp_path, [session, (kind, description, data), second])
+    assert count == 2
+    assert f"replicates/{column} are impossible: computed again" in start.remarks[0]
+
+
+def test_any_shuffled_journal_is_taken_or_refused(reader, tmp_path):
+    for number in range(60):
+        path = reader.make(random.Random(number), tmp_path)
+        try:
+            reader.read(path)
+        except FlocsimError as error:
+            assert str(error).isprintable()
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The bytes of a finished study's results file."""
+    folder = tmp_path_factory.mktemp("finished")
+    run_to_file(small_config(folder, SPHERES), SerialCommunicator(), folder / "r.h5", NEW)
+    return read_sealed(folder / "r.h5")
+
+
+def put(name, value):
+    """A change of a scalar of the group ``run``."""
+
+    def change(file):
+        del file[f"run/{name}"]
+        file[f"run/{name}"] = value
+
+    return change
+
+
+def row(name, value):
+    """A change of one row."""
+
+    def change(file):
+        file[f"replicates/{name}"][0, 0, 0, 0] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "change",
+    [put("identity", text) for text in ("[]", "{", "[" * 10**5, "NaN", 7, "")]
+    + [put(name, text) for name in ("failed", "history", "cpus")
+       for text in ("{}", "[1]", '[{"a": ' * 50, 1.5)]
+    + [put("failed", '[{"type": "I", "vertices": 1, "delta": "x", "replicate": 0, "why": "y"}]')]
+    + [row("outcome", 9), row("failure", 50), row("t_end", np.nan), row("steps", -4)]
+    + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")],
+)  # fmt: skip
+def test_results_that_no_run_has_written_are_not_extended(tmp_path, finished, change):
+    image = io.BytesIO(finished)
+    with h5py.File(image, "r+") as file:
+        change(file)
+    before = seal(image.getvalue())
+    (tmp_path / "r.h5").write_bytes(before)
+    config = small_config(tmp_path, SPHERES | {"replicates": 4})
+    with pytest.raises(SharedError) as caught:
+        run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", RESUME)
+    error = caught.value.args[0]
+    assert isinstance(error, FlocsimError)
+    assert str(error).isprintable()
+    assert (tmp_path / "r.h5").read_bytes() == before
