@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
-from flocsim.compiler.fingerprint import reached
+from flocsim.compiler.reads import reached
 from flocsim.forces.base import BodyForce, ContactForce, PairForce
 from flocsim.forces.check import (
     SAMPLE_BODIES,

@@ -36,8 +36,9 @@ ROWS = [
 INNER_ROWS = {
     "compiler": [
         ["composer"],
-        ["interpreter_calls", "numba_internals"],
-        ["fingerprint", "disk_cache"],
+        ["fingerprint", "interpreter_calls"],
+        ["constants", "numba_internals"],
+        ["disk_cache", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "integrators": [

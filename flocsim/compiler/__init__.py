@@ -3,5 +3,6 @@
 ``composer``: engines and laws compiled and kept.  ``fingerprint``: what a function does, as a hash.
 ``interpreter_calls``: what of Python compiled code cannot call.
 ``disk_cache``: compiled code on disk, and what of it is to be trusted.
+``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
 ``numba_internals``: all that leans on numba's private parts.  Imports errors only.
 """

@@ -24,8 +24,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from flocsim.compiler.fingerprint import fingerprint, reached, refuse_closure
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.compiler.reads import is_users_module, module_reads, reached, refuse_closure
 from flocsim.errors import KernelError
 
 INLINED_SIZE = 1200
@@ -57,11 +58,31 @@ class Linker:
             self.clones[function] = self.transform(self.clone(function))
         return self.clones[function]
 
+    def linked_value(self, value):
+        """A function linked, anything else as it is."""
+        return self.link(value) if isinstance(value, types.FunctionType) else value
+
+    def put(self, names, chain, value):
+        """Put ``module.name`` among a clone's globals: in a module that has what is read alone.
+
+        What the user's module is given later, or has compiled before, is not seen then.
+        """
+        *modules, name = chain
+        for each in modules:
+            known = names.get(each)
+            if not isinstance(known, types.ModuleType):
+                names[each] = known = types.ModuleType(each)
+            names = vars(known)
+        names[name] = value
+
     def clone(self, function):
         """A copy of the function whose globals are its own, linked."""
         linked = {"__builtins__": builtins, "__name__": function.__module__}
         for name, value in reached(function).items():
-            linked[name] = self.link(value) if isinstance(value, types.FunctionType) else value
+            if not is_users_module(value):
+                linked[name] = self.linked_value(value)
+        for chain, value in module_reads(function).items():
+            self.put(linked, chain, self.linked_value(value))
         copy = types.FunctionType(
             function.__code__, linked, function.__name__, function.__defaults__
         )

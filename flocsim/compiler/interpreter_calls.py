@@ -12,7 +12,7 @@ import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from flocsim.compiler.fingerprint import reached, where
+from flocsim.compiler.reads import reached, where
 from flocsim.errors import KernelError
 
 OBJECT_MODE = "objmode"

@@ -11,21 +11,31 @@
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits.
 6. ``kept_on_disk``: numba's own cache unpickles whatever lies in its folder; ours is checked first.
+7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
+   hash of a kernel could tell it.
 
 Measured: benchmarks/speed/compile_times.py --without NAME leaves one of 3 to 5 out.
 """
 
+import builtins
 import contextlib
 import functools
 import gc
+import inspect
+import operator
 import os
 import pickle
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import disk_cache
+from flocsim.compiler.reads import is_in_library, names_in, where
+from flocsim.errors import KernelError
+
+PACKAGE = str(Path(__file__).parents[1])
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 """Names of what to leave out, to measure what it gains."""
@@ -317,3 +327,69 @@ def quick_typing() -> Iterator[None]:
         return
     with _one_at_a_time, garbage_waits(), types_remembered():
         yield
+
+
+@functools.cache
+def is_installed(file: str) -> bool:
+    """Whether a file is numba's, another installed package's or flocsim's, and not the user's."""
+    return is_in_library(file) or file.startswith((PACKAGE, "<")) or "-packages" in file
+
+
+def teachers(template: Any) -> list[Any]:
+    """The functions of the user's that stand behind a template of numba's for types."""
+    found = [getattr(each, "__func__", each) for each in vars(template).values()]
+    return [
+        each for each in found if inspect.isfunction(each) and not is_installed(file_of(each))
+    ]  # fmt: skip
+
+
+def file_of(function):
+    return function.__code__.co_filename
+
+
+@functools.lru_cache(maxsize=1)
+def taught(sizes: tuple[int, ...]) -> list[tuple[Any, str, Any]]:
+    """(key, attribute or "", function) of all that the user has taught numba.
+
+    ``sizes`` of numba's lists, which only grow, tell whether there is anything new.
+    """
+    from numba.core.imputils import builtin_registry as lowering
+    from numba.core.typing.templates import builtin_registry as typing
+
+    found = [
+        (getattr(template, "key", None), getattr(template, "_attr", ""), function)
+        for template in (*typing.functions, *typing.attributes)
+        for function in teachers(template)
+    ]
+    for function, key, _ in (*lowering.functions, *lowering.getattrs):
+        behind = inspect.unwrap(function)
+        if inspect.isfunction(behind) and not is_installed(file_of(behind)):
+            found.append((key, key if isinstance(key, str) else "", behind))
+    return found
+
+
+def refuse_extensions(functions: Iterable[Any], values: Iterable[Any]) -> None:
+    """KernelError where numba was taught what these functions may use.
+
+    ``values``: what they read beside functions. What a function of the user's own is taught for
+    (@overload of it, @register_jitable) does not matter: such a function is compiled as it stands.
+    """
+    from numba.core.imputils import builtin_registry as lowering
+    from numba.core.typing.templates import builtin_registry as typing
+
+    lists = (typing.functions, typing.attributes, lowering.functions, lowering.getattrs)
+    extensions = taught(tuple(map(len, lists)))
+    if not extensions:
+        return
+    names = set().union(*(names_in(each.__code__) for each in functions))
+    used = [*values, *(getattr(builtins, name, None) for name in names)]
+    operators = set(map(id, vars(operator).values()))
+    for key, attribute, function in extensions:
+        if inspect.isfunction(key):
+            continue
+        if attribute in names or id(key) in operators or any(key is each for each in used):
+            what = attribute or getattr(key, "__name__", key)
+            raise KernelError(
+                f"{where(function)} teaches numba another {what!r}, which the kernels use and no "
+                "hash follows; call a plain function of another name"
+            )

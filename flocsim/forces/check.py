@@ -1,6 +1,7 @@
 """A force's kernels tried once, uncompiled, so that a wrong one is named before it is compiled."""
 
 import difflib
+import functools
 import inspect
 import math
 import traceback
@@ -14,7 +15,8 @@ import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
 from flocsim.body import Fluid
-from flocsim.compiler.fingerprint import names_in, reached, refuse_closure, where
+from flocsim.compiler.fingerprint import globals_read, tell
+from flocsim.compiler.reads import names_in, refuse_closure, where
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 
@@ -58,6 +60,19 @@ def require_plain(force, kernel):
     if kernel.__name__ == "<lambda>":
         raise refusal(force, kernel, "is a lambda; write it with `def`")
     refuse_closure(kernel)
+    words = why_untold(kernel)
+    if words:
+        raise KernelError(f"{name}: {words}")
+
+
+@functools.lru_cache(maxsize=256)
+def why_untold(kernel):
+    """Why no hash could follow what a kernel reads, in words; "" where one can."""
+    try:
+        tell(kernel, {})
+    except KernelError as error:
+        return str(error)
+    return ""
 
 
 def parameter_value(force, fluid, name, kernel):
@@ -177,7 +192,7 @@ def fields_read(force: Force, fluid: Fluid, kernel: Callable, samples: Iterable)
         function = pending.pop()
         known.add(function)
         names |= names_in(function.__code__)
-        called = [value for value in reached(function).values() if inspect.isfunction(value)]
+        called = [value for _, value in globals_read(function) if inspect.isfunction(value)]
         pending += [each for each in called if each not in known]
     watched = [Watched(view) for view in samples]
     for _ in results(force, kernel, watched, kernel_arguments(force, fluid, kernel)):

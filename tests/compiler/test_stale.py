@@ -1,0 +1,402 @@
+"""Nothing that reaches the machine code is missing in its hash: it is told, or refused by name.
+
+Each construct is written twice, with another number in it. Either the hashes differ, or both
+versions are refused; and where a version is accepted, it computes what plain Python does.
+"""
+
+import importlib.util
+import re
+import sys
+
+import pytest
+
+from flocsim import Body, Sphere, System
+from flocsim.compiler import composer
+from flocsim.compiler.composer import compose
+from flocsim.compiler.fingerprint import fingerprint
+from flocsim.errors import KernelError
+from flocsim.forces import Contact
+
+TOLD = {
+    "number": "K = @\ndef kernel(x):\n    return K * x\n",
+    "numpy number": "import numpy as np\nK = np.float32(@)\ndef kernel(x):\n    return K * x\n",
+    "numpy integer": "import numpy as np\nK = np.int64(@)\ndef kernel(x):\n    return K * x\n",
+    "text": "K = '@'\ndef kernel(x):\n    return x if K == '2' else 2.0 * x\n",
+    "tuple": "K = (1.0, (@, 2.0))\ndef kernel(x):\n    return K[1][0] * x\n",
+    "constant of the code": "def kernel(x):\n    return @ * x\n",
+    "sign of zero": "import math\ndef kernel(x):\n    return math.atan2((@ - 3) * 0.0, -x)\n",
+    "set in the code": "def kernel(x):\n    return x if 2 in {@, 7} else 0.0\n",
+    "default": "def kernel(x, k=@):\n    return k * x\n",
+    "default read from a global": "K = @\ndef kernel(x, k=K):\n    return k * x\n",
+    "enum": (
+        "import enum\nclass Mode(enum.Enum):\n    A = @\n    B = 9\n"
+        "def kernel(x):\n    return Mode.A.value * x\n"
+    ),
+    "whole enum": (
+        "import enum\nclass Mode(enum.IntEnum):\n    A = @\n    B = 9\n"
+        "def kernel(x):\n    return Mode.A * x\n"
+    ),
+    "enum member": (
+        "import enum\nclass Mode(enum.Enum):\n    A = @\n    B = 9\nM = Mode.A\n"
+        "def kernel(x):\n    return M.value * x\n"
+    ),
+    "named tuple": (
+        "from typing import NamedTuple\nclass P(NamedTuple):\n    k: float\n    m: float = 1.0\n"
+        "p = P(@)\ndef kernel(x):\n    return p.k * x\n"
+    ),
+    "default of a named tuple": (
+        "from typing import NamedTuple\nclass P(NamedTuple):\n    k: float\n    m: float = @\n"
+        "def kernel(x):\n    return P(x).m * x\n"
+    ),
+    "helper": "def helper(x):\n    return @ * x\ndef kernel(x):\n    return helper(x)\n",
+    "helper of a helper": (
+        "def inner(x):\n    return @ * x\ndef helper(x):\n    return inner(x)\n"
+        "def kernel(x):\n    return helper(x)\n"
+    ),
+    "nested function": (
+        "def kernel(x):\n    def inner(y):\n        return @ * y\n    return inner(x)\n"
+    ),
+    "global of a nested function": (
+        "K = @\ndef kernel(x):\n    def inner(y):\n        return K * y\n    return inner(x)\n"
+    ),
+    "njit": "import numba\n@numba.njit\ndef helper(x):\n    return @ * x\n"
+    "def kernel(x):\n    return helper(x)\n",
+    "njit that reads a global": "import numba\nK = @\n@numba.njit(cache=True)\ndef helper(x):\n"
+    "    return K * x\ndef kernel(x):\n    return helper(x)\n",
+    "register_jitable": "from numba.extending import register_jitable\n@register_jitable\n"
+    "def helper(x):\n    return @ * x\ndef kernel(x):\n    return helper(x)\n",
+    "same decorator": "def keep(function):\n    return function\n@keep\ndef helper(x):\n"
+    "    return @ * x\ndef kernel(x):\n    return helper(x)\n",
+    "module's number": "import beside\ndef kernel(x):\n    return beside.K * x\n",
+    "module's plain function": "import beside\ndef kernel(x):\n    return beside.helper(x)\n",
+    "module's njit": "import beside\ndef kernel(x):\n    return beside.fast(x)\n",
+    "module's enum": "import beside\ndef kernel(x):\n    return beside.Mode.A.value * x\n",
+    "module's function that reads another module": (
+        "import beside\ndef kernel(x):\n    return beside.through(x)\n"
+    ),
+    "module of a module": "import beside\ndef kernel(x):\n    return beside.deeper.K * x\n",
+    "star import": "from beside import *\ndef kernel(x):\n    return helper(x) + K\n",
+    "imported under another name": (
+        "from beside import fast as f\ndef kernel(x):\n    return f(x)\n"
+    ),
+    "overload of one's own function": (
+        "from numba.extending import overload\ndef helper(x):\n    return @ * x\n"
+        "@overload(helper)\ndef typed(x):\n    return lambda x: 7.0 * x\n"
+        "def kernel(x):\n    return helper(x)\n"
+    ),
+}  # fmt: skip
+"""Constructs that a kernel may use; @ is 2 or 3."""
+
+DECORATED = (
+    "import numba\n@numba.{}\ndef helper(x):\n    return @ * x\n"
+    "def kernel(x):\n    return helper(x)\n"
+)
+
+REFUSED = {
+    "vectorize": (DECORATED.format("vectorize(['f8(f8)'])"), "'helper', a DUFunc"),
+    "lazy vectorize": (DECORATED.format("vectorize"), "'helper', a DUFunc"),
+    "guvectorize": (
+        "import numba\n@numba.guvectorize(['f8,f8[:]'], '()->()')\ndef helper(x, out):\n"
+        "    out[0] = @ * x\ndef kernel(x):\n    return helper(x)\n",
+        "'helper', a GUFunc",
+    ),
+    "cfunc": (DECORATED.format("cfunc('f8(f8)')"), "'helper', a CFunc"),
+    "intrinsic": (
+        "from numba.extending import intrinsic\n@intrinsic\ndef helper(typing, x):\n"
+        "    return x(x), lambda c, b, s, v: b.fmul(v[0], v[0].type(@))\n"
+        "def kernel(x):\n    return helper(x)\n",
+        "'helper', a _?Intrinsic",
+    ),
+    "jitclass": (
+        "from numba.experimental import jitclass\n@jitclass\nclass Box:\n    k: float\n"
+        "    def __init__(self):\n        self.k = @\ndef kernel(x):\n    return Box().k * x\n",
+        "'Box', the class Box, which no hash follows",
+    ),
+    "stencil": (
+        "import numba\n@numba.stencil\ndef helper(a):\n    return @ * a[0]\n"
+        "def kernel(x):\n    return helper(x)\n",
+        "'helper', a StencilFunc",
+    ),
+    "overload of math": (
+        "import math\nfrom numba.extending import overload\n@overload(math.cbrt)\n"
+        "def typed(x):\n    return lambda x: @ * x\ndef kernel(x):\n    return math.cbrt(x)\n",
+        r"typed \(.*kernels\.py:\d+\) teaches numba another 'cbrt'",
+    ),
+    "overload of a builtin": (
+        "from numba.extending import overload\n@overload(max)\n"
+        "def typed(x, y):\n    return lambda x, y: @ * x\ndef kernel(x):\n    return max(x, 1.0)\n",
+        "teaches numba another 'max'",
+    ),
+    "overload of an operator": (
+        "import operator\nfrom numba.extending import overload\n@overload(operator.mul)\n"
+        "def typed(x, y):\n    return lambda x, y: @ + x\ndef kernel(x):\n    return x * 7.0\n",
+        "teaches numba another 'mul'",
+    ),
+    "overload of a method": (
+        "import numba\nfrom numba.extending import overload_method\n"
+        "@overload_method(numba.types.Float, 'shrunk')\ndef typed(x):\n    return lambda x: @ * x\n"
+        "def kernel(x):\n    return x.shrunk()\n",
+        "teaches numba another 'shrunk'",
+    ),
+    "overload of an attribute": (
+        "import numba\nfrom numba.extending import overload_attribute\n"
+        "@overload_attribute(numba.types.Float, 'half')\ndef typed(x):\n"
+        "    return lambda x: @ * x\ndef kernel(x):\n    return x.half\n",
+        "teaches numba another 'half'",
+    ),
+    "lowering": (
+        "import math, numba\nfrom numba.extending import lower_builtin\n"
+        "@lower_builtin(math.expm1, numba.float64)\ndef lowered(c, b, s, v):\n"
+        "    return b.fmul(v[0], v[0].type(@))\ndef kernel(x):\n    return math.expm1(x)\n",
+        "teaches numba another 'expm1'",
+    ),
+    "objmode": (
+        "import numba\ndef helper(x):\n    return @ * x\ndef kernel(x):\n"
+        "    with numba.objmode(y='f8'):\n        y = helper(x)\n    return y\n",
+        "'numba.objmode', ",
+    ),
+    "array": (
+        "import numpy as np\nK = np.array([@])\ndef kernel(x):\n    return K[0] * x\n",
+        "'K', a ndarray that can change",
+    ),
+    "list": ("K = [@]\ndef kernel(x):\n    return K[0] * x\n", "'K', a list that can change"),
+    "dict": ("K = {1: @}\ndef kernel(x):\n    return K[1] * x\n", "'K', a dict that can change"),
+    "set": ("K = {@}\ndef kernel(x):\n    return x in K\n", "'K', a set that can change"),
+    "list in a tuple": ("K = (1, [@])\ndef kernel(x):\n    return K[1][0]\n", "'K', a list that"),
+    "typed list": (
+        "from numba.typed import List\nK = List([@])\ndef kernel(x):\n    return K[0] * x\n",
+        "'K', a List of numba",
+    ),
+    "typed dict": (
+        "from numba.typed import Dict\nK = Dict.empty(2, 2) if 0 else Dict()\nK[1] = @\n"
+        "def kernel(x):\n    return K[1] * x\n",
+        "'K', a Dict of numba",
+    ),
+    "class attribute": (
+        "class Box:\n    k = @\ndef kernel(x):\n    return Box.k * x\n",
+        "'Box', the class Box",
+    ),
+    "object's attribute": (
+        "from types import SimpleNamespace\nbox = SimpleNamespace(k=@)\n"
+        "def kernel(x):\n    return box.k * x\n",
+        "'box', a SimpleNamespace that can change",
+    ),
+    "enum of functions": (
+        "import enum, functools\ndef f(x):\n    return @ * x\nclass Law(enum.Enum):\n"
+        "    A = functools.partial(f)\n    B = (f,)\n"
+        "def kernel(x):\n    return Law.B.value[0](x)\n",
+        "'Law', a (partial|function)",
+    ),
+    "named tuple with more": (
+        "from typing import NamedTuple\nclass P(NamedTuple):\n    k: float\nclass Q(P):\n"
+        "    def more(self):\n        return @\nq = Q(1.0)\ndef kernel(x):\n    return q.more()\n",
+        "'q', a Q that can change|'q', the class Q",
+    ),
+    "number with more": (
+        "class Number(float):\n    def more(self):\n        return @\nK = Number(1.0)\n"
+        "def kernel(x):\n    return K.more() * x\n",
+        "'K', a Number that can change",
+    ),
+    "partial": (
+        "import functools\ndef f(k, x):\n    return k * x\nhelper = functools.partial(f, @)\n"
+        "def kernel(x):\n    return helper(x)\n",
+        "'helper', a partial, whose code no hash follows",
+    ),
+    "cached function": (
+        "import functools\n@functools.cache\ndef helper(x):\n    return @ * x\n"
+        "def kernel(x):\n    return helper(x)\n",
+        "'helper', a _lru_cache_wrapper",
+    ),
+    "wrapped by a decorator": (
+        "import functools\ndef twice(f):\n    @functools.wraps(f)\n    def inner(x):\n"
+        "        return @ * f(x)\n    return inner\n@twice\ndef helper(x):\n    return x\n"
+        "def kernel(x):\n    return helper(x)\n",
+        "captures f",
+    ),
+    "callable object": (
+        "class Law:\n    def __call__(self, x):\n        return @ * x\nlaw = Law()\n"
+        "def kernel(x):\n    return law(x)\n",
+        "'law', a Law, whose code no hash follows",
+    ),
+    "object with a py_func": (
+        "def f(x):\n    return x\nclass Law:\n    py_func = staticmethod(f)\n    k = @\n"
+        "    def __call__(self, x):\n        return self.k * x\nlaw = Law()\n"
+        "def kernel(x):\n    return law(x)\n",
+        "'law', a Law, whose code no hash follows",
+    ),
+    "ctypes": (
+        "import ctypes\nlaw = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)"
+        "(lambda x: @ * x)\ndef kernel(x):\n    return law(x)\n",
+        "'law', a CFunctionType, whose code",
+    ),
+    "module as a value": (
+        "import beside\ndef kernel(x):\n    m = beside\n    return m.K * x\n",
+        "uses the module 'beside' as a value",
+    ),
+    "attribute by its name": (
+        "import beside\ndef kernel(x):\n    return getattr(beside, 'K') * x\n",
+        "uses the module 'beside' as a value",
+    ),
+    "module's list": (
+        "import beside\ndef kernel(x):\n    return beside.LIST[0] * x\n",
+        "'beside.LIST', a list that can change",
+    ),
+    "module that lacks it": (
+        "import beside\ndef kernel(x):\n    return beside.missing * x\n",
+        "reads beside.missing, which the module beside has not",
+    ),
+    "mutable default": (
+        "def kernel(x, k=[@]):\n    return k[0] * x\n",
+        "a default argument, a list",
+    ),
+    "function as default": (
+        "def f(x):\n    return @ * x\ndef kernel(x, f=f):\n    return f(x)\n",
+        "a default argument, a function",
+    ),
+    "random": (
+        "import random\ndef kernel(x):\n    return @ * random.random()\n",
+        "'random.random', which draws random numbers",
+    ),
+    "numpy's random": (
+        "import numpy as np\ndef kernel(x):\n    return @ * np.random.rand()\n",
+        "'np.random.rand', which draws random numbers",
+    ),
+    "imported random": (
+        "from numpy.random import rand\ndef kernel(x):\n    return @ * rand()\n",
+        "'rand', which draws random numbers",
+    ),
+    "file that has the name of one of Python's": (
+        "import colorsys\ndef kernel(x):\n    return colorsys.LIST[0] * x\n",
+        "'colorsys.LIST', a list that can change",
+    ),
+}
+"""Constructs that no hash follows, and what the refusal says."""
+
+DEEPER = "K = @\n"
+BESIDE = """\
+import enum, numba
+import deeper
+K = @
+LIST = [@]
+class Mode(enum.Enum):
+    A = @
+    B = 9
+def helper(x):
+    return @ * x
+@numba.njit
+def fast(x):
+    return K * x
+def through(x):
+    return deeper.K * x
+"""
+
+
+@pytest.fixture
+def load(tmp_path, monkeypatch):
+    """``load(text, number)`` writes a module and its neighbours and imports them afresh."""
+    monkeypatch.setattr(composer, "_composed", {})
+
+    def write(text, number):
+        loaded = None
+        files = {"deeper": DEEPER, "beside": BESIDE, "colorsys": "LIST = [@]\n", "kernels": text}
+        for name, source in files.items():
+            path = tmp_path / f"{name}.py"
+            path.write_text(re.sub(r"@(?!\w)", str(number), source))  # not the decorators
+            spec = importlib.util.spec_from_file_location(name, path)
+            loaded = importlib.util.module_from_spec(spec)
+            monkeypatch.setitem(sys.modules, name, loaded)
+            exec(compile(path.read_text(), str(path), "exec"), vars(loaded))
+        return loaded
+
+    return write
+
+
+@pytest.fixture
+def untaught():
+    """What a test teaches numba is forgotten after it."""
+    from numba.core.imputils import builtin_registry as lowering
+    from numba.core.typing.templates import builtin_registry as typing
+
+    lists = (typing.functions, typing.attributes, typing.globals, lowering.functions)
+    sizes = [len(each) for each in lists]
+    yield
+    for each, size in zip(lists, sizes, strict=True):
+        del each[size:]
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_is_accepted_has_another_hash_when_it_is_edited(load, untaught, name):
+    found = {}
+    for number in (2, 3, 2):
+        kernel = load(TOLD[name], number).kernel
+        found.setdefault(number, set()).add(fingerprint(kernel, {}))
+    assert len(found[2]) == len(found[3]) == 1 and found[2] != found[3]
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_no_hash_follows_is_refused_by_file_line_and_name(load, untaught, name):
+    text, words = REFUSED[name]
+    for number in (2, 3):
+        kernel = load(text, number).kernel
+        with pytest.raises(KernelError, match=words) as caught:
+            fingerprint(kernel, {})
+        assert re.search(r"[\w.]+ \(.*\.py:\d+\)", str(caught.value))
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["enum", "enum member", "named tuple", "numpy number", "njit that reads a global",
+     "module's njit", "module's plain function", "module's function that reads another module",
+     "star import", "module of a module", "module's enum", "overload of one's own function"],
+)  # fmt: skip
+def test_what_is_accepted_computes_compiled_what_it_does_in_python(
+    load, untaught, name, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    for number in (2, 3):
+        kernel = load(TOLD[name], number).kernel
+        assert compose(kernel, {})(1.5) == pytest.approx(kernel(1.5))
+        assert compose(kernel, {}, jit=False)(1.5) == pytest.approx(kernel(1.5))
+
+
+def test_a_module_changed_between_linking_and_compiling_does_not_reach_the_machine_code(
+    load, tmp_path, monkeypatch
+):
+    """Neither what is given to it later nor what it had compiled before."""
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    kernels = load(TOLD["module's njit"], 2)
+    assert kernels.beside.fast(1.0) == 2.0
+    kernels.beside.K = 5
+    linked = compose(kernels.kernel, {})
+    kernels.beside.K = 7
+    assert linked(1.0) == 5.0
+
+
+def test_a_global_of_the_name_of_an_attribute_is_not_the_kernels(load):
+    text = "gap = [@]\ndef kernel(x):\n    return x.gap\n"
+    assert fingerprint(load(text, 2).kernel, {}) == fingerprint(load(text, 3).kernel, {})
+
+
+def test_sets_in_the_code_do_not_hang_on_the_order_of_a_process(load):
+    from flocsim.compiler.fingerprint import constant_text
+
+    assert constant_text(frozenset(["b", "a", "c"])) == "set [\"'a'\", \"'b'\", \"'c'\"]"
+
+
+STICKY = """\
+from flocsim.forces import CentreForce
+LIST = [@]
+def helper(gap):
+    return LIST[0] * gap
+class Sticky(CentreForce):
+    @staticmethod
+    def kernel(pair):
+        return helper(pair.gap)
+"""
+
+
+def test_the_refusal_names_the_force(load):
+    words = r"^Sticky: kernel helper \(.*kernels\.py:3\) reads the global 'LIST', a list"
+    with pytest.raises(KernelError, match=words):
+        System([Body(Sphere(5e-6), density=2650.0)] * 2, [load(STICKY, 2).Sticky(), Contact()])
