@@ -114,6 +114,13 @@ def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
             raise refusal(
                 force, kernel, f"asks for {name!r}, which is {value!r}; a kernel takes numbers only"
             ) from None
+        # Rows could not be repeated: every pair of bodies asks anew.
+        if repr(again := parameter_value(force, fluid, name, kernel)) != repr(value):
+            raise refusal(
+                force, kernel,
+                f"asks for {name!r}, which is {value!r} once and {again!r} then; compute it from "
+                "the force's fields alone",
+            )  # fmt: skip
     return arguments
 
 

@@ -55,6 +55,8 @@ def identity_of(study: Study) -> dict:
     # A class of the user's own may have these as properties, whose code no kernel reaches.
     for name in ("tolerance", "first_step", "largest_step"):
         facts[f"integrator.{name}"] = plain(getattr(method, name))
+    starts = [*method.fresh_clock(), *method.fresh_counts(config.integrator.max_steps)]
+    facts["start.the integrator"] = digest(np.array(starts, float))
     facts["integrator.name"] = config.integrator.label
     facts["integrator.max_steps"] = config.integrator.max_steps
     for name, force in zip(config.force_names, config.forces, strict=True):
@@ -84,10 +86,14 @@ def plain(value):
 
 
 def type_facts(config):
-    """Radii of the collision types, and the numbers that the forces hand to the kernels."""
+    """Radii and zone of the collision types, and the numbers that the forces hand to kernels."""
     facts = {f"types.{name}": list(radii) for name, *radii in config.scene.conditions}
     for name, pair in sphere_pairs(config):
-        facts[f"numbers.{name}"] = digest(np.array(pair.system.pieces.parameters, float))
+        pieces = pair.system.pieces
+        numbers = [*pieces.parameters, pieces.surface_reach, pieces.events]
+        facts[f"numbers.{name}"] = digest(np.array(numbers, float))
+        # A force of the user's own may compute what the zone follows from.
+        facts[f"types.{name}"].append(plain(pair.zone_distance))
     return facts
 
 
@@ -99,13 +105,40 @@ def floc_facts(study):
             parts = [np.array([floc.ratio]) for floc in study.flocs]
             shapes = [floc.shapes[n] for floc in study.flocs]
             parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
-            if study.config.shapes.own is not None:
-                # Its class computes what is known of others, and how it grows.
-                for each in (*shapes, *(shape.scaled(2.0) for shape in shapes)):
-                    numbers = [each.radius, each.area, each.second_moment]
-                    parts.append(np.append(np.ravel(each.vertices), numbers))
             facts[f"flocs.{n}"] = digest(np.concatenate(parts))
+    return facts | own_shape_facts(study)
+
+
+def own_shape_facts(study):
+    """A digest of all that a replicate reads of the user's own shape, at the sizes of each type.
+
+    Its class computes what is known of others, and how it grows.
+    """
+    config = study.config
+    facts = {}
+    if config.shapes.own is not None and study.flocs:
+        [floc] = study.flocs
+        [n] = floc.shapes
+        for name, *radii in config.scene.conditions:
+            shapes = [floc.resized(n, radius, config.shapes.radius) for radius in radii]
+            facts[f"flocs.{n} at the sizes of {name}"] = digest(
+                np.concatenate([shape_numbers(each) for each in shapes])
+            )
     return facts
+
+
+def shape_numbers(shape):
+    """What bodies, laws and starts read of a shape."""
+    numbers = (
+        shape.radius, shape.area, shape.second_moment, shape.equivalent_radius,
+        shape.bounding_radius,
+    )  # fmt: skip
+    placed = [shape.placed_vertices(angle=angle) for angle in SAMPLE_ANGLES]
+    return np.concatenate([np.ravel(shape.vertices), *map(np.ravel, placed), numbers])
+
+
+SAMPLE_ANGLES = (0.0, 1.0, 4.0)
+"""Angles [rad] at which a shape is placed for the identity."""
 
 
 def kernel_facts(config):
@@ -208,6 +241,7 @@ EXPLAINED = {
     "another C library or numpy): go on where the run was begun, or begin anew",
     "code": "flocsim's own code has changed",
     "flocs": "the flocs with N = {} have changed",
+    "start": "what {} begins a run with has changed",
     "numbers": "the numbers that the forces work with have changed for type {}",
     "kernels": "the compiled code for {} has changed (flocsim, a force or an integrator of your "
     "own, Python, numba or numpy)",

@@ -13,6 +13,7 @@ from flocsim.ensembles.config.schema import IntegratorConfig
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
+from flocsim.errors import KernelError
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from tests.helpers.small_study import load_text, problem_lines
 
@@ -428,9 +429,27 @@ def first_identity(tmp_path_factory):
 @pytest.mark.parametrize(
     ("edited", "said"),
     [
-        ({"/ 12.0": "/ 12.5"}, "the flocs with N = 2 have changed"),
+        ({"/ 12.0": "/ 12.5"}, "the flocs with N = 2 at the sizes of III have changed"),
         ({"2.0 * self.length * self.radius +": "2.1 * self.length * self.radius +"}, "the flocs"),
         ({"return Rod(self.length * factor": "return Rod(1.0001 * self.length * factor"}, None),
+        (
+            {"length * factor": "length * factor * (1.0 if factor > 0.1 else 1.01)"},
+            "the flocs with N = 2 at the sizes of III have changed",
+        ),
+        (
+            {
+                "    def core(self)": "    def equivalent_radius(self):\n        return "
+                "0.9 * self.area**0.5\n\n    @property\n    def core(self)"
+            },
+            "the flocs with N = 2 have changed",
+        ),
+        (
+            {
+                "largest_step = 1e-7": "largest_step = 1e-7\n\n    def fresh_clock(self):\n        "
+                "return 1.0 + VelocityVerlet.fresh_clock(self)"
+            },
+            "what the integrator begins a run with has changed",
+        ),
         ({"1.0 * step": "0.9 * step"}, "the compiled code for polygons has changed"),
         ({"largest_step = 1e-7": "largest_step = 2e-7"}, "integrator.largest_step is 1e-07 in the"),
         ({"default=0.5)": "default=0.6)"}, "integrator.factor is 0.5 in the file, 0.6 now"),
@@ -449,6 +468,69 @@ def test_an_edit_makes_it_another_study(tmp_path, own_module, first_identity, ed
     found = differences(first_identity, identity_of(Study(load_text(tmp_path, OWN_STUDY))))
     assert bool(found) == bool(said)
     assert all(said in line for line in found[:1])
+
+
+WITH_ENUM = """\
+import enum
+import attrs
+import numba
+from flocsim.fields import quantity
+from flocsim.forces import CentreForce
+
+class Power(enum.Enum):
+    FIRST = 1.0
+
+@numba.{}
+def doubled(x):
+    return 2.0 * x
+
+@attrs.frozen
+class Mine(CentreForce):
+    strength: float = quantity("N", above=0.0)
+
+    @staticmethod
+    def kernel(pair, strength):
+        return doubled(strength) * Power.FIRST.value
+"""
+WITH_ENUM_STUDY = """\
+preset = "tang2014"
+[shapes]
+vertices = [1]
+[forces.mine]
+class = "own:Mine"
+strength = "1 nN"
+"""
+
+
+@pytest.mark.parametrize("edited", [("FIRST = 1.0", "FIRST = 2.0"), ("2.0 * x", "3.0 * x")])
+def test_an_enum_and_a_helper_that_are_edited_make_it_another_study(tmp_path, own_module, edited):
+    found = []
+    for old, new in (("", ""), edited):
+        own_module.write_text(WITH_ENUM.format("njit").replace(old, new))
+        found.append(identity_of(Study(load_text(tmp_path, WITH_ENUM_STUDY))))
+    assert "the compiled code for spheres has changed" in differences(*found)[0]
+
+
+def test_a_helper_that_no_hash_follows_is_refused_with_its_force_before_anything_runs(
+    tmp_path, own_module
+):
+    own_module.write_text(WITH_ENUM.format("vectorize(['f8(f8)'])"))
+    said = (
+        r"^Mine: kernel Mine.kernel \(.*own\.py:\d+\) reads the global 'doubled', a DUFunc, whose"
+    )
+    with pytest.raises(KernelError, match=said):
+        check_study(load_text(tmp_path, WITH_ENUM_STUDY))
+
+
+def test_a_parameter_that_is_another_each_time_is_refused(tmp_path, own_module):
+    text = WITH_ENUM.format("njit").replace("def kernel(pair, strength)", "def kernel(pair, now)")
+    text = text.replace("doubled(strength)", "doubled(now)")
+    own_module.write_text(
+        text + "\n    @property\n    def now(self):\n        import time\n\n"
+        "        return float(time.perf_counter_ns())\n"
+    )
+    with pytest.raises(KernelError, match=r"Mine: kernel .* asks for 'now', which is .* once and"):
+        check_study(load_text(tmp_path, WITH_ENUM_STUDY))
 
 
 def test_other_parameters_make_it_another_study(tmp_path, own_module, first_identity):
