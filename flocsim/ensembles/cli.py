@@ -120,9 +120,21 @@ def study(config, comm, arguments):
                 sys.stderr,
             )
         return STOPPED
-    if comm.rank == 0 and not arguments.quiet:
+    if comm.rank > 0:
+        return 0
+    if not arguments.quiet:
         report(ended, output)
-    return 0
+    return verdict(ended.results, output)
+
+
+def verdict(results, output):
+    """0, or the code of an error where not one replicate has come to an outcome: said why."""
+    from flocsim.ensembles.report import undecided_line
+
+    line = undecided_line(results)
+    if line:
+        tell(f"flocsim: {line}; the rows are in {output}", sys.stderr)
+    return INTERNAL if line else 0
 
 
 def report(ended, output):

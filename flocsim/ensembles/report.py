@@ -1,10 +1,13 @@
 """The table of a study for the terminal."""
 
+import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from flocsim.ensembles.collision.failures import describe_note
 from flocsim.io.results.file import CLASSES
+from flocsim.io.results.schema import Results
 
 HEADER = (
     ("", "N"),
@@ -48,6 +51,23 @@ def format_table(
             lines.append(f"type {types[place[0]]}")
         lines.append(align(row, widths))
     return "\n".join(lines)
+
+
+def undecided_line(results: Results) -> str:
+    """What to say where no replicate has missed or come to a class; "" where one has."""
+    table = results.probabilities
+    total, failed, undecided = (
+        int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
+    )
+    if total == 0 or failed + undecided < total:
+        return ""
+    notes = json.loads(str(results.run.get("failed", "[]")))
+    first = f"; the first: {describe_note(notes[0])}" if notes else ""
+    advice = ": raise integrator.max_steps or scene.time_limit" if undecided else ""
+    return (
+        f"no replicate has come to an outcome, {failed} failed and {undecided} are undecided"
+        f"{advice}{first}"
+    )
 
 
 def condition_row(vertices, delta, table, place):

@@ -11,7 +11,8 @@ from flocsim import hooks
 from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.failures import collided, outcome_of
+from flocsim.ensembles.collision.blame import force_to_blame
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, UNABLE, WHY, collided, outcome_of
 from flocsim.ensembles.collision.settling import terminal_motion, turn_time
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.schema import Config, SceneConfig
@@ -182,7 +183,10 @@ def run_encounter(
         return None
     if record is not None:
         record.run = run
-    return replicate_row(status, angles, run)
+    row = replicate_row(status, angles, run)
+    if status in UNABLE and (why := force_to_blame(encounter.system, run)):
+        row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
+    return row
 
 
 def replicate_row(status, angles, run):

@@ -30,6 +30,12 @@ UNDECIDED_ENDS = {
 FAILED_ENDS = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
 """Ends in which the model was left, and their reasons."""
 
+UNABLE = (Status.STEP_BUDGET, Status.STALLED, Status.NOT_FINITE)
+"""Ends at which a force may be to blame that gives NaN or infinity."""
+
+WHY = "why"
+"""Key of a row, beside the columns, for the words on a failure."""
+
 CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): "D"}
 """Class by (inside, decision)."""
 
@@ -79,11 +85,13 @@ def run_safely(
         return failed_row("exception", angles), make_note(study, place, replicate, why)
     if row is None:
         return None, None
+    why = row.pop(WHY, "")
     if row["outcome"] != FAILED and not all(math.isfinite(row[name]) for name in ALWAYS_FINITE):
         flocs = {name: row[name] for name in ("floc_i", "floc_j")}
         row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | flocs
     if row["outcome"] == FAILED:
-        return row, make_note(study, place, replicate, FAILURES[row["failure"]])
+        reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
+        return row, make_note(study, place, replicate, reason)
     return row, None
 
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from flocsim.arrays import BodyView
 from flocsim.body import Body
+from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
+from flocsim.forces.codegen import laws_of
 from flocsim.system import System
 
 ITERATIONS = 50
@@ -44,6 +46,23 @@ def derivative(force, body, fluid, parameters, velocity):
     return np.array(columns).T
 
 
+def no_number(system, body, velocity):
+    """Which body force gives no number at a velocity, or around it, in words."""
+    at = f"a velocity of ({velocity[0]:.3g}, {velocity[1]:.3g}) m/s"
+    for force in system.pieces.used.values():
+        own = laws_of([force], system.fluid)
+        law = own.laws.get("body_force")
+        try:
+            known = (law, body, system.fluid, own.parameters)
+            if law is None or np.isfinite(derivative(*known, velocity)).all():
+                continue
+        except (ArithmeticError, ValueError):
+            pass
+        return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
+    return f"the body forces overflow at {at}"
+
+
+@np.errstate(all="ignore")
 def terminal_motion(system: System, body: Body) -> tuple[np.ndarray, float]:
     """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
 
@@ -57,7 +76,12 @@ def terminal_motion(system: System, body: Body) -> tuple[np.ndarray, float]:
     known = (force, body, system.fluid, pieces.parameters)
     velocity = np.zeros(2)
     for _ in range(ITERATIONS):
-        slope = derivative(*known, velocity)
+        try:
+            slope = derivative(*known, velocity)
+        except (ArithmeticError, ValueError):
+            slope = np.full((2, 2), np.nan)
+        if not np.isfinite(slope).all():
+            raise UsageError(f"no terminal velocity: {no_number(system, body, velocity)}")
         if not abs(np.linalg.det(slope)) > 0.0:
             break
         change = np.linalg.solve(slope, balance(*known, velocity))

@@ -1,0 +1,128 @@
+"""Which force gives no number where a replicate could not go on.
+
+A method tries shorter and shorter steps where a force is NaN or infinite, and ends as stalled, or
+without any steps left. Looking at every force by itself where the run has ended, and at where it
+would have gone next, tells such an end from one that the method alone is to blame for.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY
+from flocsim.compiler.composer import compose
+from flocsim.compiler.reads import where
+from flocsim.forces.codegen import laws_of
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.rhs.views import body_view, centre_view, contact_view, surface_view
+from flocsim.run import Run
+from flocsim.system import System
+
+AHEAD = (0.0, *np.geomspace(1e-16, 1e-4, 25))
+"""Times [s] behind the end of a run at which forces are looked at, at unchanged velocities."""
+
+LARGEST = 1e100
+"""Beyond such an answer, in SI units, the motion overflows."""
+
+MAY_BE_INFINITE = ("slip_limit", "contact_event")
+"""Laws of which only NaN is no answer."""
+
+
+def locate(scene, work):
+    """List the pairs of outlines that are near, and where they are; False without room."""
+    room = list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    return room
+
+
+def views_of(system, scene, work, time):
+    """{first part of laws' names: [what they are shown]} in the state NOW."""
+    views = {
+        "body": [body_view(scene, work, time, NOW, body) for body in range(len(system.bodies))],
+        "centre": [centre_view(scene, work, time, NOW, 1, 0)],
+    }
+    if compose(locate, system.fillings(), jit=False)(scene, work):
+        rows = range(work.tally[CANDIDATES])
+        touching = [row for row in rows if work.geometry[NOW, row, GAP] < 0.0]
+        views["surface"] = [surface_view(scene, work, time, NOW, row) for row in rows]
+        views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
+    return views
+
+
+def family(law):
+    """Which views a law is shown: the key in views_of."""
+    first = law.partition("_")[0]
+    return {"velocity": "body", "position": "body", "slip": "contact"}.get(first, first)
+
+
+def values_of(law, view, parameters, which):
+    """What a law answers, as a tuple; as compiled where Python raises for what is no number."""
+    try:
+        answer = law(view, parameters, *which)
+    except (ArithmeticError, ValueError):
+        answer = compose(law, {})(view, parameters, *which)
+    return answer if isinstance(answer, tuple) else (answer,)
+
+
+def is_answer(name, value):
+    """Whether a law of this name may give a value."""
+    return abs(value) < LARGEST or (name in MAY_BE_INFINITE and not math.isnan(value))
+
+
+def kernel_of(force, law, fluid):
+    """The function of a force that a law calls."""
+    if family(law) == "body":
+        return force.kernel_in(fluid)
+    if law.endswith("derivatives") and force.slope is not None:
+        return force.slope
+    return getattr(
+        force, {"slip_limit": "slip_limit", "contact_event": "events"}.get(law, "kernel")
+    )
+
+
+def place_of(view):
+    """Where a force was asked, in words."""
+    if hasattr(view, "gap"):
+        return f"a gap of {view.gap:.3g} m"
+    if hasattr(view, "overlap"):
+        return f"an overlap of {view.overlap:.3g} m"
+    return f"t = {view.time:.3g} s and an angle of {view.angle:.3g} rad"
+
+
+def wrong_answer(force, pieces, views, fluid):
+    """ "kernel (file:line) gives nan at …" of a force; "" where all of its answers are numbers."""
+    parameters = np.array(pieces.parameters, dtype=float)
+    for name, law in pieces.laws.items():
+        each_event = range(pieces.events) if name == "contact_event" else [None]
+        for view in views.get(family(name), ()):
+            for event in each_event:
+                which = () if event is None else (event,)
+                values = values_of(law, view, parameters, which)
+                wrong = [value for value in values if not is_answer(name, value)]
+                if wrong:
+                    what = where(kernel_of(force, name, fluid))
+                    slope = "a slope of " if name.endswith("derivatives") else ""
+                    return f"{what} gives {slope}{float(wrong[0])} at {place_of(view)}"
+    return ""
+
+
+@np.errstate(all="ignore")
+def force_to_blame(system: System, run: Run) -> str:
+    """The force that gives NaN, or more than LARGEST, where a Run has ended, in words; or ""."""
+    scene: Any = system.scene(jit=False)
+    start = run.work.motion[NOW].copy()
+    if not np.isfinite(start).all():
+        return ""
+    work = type(run.work)(*(np.copy(each) for each in run.work))
+    pieces = [(force, laws_of([force], system.fluid)) for force in system.pieces.used.values()]
+    for ahead in AHEAD:
+        work.motion[NOW] = start
+        work.motion[NOW, :, :VELOCITY] += ahead * start[:, VELOCITY:]
+        views = views_of(system, scene, work, run.clock[TIME] + ahead)
+        for force, own in pieces:
+            words = wrong_answer(force, own, views, system.fluid)
+            if words:
+                return words
+    return ""

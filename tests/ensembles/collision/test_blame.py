@@ -1,0 +1,139 @@
+"""A force that gives no number costs the replicates that meet it, and is named in them."""
+
+import math
+
+import pytest
+
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, run_safely
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.study import Study
+from flocsim.errors import UsageError
+from flocsim.io.results.file import read_results
+from tests.helpers.small_study import load_text, run_command
+
+FORCE = """\
+import math
+import attrs
+from flocsim.forces import BodyForce, CentreForce, ContactForce, SurfaceForce
+
+@attrs.frozen
+class Wrong({kind}):
+    {more}
+    @staticmethod
+    def kernel(view):
+        return {answer}
+"""
+STUDY = """\
+preset = "tang2014"
+seed = 1
+replicates = {replicates}
+[scene]
+types = ["III"]
+delta = [0.0]
+[shapes]
+vertices = [1]
+[forces.wrong]
+class = "wrong:Wrong"
+[stop]
+failed = {allowed}
+[output]
+file = "r.h5"
+"""
+SLOPE = "@staticmethod\n    def slope(view):\n        return math.nan\n"
+REACH = "reach = 5e-6"
+SETTLES = "no terminal velocity: Wrong.kernel "
+
+CASES = {
+    "always": ("CentreForce", "", "math.nan", "gives nan at a gap of 2e-06 m"),
+    "near": ("CentreForce", "", "math.inf if view.gap < 1e-6 else 0.0", "at a gap of 1e-06 m"),
+    "surface": ("SurfaceForce", REACH, "math.nan if view.gap < 1e-7 else 0.0", "a gap of 1e-07"),
+    "overflow": ("CentreForce", "", "math.exp(2e-3 / view.gap)", "gives inf at a gap of 2e-06"),
+    "too large": ("CentreForce", "", "math.exp(1e-3 / view.gap)", "e+217 at a gap of 2e-06 m"),
+    "by zero": ("CentreForce", "", "1e-12 / (view.gap - view.gap)", "gives inf at a gap of"),
+    "slope": ("CentreForce", SLOPE, "0.0", "Wrong.slope (X) gives a slope of nan at a gap of"),
+    "contact": ("ContactForce", "", "(math.nan, 0.0)", "gives nan at an overlap of"),
+    "stiff": ("ContactForce", "", "(1e300 * view.overlap, 0.0)", "at an overlap of"),
+    "late": ("BodyForce", "", "(math.nan if view.time > 1e-3 else 0.0, 0.0, 0.0)", "t = 0.001 s"),
+}
+
+
+def write(folder, kind, more, answer):
+    (folder / "wrong.py").write_text(FORCE.format(kind=kind, more=more, answer=answer))
+
+
+def wrong_study(folder, replicates=2, allowed=1):
+    return load_text(folder, STUDY.format(replicates=replicates, allowed=allowed))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_force_that_gives_no_number_is_named(tmp_path, name):
+    kind, more, answer, said = CASES[name]
+    write(tmp_path, kind, more, answer)
+    row, note = run_safely(Study(wrong_study(tmp_path)), (0, 1, 0.0), 0)
+    assert (row["outcome"], FAILURES[row["failure"]]) == (FAILED, "not finite")
+    told = note["why"]
+    assert told.startswith("not finite: Wrong.") and f"{tmp_path}/wrong.py:" in told
+    assert said.partition(" (X) ")[0] in told and said.rpartition(" (X) ")[2] in told
+    assert math.isfinite(row["t_end"])
+
+
+def test_a_force_that_gives_no_number_to_some_costs_these_alone(tmp_path):
+    write(tmp_path, "BodyForce", "", "(math.nan if view.angle > 3.0 else 0.0, 0.0, 0.0)")
+    study = Study(wrong_study(tmp_path))
+    found = {}
+    for replicate in range(12):
+        row, note = run_safely(study, (0, 1, 0.0), replicate)
+        lost = row["outcome"] == FAILED
+        assert lost == (max(row["angle_i"], row["angle_j"]) > 3.0) == (note is not None)
+        found.setdefault(lost, []).append(row)
+    assert len(found[True]) and len(found[False])
+    write(tmp_path, "BodyForce", "", "(0.0, 0.0, 0.0)")
+    sound = Study(wrong_study(tmp_path))
+    for row in found[False]:
+        assert row["outcome"] == 0 and row["steps"] > 10
+    assert run_safely(sound, (0, 1, 0.0), 0)[1] is None
+
+
+@pytest.mark.parametrize(
+    "answer", ["(math.nan, 0.0, 0.0)", "(1e-12 / (view.vx - view.vx), 0.0, 0.0)"]
+)
+def test_a_body_force_without_a_number_at_the_start_is_named_before_anything_runs(tmp_path, answer):
+    write(tmp_path, "BodyForce", "", answer)
+    with pytest.raises(UsageError, match=r"no terminal velocity: Wrong.kernel \(.*wrong.py:\d+\)"):
+        check_study(wrong_study(tmp_path))
+
+
+def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
+    write(tmp_path, "CentreForce", "", "0.0")
+    config = load_text(
+        tmp_path, STUDY.format(replicates=1, allowed=1), {"integrator": {"max_steps": 5}}
+    )
+    row, note = run_safely(Study(config), (0, 1, 0.0), 0)
+    assert (FAILURES[row["failure"]], note) == ("step budget", None)
+
+
+@pytest.mark.parametrize(
+    ("answer", "allowed", "words", "said", "kept"),
+    [
+        ("math.nan", 1, (), "no replicate has come to an outcome, 3 failed and 0 are und", True),
+        ("math.nan", 0.1, (), "1 replicates have failed, more than stop.failed allows", False),
+        ("0.0", 1, ("--set", "integrator.max_steps=5"), "0 failed and 3 are undecided: raise int",
+         True),
+    ],
+)  # fmt: skip
+def test_a_study_in_which_nothing_is_decided_ends_with_70(
+    tmp_path, answer, allowed, words, said, kept
+):
+    write(tmp_path, "CentreForce", "", answer)
+    (tmp_path / "c.toml").write_text(STUDY.format(replicates=3, allowed=allowed))
+    done = run_command(tmp_path, "c.toml", *words)
+    assert done.returncode == 70
+    [line] = [each for each in done.stderr.splitlines() if each.startswith("flocsim: ")]
+    assert said in line and ("Wrong.kernel (" in line) == (answer != "0.0")
+    assert (tmp_path / "r.h5").exists() == kept
+    if kept:
+        counts = read_results(tmp_path / "r.h5").probabilities
+        assert int(counts["n_failed"].sum() + counts["n_undecided"].sum()) == 3
+        table = [line.split() for line in done.stdout.splitlines()]
+        ends = ["0", "0", "3"] if answer == "math.nan" else ["0", "3", "0"]
+        assert any(words[-3:] == ends for words in table)  # missed, undecided, failed
