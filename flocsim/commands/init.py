@@ -21,7 +21,7 @@ replicates = 100           # pairs of orientations per condition
 types = ["I", "II", "III"] # the paper's sizes
 # pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
 delta = [0.0, 0.25, 0.5, 0.75, 1.0]   # horizontal displacements, as fractions of delta_max
-# delta_max = "projected"  # a displacement of 1 just grazes; "radius": 1 always misses
+# delta_max = "projected"  # 1 just grazes; "radius": R_i + R_j, 1 is beyond a straight fall
 # receiver = "free"        # or "fixed"
 # start_gap = "2 um"       # distance of the outlines at the start
 

@@ -90,7 +90,8 @@ class SceneConfig:
         "radius",
         default="projected",
         help="δ_max: the facing horizontal half-extents at the drawn orientations (1 just grazes), "
-        "or R_i + R_j, the largest centroid-to-outline distances (1 always misses)",
+        "or R_i + R_j, the largest centroid-to-outline distances (beyond any touch in a straight "
+        "fall; at 1 two spheres just graze, and attraction may draw any pair together)",
     )
     receiver: str = choice(
         "free", "fixed", default="free", help="whether the receiving body i settles or is held"

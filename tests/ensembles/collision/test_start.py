@@ -14,6 +14,7 @@ from flocsim.ensembles.collision.start import (
     place_pair,
 )
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import small_study
 
 GAP = 2e-6
@@ -110,7 +111,24 @@ def test_a_pair_that_passes_by_starts_clear_above():
         assert places[1, 1] >= largest
 
 
-def test_the_radius_rule_always_misses():
+def test_by_the_radius_rule_two_spheres_just_graze():
+    shapes = (Sphere(4e-6), Sphere(9e-6))
+    assert largest_displacement("radius", shapes[0], 0.3, shapes[1], 0.4) == pytest.approx(13e-6)
+    assert largest_displacement("projected", shapes[0], 0.3, shapes[1], 0.4) == pytest.approx(13e-6)
+
+
+@pytest.mark.parametrize(
+    ("more", "outcome"),
+    [({}, "A"), ({"forces": {"van_der_waals": {"hamaker": 0.0}}, "zone": {"distance": 1e-6}},
+                 "missed")],
+)  # fmt: skip
+def test_at_the_radius_rules_end_attraction_alone_brings_spheres_together(tmp_path, more, outcome):
+    scene = {"types": ["III"], "delta": [1.0], "delta_max": "radius"}
+    study = small_study(tmp_path, {"scene": scene, "shapes": {"vertices": [1]}} | more)
+    assert OUTCOMES[study.run(0, 1, 1.0, 0)["outcome"]] == outcome
+
+
+def test_by_the_radius_rule_a_straight_fall_never_overlaps():
     for shapes, angles in pairs(30):
         largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
         assert largest == sum(shape.bounding_radius for shape in shapes)
