@@ -64,7 +64,11 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal"],
-        ["files", "hdf5", "json_text", "provenance", "confidence", "markdown", "terminal"],
+        ["outputs"],
+        [
+            "files", "own_mark", "hdf5", "json_text", "provenance", "confidence", "markdown",
+            "terminal",
+        ],
     ],
 }
 

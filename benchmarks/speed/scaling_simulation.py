@@ -106,7 +106,7 @@ def measure_rank_zero(folder):
 
 def measure_assembly(store, folder):
     """Rows per second that rank 0 makes into tables and columns."""
-    from flocsim.io.files import replace_by_blocks
+    from flocsim.io.files import write_by_blocks
 
     count, rows = 200_000, np.zeros(8192, ROW)
     rows["inside"] = 1  # all of them of class A
@@ -118,7 +118,7 @@ def measure_assembly(store, folder):
     reader = Reader(store, (1, 1, 1, count))
     reader.known = [np.sort(store.entries[0][60 : store.counts[0]], order="first")]
     parts = (block for name in ROW.names for block in reader.column(name))
-    replace_by_blocks(folder / "columns", count * ROW_SIZE, parts)
+    write_by_blocks(folder / "columns", count * ROW_SIZE, parts)
     written = time.perf_counter() - began
     began = time.perf_counter()
     summarize(reader)

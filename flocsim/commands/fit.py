@@ -5,9 +5,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands.fit_pictures import Options, fit_pictures
-from flocsim.errors import UsageError
-from flocsim.io.files import check_writable, replace_file
+from flocsim.commands.fit_pictures import (
+    LOST,
+    Options,
+    fit_pictures,
+    list_pictures,
+    report,
+    titles_of,
+)
+from flocsim.errors import ImageError, UsageError
+from flocsim.io.files import write_file
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.shapes import draw_overlay
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
@@ -53,6 +61,7 @@ def add_parser(subparsers: Any) -> None:
     add("--overlay", metavar="FILE",
         help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
         "pictures, one file each: FILE-picture.png")  # fmt: skip
+    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add = parser.add_argument_group("finding the flocs").add_argument
     add("--flocs", default="auto", choices=("auto", "bright", "dark"),
         help="how flocs stand out from the background (default: %(default)s)")  # fmt: skip
@@ -80,12 +89,16 @@ def run(args: argparse.Namespace) -> int:
     """Fit, print what was found and write the library; returns the exit code."""
     options = read_options(args)
     summary = args.summary or Path(args.output).with_suffix(".csv")
-    for output in (args.output, summary):
-        check_writable(output)
     if args.overlay is not None:
         checked_format(args.overlay, "--overlay ")
+    paths = list_pictures(args.images, options.masks)
+    rule, drawn = data_rule(args.overwrite), figure_rule(args.overwrite)
+    outputs = [Output(args.output, rule), Output(summary, rule)]
+    if args.overlay is not None:
+        outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
+    check_outputs(outputs, paths)
     try:
-        pictures, fits = fit_pictures(args.images, options)
+        pictures, fits, lost = fit_pictures(paths, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
@@ -98,19 +111,22 @@ def run(args: argparse.Namespace) -> int:
     ]
     table = summary_text(pictures, fits, options.pixel_size).encode()
     if not entries:
-        replace_file(summary, table)
+        write_file(summary, table, rule)
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
-        return 2
+        return LOST if lost else 2
     settings = {"method": options.method, "preserve_area": options.preserve_area,
                 "inscribed": options.inscribed}  # fmt: skip
-    write_library(args.output, entries, settings)
-    replace_file(summary, table)
+    write_library(args.output, entries, settings, rule)
+    write_file(summary, table, rule)
     if args.overlay is not None:
-        draw(Path(args.overlay), pictures, fits, options)
+        lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1)
     print(format_errors(entries))
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
-    return 0
+    if not lost:
+        return 0
+    report(f"lost: {', '.join(lost)}; all else was written")
+    return LOST
 
 
 def read_options(args):
@@ -171,20 +187,46 @@ def whole(option, text):
     return int(text)
 
 
-def draw(overlay, pictures, fits, options):
-    """Write each picture with the outlines at the largest N and the smallest spheroradius."""
+def overlay_paths(overlay, names, several):
+    """A path for the overlay of each of the pictures that have these (name, path of the file)."""
+    if not several:
+        return [overlay] * len(names)
+    paths: list[Path] = []
+    for name, file in names:
+        plain = Path(name.replace(":", "-").replace("/", "-"))
+        stem = plain.stem if plain.suffix.lower() == file.suffix.lower() else plain.name
+        path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
+        while path in paths:  # pictures a/b.png and a-b.png
+            path = path.with_name(f"{path.stem}'{path.suffix}")
+        paths.append(path)
+    return paths
+
+
+def expected_overlays(overlay, paths):
+    """The overlays that will be drawn, as far as it can be known before files are read."""
+    names = list(zip(titles_of(paths), paths, strict=True))
+    return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
+
+
+def draw(overlay, pictures, fits, options, rule, several):
+    """Write each picture with the outlines at the largest N and the smallest spheroradius.
+
+    Returns what could not be drawn because its picture cannot be read any more.
+    """
     from flocsim.io.images.pictures import read_grey
 
     most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
-    for picture in pictures:
+    names = [(each.name, each.path) for each in pictures]
+    paths, lost = overlay_paths(overlay, names, several or len(pictures) > 1), []
+    for picture, path in zip(pictures, paths, strict=True):
         flocs = [(region, next(results)[radius][most]) for region in picture.regions]
         title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
-        grey = picture.found.foreground if options.masks else read_grey(picture.path)
+        try:
+            grey = picture.found.foreground if options.masks else read_grey(picture.path)
+        except (ImageError, MemoryError) as error:
+            report(str(error) or f"{picture.name}: there was not enough memory for its overlay")
+            lost.append(str(path))
+            continue
         figure = draw_overlay(grey, flocs, title, picture.found.rejected)
-        path = overlay
-        if len(pictures) > 1:
-            name = Path(picture.name.replace(":", "-").replace("/", "-"))
-            same = name.suffix.lower() == picture.path.suffix.lower()
-            stem = name.stem if same else name.name
-            path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
-        save(figure, path)
+        save(figure, path, rule)
+    return lost

@@ -1,6 +1,7 @@
 """The work of `flocsim fit`, in one process or several: pictures → flocs → fits."""
 
 import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from flocsim.commands.fit_processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.io.shapes.fit_report import picture_line, warn_of_coarse
 from flocsim.io.terminal import Progress
@@ -16,6 +18,9 @@ from flocsim.io.terminal import Progress
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
     from flocsim.io.images.pictures import Region, Segmentation
+
+LOST = FlocsimError.exit_code
+"""Exit code where pictures were lost; the library has the others."""
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
@@ -53,18 +58,28 @@ class Picture:
 
 
 def fit_pictures(
-    names: Sequence[str], options: Options
-) -> "tuple[list[Picture], list[dict[float, dict[int, Fit]]]]":
-    """Pictures, and for each of their regions {radius: {N: Fit}}."""
-    paths = list_pictures(names, options.masks)
+    paths: Sequence[Path], options: Options
+) -> "tuple[list[Picture], list[dict[float, dict[int, Fit]]], list[str]]":
+    """Pictures, for each of their regions {radius: {N: Fit}}, and the names of pictures lost.
+
+    A file that cannot be read as a picture is told and passed over. One that the machine has
+    failed on, for want of memory or because a process was killed, is lost, with all its flocs.
+    """
     background = find_background(paths, options)
-    repeated = [path.name for path in paths]
-    # Pictures of one name in several folders are told apart by their paths.
-    titles = [p.name if repeated.count(p.name) == 1 else p.as_posix() for p in paths]
-    tasks = [(p, t, background, options) for p, t in zip(paths, titles, strict=True)]
-    with workers(options.jobs) as mapped:
-        pictures = []
-        for result in mapped(find_flocs, tasks):
+    tasks = [(p, t, background, options) for p, t in zip(paths, titles_of(paths), strict=True)]
+    lost: dict[str, None] = {}
+
+    def lose(name, result):
+        if name not in lost:
+            report(f"{name} is lost: {result.reason}; the other pictures are not")
+        lost[name] = None
+
+    with workers(options.jobs, compile_fit) as mapped:
+        pictures: list[Picture] = []
+        for task, result in zip(tasks, mapped(find_flocs, tasks), strict=True):
+            if isinstance(result, Lost):
+                lose(task[1], result)
+                continue
             if isinstance(result, FlocsimError):
                 report(result)
                 continue
@@ -80,36 +95,42 @@ def fit_pictures(
             fits.append(fit)
             progress.report(len(masks) - len(fits))
         progress.finish()
-    return pictures, fits
+    for (name, _), fit in zip(regions, fits, strict=True):
+        if isinstance(fit, Lost):
+            lose(name, fit)
+    fits = [fit for (name, _), fit in zip(regions, fits, strict=True) if name not in lost]
+    return [each for each in pictures if each.name not in lost], fits, list(lost)
+
+
+def titles_of(paths: Sequence[Path]) -> list[str]:
+    """What pictures are called in tables and libraries: all different, and all of them text.
+
+    Pictures of one name in several folders are told apart by their paths; a byte that is no UTF-8
+    is written as \\xe9.
+    """
+    names = [printable(path.name) for path in paths]
+    titles: list[str] = []
+    for name, path in zip(names, paths, strict=True):
+        title = name if names.count(name) == 1 else printable(path.as_posix())
+        while title in titles:
+            title += "'"
+        titles.append(title)
+    return titles
+
+
+def printable(text):
+    return os.fsencode(str(text)).decode("utf-8", "backslashreplace")
+
+
+def compile_fit():
+    """Compile before there are several processes that would all do it."""
+    from flocsim.geometry.fit.fit import fit_mask
+
+    fit_mask(np.ones((9, 9), bool), vertices=5)
 
 
 def report(error):
-    print(f"flocsim: {error}", file=sys.stderr, flush=True)
-
-
-@contextlib.contextmanager
-def workers(jobs):
-    """A map over tasks, in order, as results come in; by `jobs` processes if more than one."""
-    if jobs == 1:
-        yield map
-        return
-    import multiprocessing
-
-    from flocsim.geometry.fit.fit import fit_mask
-
-    # Compile before there are several processes that would all do it.
-    fit_mask(np.ones((9, 9), bool), vertices=5)
-    # Linux processes inherit what is compiled and loaded; elsewhere forking is not safe.
-    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
-    with context.Pool(jobs, ignore_interrupts) as pool:
-        yield pool.imap
-
-
-def ignore_interrupts():
-    """Ctrl-C is the parent's to handle."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    print(f"flocsim: {printable(error)}", file=sys.stderr, flush=True)
 
 
 def find_flocs(task):
@@ -171,7 +192,7 @@ def fit_region(task):
     return fits
 
 
-def list_pictures(names, masks):
+def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:
     """The files' paths, folders replaced by the pictures in them; each path once."""
     from flocsim.io.images.masks import MASK_SUFFIXES
     from flocsim.io.images.reading import SUFFIXES
@@ -197,7 +218,7 @@ def find_background(paths, options):
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
         # A file that cannot be read is reported when its own turn comes.
-        with contextlib.suppress(ImageError):
+        with contextlib.suppress(ImageError, MemoryError):
             frames.append(read_grey(path))
     shapes = {frame.shape for frame in frames}
     if len(frames) < FEWEST_FRAMES or len(shapes) > 1:

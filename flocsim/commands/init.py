@@ -1,11 +1,10 @@
 """`flocsim init`: write a commented example of a config file."""
 
-import os
 from argparse import Namespace
 from typing import Any
 
-from flocsim.errors import UsageError
-from flocsim.io.files import replace_file
+from flocsim.io.files import write_file
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 
 DEFAULT_FILE = "study.toml"
 
@@ -69,8 +68,8 @@ tolerance = "1 nm"         # largest error in position of a step
 # half_width = 0.02        # of the 95 % intervals, in every condition
 # failed = 0.1             # give the study up where a larger share of replicates fails
 
-[output]
-file = "results.h5"
+# [output]
+# file = "elsewhere.h5"    # without it, the results of study.toml go to study.h5
 """
 
 
@@ -83,14 +82,14 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
     )
-    parser.add_argument("--force", action="store_true", help="overwrite a file that exists")
+    parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
-    if os.path.lexists(args.file) and not args.force:
-        raise UsageError(f"{args.file} exists already: name another file, or add --force")
-    replace_file(args.file, EXAMPLE.encode())
+    rule = data_rule(args.overwrite)
+    check_outputs([Output(args.file, rule)], [])
+    write_file(args.file, EXAMPLE.encode(), rule)
     print(f"wrote {args.file}; run it with: flocsim ensemble {args.file}")
     return 0

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.errors import FileError, UsageError
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import FORMATS, save
@@ -38,6 +39,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
     parser.add_argument("--figures", metavar="LIST",
         help="figures with commas between them (default: all that the file has)")  # fmt: skip
+    parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
 
@@ -56,12 +58,17 @@ def run(args: argparse.Namespace) -> int:
             f"--output-dir {args.output_dir} could not be made: {error.strerror}; "
             "name another folder"
         ) from error
-    for name in names or figures:
-        label = f"figure-{name}" if name.isdigit() else name
-        path = folder / f"{Path(args.results).stem}-{label}.{args.format}"
-        save(figures[name](content), path)
+    stem, rule = Path(args.results).stem, figure_rule(args.overwrite)
+    paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
+    check_outputs([Output(path, rule) for path in paths.values()], [args.results])
+    for name, path in paths.items():
+        save(figures[name](content), path, rule)
         print(path)
     return 0
+
+
+def label(name):
+    return f"figure-{name}" if name.isdigit() else name
 
 
 def read_content(path):

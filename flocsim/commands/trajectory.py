@@ -14,9 +14,10 @@ from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.preflight import check_output, check_study
+from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.results.schema import OUTCOMES
@@ -37,7 +38,8 @@ def add_parser(subparsers: Any) -> None:
     add("--seed", type=int, help="seed, instead of the config's")
     add("--frames", type=int, default=6, metavar="K", help="default: 6")
     add("-o", "--output", nargs="+", default=[], metavar="FILE",
-        help="strip of frames: .png, .pdf or .svg, or several of them")  # fmt: skip
+        help="strip of frames: .png, .pdf or .svg, or several of them (default: a .png named after "
+        "the config and the replicate)")  # fmt: skip
     add("--distance", nargs="+", default=[], metavar="FILE",
         help="also draw the centre distance against time")  # fmt: skip
     add("--forces", nargs="+", default=[], metavar="FILE",
@@ -47,6 +49,7 @@ def add_parser(subparsers: Any) -> None:
         help="any value instead of the config's, as in flocsim ensemble; may be "
         "repeated")  # fmt: skip
     add("--save", metavar="FILE.h5", help="also write the motion to HDF5")
+    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
 
 
 def add_replicate(parser: ArgumentParser) -> None:
@@ -122,29 +125,37 @@ def draw(args, encounter, arrays, row, title):
     times, position, _ = arrays
     touch, zone = row["t_collision"], encounter.zone_distance
     motion = times, centre_distance(position)
+    rule = figure_rule(args.overwrite)
     frames = frames_of(encounter.shapes, times, position, touch, args.frames)
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
         centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
     )  # fmt: skip
-    written = save_all(strip, args.output)
+    written = save_all(strip, args.output, rule)
     if args.distance:
-        written += save_all(draw_distance(*motion, zone, title), args.distance)
+        written += save_all(draw_distance(*motion, zone, title), args.distance, rule)
     if args.forces:
         instants, forces = forces_between(encounter, *arrays)
-        written += save_all(draw_forces(instants, forces, touch, title), args.forces)
+        written += save_all(draw_forces(instants, forces, touch, title), args.forces, rule)
     if args.animation:
         frames = frames_of(encounter.shapes, times, position, touch, ANIMATION_FRAMES)
-        write_animation(args.animation, frames, motion, zone, title)
+        write_animation(args.animation, frames, motion, zone, title, rule)
         written.append(Path(args.animation))
     return written
 
 
-def save_all(figure, names):
+def save_all(figure, names, rule):
     paths = [Path(name) for name in names]
     for path in paths:
-        save(figure, path)
+        save(figure, path, rule)
     return paths
+
+
+def default_name(args, config, place):
+    """A figure's name that says what it shows: "study-I-64-0.5-17.png"."""
+    condition, vertices, share = place
+    name = config.scene.conditions[condition][0]
+    return f"{Path(args.config).stem}-{name}-{vertices}-{share:g}-{args.replicate}.png"
 
 
 def run(args: Namespace) -> int:
@@ -154,15 +165,17 @@ def run(args: Namespace) -> int:
     take_scene(args)
     place = select(config, args)
     check_study(config)
-    args.output = args.output or [f"trajectory-{args.replicate}.png"]
+    args.output = args.output or [default_name(args, config, place)]
     figures = [*args.output, *args.distance, *args.forces]
     # What could not be written is said now, not after the run.
     for path in figures:
         checked_format(path)
     if args.animation and Path(args.animation).suffix.lower() != ".gif":
         raise UsageError(f"--animation {args.animation} must end in .gif")
-    for path in [*figures, *filter(None, (args.animation, args.save))]:
-        check_output(path, args.config)
+    drawn = [*figures, *filter(None, [args.animation])]
+    outputs = [Output(path, figure_rule(args.overwrite)) for path in drawn]
+    motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
+    check_outputs([*outputs, *motion], inputs_of(config, args.config))
     study = Study(with_one_count(config, place[1]))
     record = Record()
     row = study.run(*place, args.replicate, record)
@@ -176,6 +189,7 @@ def run(args: Namespace) -> int:
         facts = {"config": config.text, "replicate": args.replicate}
         facts["zone_distance"] = encounter.zone_distance
         times, position, velocity = arrays
-        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts)
+        rule = data_rule(args.overwrite)
+        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts, rule)
         print(args.save)
     return 0

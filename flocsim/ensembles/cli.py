@@ -18,6 +18,7 @@ from flocsim.ensembles.parallel.communicator import (
 from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
 INTERNAL = 70
@@ -50,8 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     )  # fmt: skip
     begin.add_argument(
         "--restart", action="store_const", const="restart", dest="mode",
-        help="throw an unfinished run away and start anew",
+        help="throw an unfinished run away and start anew (finished results: --overwrite)",
     )  # fmt: skip
+    parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.add_argument("--dry-run", action="store_true", help="say what would be run, and stop")
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     return parser
@@ -74,14 +76,22 @@ def overrides(arguments: argparse.Namespace) -> dict:
 def checked_config(arguments):
     """The config, found to make a study whose results can be written where they should go."""
     from flocsim.ensembles.config.loader import load_config
-    from flocsim.ensembles.preflight import check_output, check_study
+    from flocsim.ensembles.preflight import check_study, inputs_of
 
     config = load_config(arguments.config, overrides(arguments))
     check_study(config)
     if not arguments.dry_run:
-        sources = [arguments.config, config.shapes.file]
-        check_output(config.output.file, *(source for source in sources if source))
+        check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
     return config
+
+
+def results_of(config, arguments):
+    """The results file as an Output; what is to be extended is looked at when the run begins."""
+    from flocsim.ensembles.storage.resume import RESUME, WAYS
+    from flocsim.io.journal.journal import SUFFIX
+
+    rule = data_rule(arguments.overwrite or arguments.mode == RESUME)
+    return Output(config.output.file, rule, SUFFIX, WAYS)
 
 
 def agree(comm, arguments):
@@ -105,7 +115,8 @@ def study(config, comm, arguments):
 
     output = config.output.file
     try:
-        ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet)
+        ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet,
+                            arguments.overwrite)  # fmt: skip
     except RankZeroFailed as error:
         return error.args[0]
     except SharedError as error:

@@ -1,6 +1,5 @@
 """What is wrong with a study can mostly be known before anything is compiled or run."""
 
-import os
 from collections.abc import Iterator, Sequence
 
 import attrs
@@ -17,7 +16,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
-from flocsim.io.files import check_writable
+from flocsim.io.outputs import loaded_sources
 from flocsim.system import System
 
 
@@ -67,12 +66,10 @@ def check_approach(config, name, pair):
         )
 
 
-def check_output(path: str | os.PathLike, *inputs: str | os.PathLike) -> None:
-    """FileError for a file that could not be written, ConfigError for one that the study reads."""
-    for source in inputs:
-        if os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source):
-            raise ConfigError(f"writing {path} would replace {source}, which is read: name another")
-    check_writable(path)
+def inputs_of(config: Config, path: str) -> list[str]:
+    """The files that a study is made from: the config at ``path``, its library, its own classes."""
+    library = [str(config.shapes.file)] if config.shapes.file else []
+    return [path, *library, *loaded_sources()]
 
 
 def stand_in(shape, options):

@@ -76,19 +76,21 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
 
 
 def run_to_file(
-    config: Config, comm: Communicator, output: str | Path, mode: str, quiet: bool = True
-) -> Ended:
+    config: Config, comm: Communicator, output: str | Path, mode: str, quiet: bool = True,
+    overwrite: bool = False,
+) -> Ended:  # fmt: skip
     """Run a config's study into the results file ``output``: how it Ended.
 
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
     finished goes into a journal beside the file, and from there into the file when all is.
+    ``overwrite``: what lies at ``output`` and is not to be extended is kept under another name.
     """
     study, cpus = make_study(config, comm)
     if comm.rank > 0:
         return follow(study, comm)
     progress = Progress(study.size, quiet)
     with sharing_errors(comm):
-        start = begin(study, identity_of(study), output, mode, cpus)
+        start = begin(study, identity_of(study), output, mode, cpus, overwrite)
     with start.resources:
         for remark in start.remarks:
             progress.warn(remark)
@@ -227,7 +229,7 @@ def make_results(
         count=count,
     )
     if output:
-        write_results(output, results, reader.column)
+        write_results(output, results, reader.column, start.rule)
     return results
 
 

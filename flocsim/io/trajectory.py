@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.files import replace_file, seal
+from flocsim.io.files import Rule, keep, seal, write_file
 
 SCHEMA_VERSION = 1
 
@@ -32,11 +32,13 @@ def write_trajectory(
     velocity: np.ndarray,
     shapes: Sequence[Shape],
     facts: Mapping[str, str | float],
+    rule: Rule = keep,
 ) -> None:
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
     Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],
-    their spheroradii in the attribute ``radius``. Raises FileError if it cannot be written.
+    their spheroradii in the attribute ``radius``; ``rule`` says what becomes of a file that is
+    there. Raises FileError if it cannot be written.
     """
     import h5py
 
@@ -59,4 +61,4 @@ def write_trajectory(
             dataset = file.create_dataset(f"vertices_{body}", data=np.array(shape.vertices))
             dataset.attrs["units"] = "m"
             dataset.attrs["radius"] = shape.radius
-    replace_file(path, seal(buffer.getvalue()))
+    write_file(path, seal(buffer.getvalue()), rule)

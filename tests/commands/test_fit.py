@@ -56,7 +56,7 @@ def test_only_the_largest_flocs(tmp_path, frame, capsys):
     assert run(frame / "a.png", *options, "--max-flocs", "2") == 0
     assert "the 2 largest fitted" in capsys.readouterr().out
     areas = [entry.area for entry in read_library(tmp_path / "s.h5")]
-    assert run(frame / "a.png", *options) == 0
+    assert run(frame / "a.png", *options, "--overwrite") == 0
     every = [entry.area for entry in read_library(tmp_path / "s.h5")]
     assert sorted(areas) == sorted(every)[1:]
 
@@ -162,7 +162,7 @@ def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):
     options = ("--pixel-size", "1e-6", "--vertices", "4")
     areas = []
     for more in ([], ["--inscribed"]):
-        assert run(frame, *options, *more, "-o", tmp_path / "s.h5") == 0
+        assert run(frame, *options, *more, "-o", tmp_path / "s.h5", "--overwrite") == 0
         areas.append([entry.fits[4].shape.area for entry in read_library(tmp_path / "s.h5")])
     assert sum(areas[1]) < sum(areas[0])
     for more in (["--preserve-area"], ["--method", "paper"]):
@@ -205,7 +205,7 @@ def test_overlays_are_drawn(tmp_path, frame):
         red, _, blue = (np.asarray(drawn.convert("RGB"), int)[..., k] for k in range(3))
     assert np.count_nonzero(red - blue > 100) > 300
     (frame / "c.png").write_bytes((frame / "a.png").read_bytes())
-    assert run(frame, *options, "--overlay", tmp_path / "two.png") == 0
+    assert run(frame, *options, "--overlay", tmp_path / "two.png", "--overwrite") == 0
     assert (tmp_path / "two-a.png").exists() and (tmp_path / "two-c.png").exists()
 
 

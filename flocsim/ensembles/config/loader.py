@@ -42,6 +42,8 @@ def load_config(path: str | os.PathLike, overrides: dict | None = None) -> Confi
     reader = Reader(folder, problems)
     parts = reader.config_parts(table)
     problems.raise_if_any()
+    if "file" not in table.get("output", {}):
+        parts["output"] = attrs.evolve(parts["output"], file=f"{Path(path).stem}.h5")
     return Config(text=text, folder=folder, overrides=overrides, **parts)
 
 

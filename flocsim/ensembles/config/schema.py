@@ -391,7 +391,8 @@ class OutputConfig:
         read_text,
         "a string",
         default="results.h5",
-        help="results file, relative to the current folder",
+        shown='"study.h5"',
+        help="results file, relative to the current folder; the default has the config's name",
     )
 
 

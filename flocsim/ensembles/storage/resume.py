@@ -26,8 +26,10 @@ from flocsim.ensembles.storage.row_store import OldTable, RowStore
 from flocsim.ensembles.storage.stored_json import is_session, stored
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.provenance import now
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import BLOCK, UNREADABLE, opened, read_scalar
@@ -35,6 +37,12 @@ from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, throw it away."""
+
+WAYS = (
+    "extend it by --resume if it is of this study, or add --overwrite, which keeps the old one "
+    "under another name"
+)
+"""What a user can do about a file in the place of the results."""
 
 MOST_DIFFERENCES = 5
 HISTORY = ("date", "command")
@@ -49,7 +57,8 @@ class Beginning:
     ``history`` has date and command of the runs before; ``complete`` is what an older results
     file holds, (conditions, replicates of each), where nothing else was found. ``cpus_now`` are
     the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of;
-    ``flocs``: how many flocs its rows may be of.
+    ``flocs``: how many flocs its rows may be of; ``rule``: what becomes of a file at the place of the results when they
+    are written.
     """
 
     store: RowStore
@@ -61,6 +70,7 @@ class Beginning:
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     flocs: int = 0
+    rule: Rule = keep
     resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
     @property
@@ -77,14 +87,22 @@ class Beginning:
 
 
 def begin(
-    study: Study, identity: dict, output: str | Path, mode: str, cpus: Sequence[dict] = ()
+    study: Study,
+    identity: dict,
+    output: str | Path,
+    mode: str,
+    cpus: Sequence[dict] = (),
+    overwrite: bool = False,
 ) -> Beginning:
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
     Raises UsageError where an unfinished run is in the way, or is one of another config, of other
-    shapes or other physics; FileError where the journal cannot be opened.
+    shapes or other physics, or where anything but results of this study to be extended lies at
+    ``output``; with ``overwrite`` that is set aside. FileError where the journal cannot be opened.
     """
     path = journal_path(output)
+    if mode != RESUME and not overwrite:
+        check_free(output)  # before an unfinished run is thrown away
     if mode == NEW and path.exists() and path.stat().st_size:
         raise UsageError(
             f"{path} holds an unfinished run: go on with it by --resume, or throw it away by "
@@ -99,8 +117,7 @@ def begin(
     start.resources.callback(journal.close)
     try:
         take_journal(start)
-        if mode == RESUME and os.path.exists(output):
-            take_results(start, output)
+        take_place(start, output, mode, overwrite)
         session = {
             "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
             "command": shlex.join(sys.argv), "cpus": start.cpus_now,
@@ -110,6 +127,30 @@ def begin(
         journal.drop_if_empty()
         raise
     return start
+
+
+def check_free(output: str | Path) -> None:
+    """UsageError where there is a file at the place of the results."""
+    if os.path.lexists(ordinary_target(output)):
+        raise in_the_way(output, WAYS)
+
+
+def take_place(start: Beginning, output: str | Path, mode: str, overwrite: bool) -> None:
+    """Use the results of this study that are to be extended; nothing else may lie there."""
+    if os.path.lexists(ordinary_target(output)) and mode == RESUME:
+        try:
+            rule = extension_rule(output)
+            take_results(start, output)
+            start.rule = rule
+            return
+        except (FileError, UsageError) as error:
+            if not overwrite:
+                raise UsageError(f"{error}; --overwrite keeps it under another name") from error
+            start.remarks.append(str(error))
+    if not overwrite:
+        check_free(output)
+    elif aside := set_aside(output):
+        start.remarks.append(f"{output} is kept as {aside.name}")
 
 
 def take_journal(start: Beginning) -> None:
@@ -147,17 +188,18 @@ def take_journal(start: Beginning) -> None:
         )
 
 
-REMEDY = "name another output, or throw it away by --restart"
+ELSEWHERE = "name another output"
+REMEDY = f"{ELSEWHERE}, or throw it away by --restart"
 
 
-def refuse_other(start, path, stored):
+def refuse_other(start, path, stored, remedy=REMEDY):
     """UsageError where an identity in a file is not that of this study."""
     lines = differences(stored, start.identity)
     if lines:
         shown = "; ".join(lines[:MOST_DIFFERENCES])
         rest = len(lines) - MOST_DIFFERENCES
         more = f"; and {rest} more" if rest > 0 else ""
-        raise UsageError(f"{path} is of another study: {shown}{more}; {REMEDY}")
+        raise UsageError(f"{path} is of another study: {shown}{more}; {remedy}")
 
 
 def take_chunk(start, record, known, places, cpus):
@@ -186,29 +228,20 @@ def take_chunk(start, record, known, places, cpus):
 
 
 def take_results(start, output):
-    """Use the rows of an older results file, if they are of this study.
-
-    With rows in the journal, the old file may be of another study: it will be replaced.
-    """
+    """Use the rows of an older results file; FlocsimError if they are not of this study."""
     begun = any(start.store.counts)
+    file = start.resources.enter_context(opened(output))
+    run = {name: read_scalar(dataset) for name, dataset in file["run"].items()}
+    if "identity" not in run:
+        raise UsageError(f"{output} does not say what it was made from: {ELSEWHERE}")
     try:
-        file = start.resources.enter_context(opened(output))
-        run = {name: read_scalar(dataset) for name, dataset in file["run"].items()}
-        if "identity" not in run:
-            raise UsageError(f"{output} does not say what it was made from: {REMEDY}")
-        try:
-            refuse_other(start, output, stored(run, "identity"))
-            found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
-            rows, places, count = old_rows(start, file)
-        except UNREADABLE as error:
-            if isinstance(error, FlocsimError):
-                raise
-            raise FileError(f"{output} holds no readable results: {error}; {REMEDY}") from error
-    except (FileError, UsageError) as error:
-        if not begun:
+        refuse_other(start, output, stored(run, "identity"), ELSEWHERE)
+        found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
+        rows, places, count = old_rows(start, file)
+    except UNREADABLE as error:
+        if isinstance(error, FlocsimError):
             raise
-        start.remarks.append(f"not used: {error}")
-        return
+        raise FileError(f"{output} holds no readable results: {error}; {ELSEWHERE}") from error
     for place, condition in enumerate(start.store.conditions):
         if condition in places and count:
             start.store.add(place, 0, count, -1)

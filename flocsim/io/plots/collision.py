@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.files import replace_file
+from flocsim.io.files import Rule, write_file
+from flocsim.io.outputs import redrawn
+from flocsim.io.own_mark import marked
 from flocsim.io.plots.style import BODY_COLOURS, CONTACT_COLOUR, Figure, house_style, new_figure
 
 MICRO = 1e6
@@ -136,11 +138,12 @@ def write_animation(
     motion: tuple[Sequence[float], Sequence[float]],
     zone_distance: float | None = None,
     title: str = "",
+    rule: Rule = redrawn,
 ) -> None:
     """Write Frames (times, outlines, paths, contacts, centre_distance) as a GIF that loops.
 
     ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
-    D_0 [m]. FileError if it cannot be written.
+    D_0 [m]; ``rule`` as in `save`. FileError if it cannot be written.
     """
     check_lengths(len(frames.times), frames.outlines, frames.contacts, frames.centre_distance)
     pictures = [picture_of(frames, place, motion, zone_distance, title)
@@ -149,7 +152,7 @@ def write_animation(
     buffer = io.BytesIO()
     pictures[0].save(buffer, "GIF", save_all=True, append_images=pictures[1:], duration=lasting,
                      loop=0, optimize=False)  # fmt: skip
-    replace_file(path, buffer.getvalue())
+    write_file(path, marked(buffer.getvalue(), ".gif"), rule)
 
 
 def picture_of(frames, place, motion, zone_distance, title):

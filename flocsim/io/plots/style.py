@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.files import replace_file
+from flocsim.io.files import Rule, write_file
+from flocsim.io.outputs import redrawn
+from flocsim.io.own_mark import marked
 
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""
@@ -138,14 +140,14 @@ def checked_format(path: str | Path, option: str = "") -> str:
     return suffix
 
 
-def save(figure: Figure, path: str | Path) -> None:
+def save(figure: Figure, path: str | Path, rule: Rule = redrawn) -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
-    The same figure gives the same bytes. Raises UsageError for another suffix, FileError if the
-    file cannot be written.
+    ``rule`` says what becomes of a file that is there (flocsim.io.outputs). The same figure gives
+    the same bytes. Raises UsageError for another suffix, FileError if the file cannot be written.
     """
     suffix = checked_format(path)
     picture = io.BytesIO()
     with house_style():
         figure.savefig(picture, format=suffix, metadata=METADATA[suffix])
-    replace_file(path, picture.getvalue())
+    write_file(path, marked(picture.getvalue(), f".{suffix}"), rule)

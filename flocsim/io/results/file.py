@@ -24,7 +24,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.files import checked_sealed, replace_by_blocks
+from flocsim.io.files import Rule, checked_sealed, keep, write_by_blocks
 from flocsim.io.hdf5.structure import structure_of
 from flocsim.io.results.checks import (
     CODED,
@@ -64,13 +64,16 @@ BLOCK = 262_144
 
 
 def write_results(
-    path: str | Path, results: Results, columns: Callable[[str], Iterable[bytes]] | None = None
+    path: str | Path,
+    results: Results,
+    columns: Callable[[str], Iterable[bytes]] | None = None,
+    rule: Rule = keep,
 ) -> None:
     """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
 
     ``columns(name)`` gives the values of a column of the table of replicates as an iterator of
     bytes, in the order of the file: for tables larger than the memory. Without it, they are taken
-    from ``results.replicates``.
+    from ``results.replicates``. ``rule`` says what becomes of a file that is there.
     """
 
     def in_memory(name):
@@ -83,7 +86,7 @@ def write_results(
         (offset, length, numbers(results.count) if name == "replicate" else columns(name))
         for offset, length, name in frame.streams
     ]
-    replace_by_blocks(path, frame.image.length, frame.image.blocks(streams))
+    write_by_blocks(path, frame.image.length, frame.image.blocks(streams), rule)
 
 
 def read_results(path: str | Path, replicates: bool = True) -> Results:

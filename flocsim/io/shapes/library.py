@@ -33,7 +33,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-from flocsim.io.files import checked_sealed, replace_file, seal
+from flocsim.io.files import Rule, checked_sealed, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column, hold_against
 from flocsim.io.hdf5.structure import Node, structure_of
 
@@ -128,11 +128,15 @@ def make_entry(
 
 
 def write_library(
-    path: str | Path, entries: Iterable[ShapeEntry], settings: Mapping[str, Any] | None = None
+    path: str | Path,
+    entries: Iterable[ShapeEntry],
+    settings: Mapping[str, Any] | None = None,
+    rule: Rule = keep,
 ) -> None:
     """Write entries, all with fits at the same N, to `path`, whole or not at all.
 
-    settings: {name: text or number}, what the fits were made with.
+    settings: {name: text or number}, what the fits were made with; rule: what becomes of a file
+    that is there.
 
     Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
     written.
@@ -165,7 +169,7 @@ def write_library(
             for name, (units, long_name) in FIT_COLUMNS.items():
                 column = np.array([getattr(fit, name) for fit in fits], dtype=float)
                 _write_column(group, name, column, units, long_name)
-    replace_file(path, seal(image.getvalue()))
+    write_file(path, seal(image.getvalue()), rule)
 
 
 def _write_column(group, name, values, units, long_name):

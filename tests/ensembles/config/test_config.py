@@ -166,11 +166,12 @@ def test_init_writes_a_config_that_loads(tmp_path, monkeypatch, capsys):
 def test_init_never_overwrites_unasked(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("precious")
-    with pytest.raises(UsageError, match=r"exists already.*--force"):
+    with pytest.raises(UsageError, match=r"exists already.*--overwrite"):
         run_init(str(path))
     assert path.read_text() == "precious"
-    assert run_init(str(path), "--force") == 0
+    assert run_init(str(path), "--overwrite") == 0
     assert load_config(path).seed == 1
+    assert (tmp_path / "mine.1.toml").read_text() == "precious"
 
 
 def test_init_into_a_folder_that_is_missing(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.errors import FileError
-from flocsim.io.files import replace_by_blocks, seal
+from flocsim.io.files import Old, seal, write_by_blocks
 from flocsim.io.journal import journal as module
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, MARK, SESSION, Damage, Record, encode, scan
@@ -149,7 +149,7 @@ def test_a_journal_in_memory_reads_what_it_was_given():
 def test_a_file_written_by_blocks_is_the_file_written_at_once(tmp_path):
     blocks = [b"\x89HDF\r\n\x1a\n", b"abc" * 1000, b""]
     data = b"".join(blocks)
-    replace_by_blocks(tmp_path / "a.h5", len(data), iter(blocks))
+    write_by_blocks(tmp_path / "a.h5", len(data), iter(blocks))
     assert (tmp_path / "a.h5").read_bytes() == seal(data)
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
 
@@ -161,6 +161,6 @@ def test_blocks_that_fail_leave_the_old_file(tmp_path):
 
     (tmp_path / "a.h5").write_bytes(b"old")
     with pytest.raises(FileError, match="No space left"):
-        replace_by_blocks(tmp_path / "a.h5", 100, failing())
+        write_by_blocks(tmp_path / "a.h5", 100, failing(), lambda _: Old.REPLACED)
     assert (tmp_path / "a.h5").read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

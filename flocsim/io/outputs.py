@@ -1,0 +1,112 @@
+"""What the commands may write to: the one rule for every file that one of them makes.
+
+- What a command reads is never what it writes, whatever its options.
+- A file that exists is left alone, and the command ends before anything is run. Two may be
+  replaced: a figure or page that flocsim made and nobody has changed since (`own_mark`), and a
+  results file that is extended.
+- With ``--overwrite`` the new file takes the place, and the old one is kept as name.1.h5.
+"""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterable
+
+import attrs
+
+from flocsim.errors import UsageError
+from flocsim.io.files import Old, Rule, check_writable, keep, ordinary_target
+from flocsim.io.own_mark import is_own
+
+OVERWRITE_HELP = "replace files that exist; each is kept, study.h5 as study.1.h5"
+
+
+def data_rule(overwrite: bool = False) -> Rule:
+    """The rule for results, libraries, tables and motions."""
+    return (lambda _: Old.SET_ASIDE) if overwrite else keep
+
+
+def figure_rule(overwrite: bool = False) -> Rule:
+    """The rule for what can be drawn again: figures and pages."""
+    otherwise = data_rule(overwrite)
+    return lambda target: Old.REPLACED if is_own(target) else otherwise(target)
+
+
+redrawn = figure_rule()
+
+
+def extension_rule(path: str | os.PathLike) -> Rule:
+    """The rule for a file that was read, and is written anew with more in it.
+
+    As long as it is the file that it was when this was called; any other one is kept.
+    """
+    before = fingerprint(path)
+    return lambda target: Old.REPLACED if fingerprint(target) == before else Old.KEPT
+
+
+def fingerprint(path):
+    about = os.stat(path)
+    return about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+
+
+WAYS = "add --overwrite, which keeps the old one under another name"
+"""What a user can do where a file is in the way, besides naming another place."""
+
+
+@attrs.frozen
+class Output:
+    """A file to be written: its rule, and the longest ending that a name made from it gets."""
+
+    path: str | os.PathLike
+    rule: Rule = keep
+    suffix: str = ""
+    ways: str = WAYS
+
+
+def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]) -> None:
+    """Raise now what would keep these from being written later, before anything is run.
+
+    UsageError for an output that is one of the ``inputs`` or of the other outputs, and for a file
+    in the way; FileError for what cannot be written.
+    """
+    sources = {mark: source for source in inputs for mark in marks_of(source)}
+    seen: dict[object, Output] = {}
+    for output in outputs:
+        target = ordinary_target(output.path)
+        for name in (target, target.with_name(target.name + output.suffix)):
+            for source in (sources[mark] for mark in marks_of(name) if mark in sources):
+                raise UsageError(
+                    f"writing {output.path} would replace {source}, which is read: name another"
+                )
+        marks = marks_of(target)
+        for other in (seen[mark].path for mark in marks if mark in seen):
+            raise UsageError(
+                f"{output.path} and {other} are one file, but two things are to be written: "
+                "name another for one of them"
+            )
+        seen |= dict.fromkeys(marks, output)
+        if os.path.lexists(target) and output.rule(target) is Old.KEPT:
+            raise in_the_way(output.path, output.ways)
+        check_writable(output.path, output.suffix)
+
+
+def in_the_way(path: str | os.PathLike, ways: str = WAYS) -> UsageError:
+    """The UsageError for a file that exists where another is to be written."""
+    return UsageError(f"{path} exists already and is left as it is: name another output, or {ways}")
+
+
+def marks_of(path):
+    """What all paths of a file have in common: the resolved path and, once there, the inode."""
+    marks: list[object] = []
+    # A name that the system cannot take is told by whoever opens it.
+    with contextlib.suppress(OSError, ValueError):
+        marks.append(os.path.realpath(path))
+        about = os.stat(path)
+        marks.append((about.st_dev, about.st_ino))
+    return marks
+
+
+def loaded_sources() -> list[str]:
+    """The files of all modules that are loaded: a user's own force is read as well."""
+    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    return [file for file in files if isinstance(file, str)]

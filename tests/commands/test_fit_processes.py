@@ -1,0 +1,221 @@
+"""A picture that takes its process with it, or the memory, costs itself and not the batch."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flocsim.__main__ import main
+from flocsim.commands import fit_pictures, fit_processes
+from flocsim.commands.fit_processes import Lost, workers
+from flocsim.errors import UsageError
+from flocsim.io.shapes.library import read_library
+from tests.helpers.small_study import ROOT
+
+needs_fork = pytest.mark.skipif(sys.platform != "linux", reason="needs fork")
+JOBS = [1, pytest.param(2, marks=needs_fork)]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder with three pictures of one floc each."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "frames").mkdir()
+    for number, name in enumerate("abc"):
+        grey = np.full((60, 60), 200, np.uint8)
+        grey[20 : 40 + number, 15:45] = 40
+        Image.fromarray(grey).save(tmp_path / f"frames/{name}.png")
+    return tmp_path
+
+
+def fit(jobs=1, *more):
+    words = ["--pixel-size", "1e-6", "--vertices", "4", "-o", "s.h5"]
+    return main(["fit", "frames", *words, "--jobs", str(jobs), *more])
+
+
+def ids(path="s.h5"):
+    return [entry.floc_id for entry in read_library(path)]
+
+
+def spoiled(monkeypatch, name, harm, function="find_flocs"):
+    """Let a task of this picture come to harm."""
+    original = getattr(fit_pictures, function)
+
+    def run(task):
+        if name in str(task[0]):
+            harm()
+        return original(task)
+
+    # Processes that are forked have it too; it is found by its name where it is unpickled.
+    run.__module__, run.__qualname__ = original.__module__, original.__qualname__
+    monkeypatch.setattr(fit_pictures, function, run)
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def use_up_memory():
+    raise MemoryError
+
+
+@needs_fork
+@pytest.mark.parametrize("function", ["find_flocs", "fit_region"])
+def test_a_picture_that_kills_its_process_is_lost_and_no_other(
+    folder, monkeypatch, capsys, function
+):
+    spoiled(monkeypatch, "b.png", die, function)
+    assert fit(2) == 70
+    assert ids() == ["a.png#1", "c.png#1"]
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 2 and "b.png is lost: its process was killed" in errors[0]
+    assert errors[1] == "flocsim: lost: b.png; all else was written"
+    assert "b.png" not in (folder / "s.csv").read_text()
+    assert multiprocessing.active_children() == []
+
+
+@needs_fork
+def test_a_process_that_is_killed_once_costs_nothing(folder, monkeypatch, capsys):
+    def die_once():
+        if not (folder / "died").exists():
+            (folder / "died").touch()
+            die()
+
+    spoiled(monkeypatch, "b.png", die_once)
+    assert fit(2) == 0
+    assert ids() == ["a.png#1", "b.png#1", "c.png#1"]
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("jobs", JOBS)
+@pytest.mark.parametrize("function", ["find_flocs", "fit_region"])
+def test_a_picture_too_large_for_the_memory_is_lost_and_no_other(
+    folder, monkeypatch, capsys, jobs, function
+):
+    spoiled(monkeypatch, "b.png", use_up_memory, function)
+    assert fit(jobs) == 70
+    assert ids() == ["a.png#1", "c.png#1"]
+    assert "b.png is lost: there was not enough memory" in capsys.readouterr().err
+
+
+def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):
+    spoiled(monkeypatch, ".png", use_up_memory)
+    assert fit() == 70
+    assert not (folder / "s.h5").exists()
+
+
+def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
+    original = fit_pictures.find_flocs
+
+    def run(task):
+        found = original(task)
+        if "b.png" in str(task[0]):
+            task[0].unlink()
+        return found
+
+    monkeypatch.setattr(fit_pictures, "find_flocs", run)
+    assert fit(1, "--overlay", "over.png") == 70
+    assert sorted(path.name for path in folder.glob("over*")) == ["over-a.png", "over-c.png"]
+    assert len(ids()) == 3 and "b.png: no such picture" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("jobs", JOBS)
+def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, jobs):
+    strange = os.fsencode(folder / "frames") + b"/caf\xe9.png"
+    try:
+        os.rename(folder / "frames/b.png", strange)
+    except OSError:
+        pytest.skip("this file system takes text only")
+    assert fit(jobs, "--overlay", "over.png") == 0
+    assert ids() == ["a.png#1", "c.png#1", r"caf\xe9.png#1"]
+    assert r"caf\xe9.png" in (folder / "s.csv").read_text("utf-8")
+    assert (folder / r"over-caf\xe9.png").exists()
+
+
+def test_pictures_have_names_of_their_own(tmp_path):
+    paths = [tmp_path / each for each in ("a/x.png", "b/x.png", "y.png", r"caf\xe9.png")]
+    paths.append(tmp_path / os.fsdecode(b"caf\xe9.png"))
+    titles = fit_pictures.titles_of(paths)
+    assert titles[:3] == [(tmp_path / "a/x.png").as_posix(), (tmp_path / "b/x.png").as_posix(),
+                          "y.png"]  # fmt: skip
+    assert len(set(titles)) == 5
+
+
+def doubled(number):
+    if number == 3:
+        raise ValueError("three")
+    if number == 5:
+        raise UsageError("five")
+    return 2 * number
+
+
+@pytest.mark.parametrize("jobs", JOBS)
+def test_results_come_in_order_and_errors_for_the_user_are_raised(jobs):
+    with workers(jobs, lambda: None) as mapped:
+        assert list(mapped(doubled, range(3))) == [0, 2, 4]
+        lost = list(mapped(doubled, [3, 4]))
+        assert isinstance(lost[0], Lost) and "ValueError: three" in lost[0].reason
+        assert lost[1] == 8
+    with pytest.raises(UsageError, match="five"), workers(jobs, lambda: None) as mapped:
+        list(mapped(doubled, [4, 5]))
+
+
+def slow(_):
+    time.sleep(600)
+
+
+@needs_fork
+def test_an_interrupt_ends_the_processes_at_once():
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), workers(2, lambda: None) as mapped:
+        found = mapped(slow, range(2))
+        original = fit_processes.wait
+        try:
+            fit_processes.wait = interrupted
+            next(found)
+        finally:
+            fit_processes.wait = original
+    assert time.monotonic() - began < 60
+    assert multiprocessing.active_children() == []
+
+
+def interrupted(*_, **__):
+    raise KeyboardInterrupt
+
+
+@needs_fork
+def test_processes_end_with_their_parent(tmp_path):
+    code = (
+        "import os, time\n"
+        "from flocsim.commands.fit_processes import workers\n"
+        "def where(number):\n"
+        "    if number < 2:\n"
+        "        print(os.getpid(), flush=True)\n"
+        "    time.sleep(600)\n"
+        "with workers(2, lambda: None) as mapped:\n"
+        "    list(mapped(where, range(2)))\n"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    children = [int(parent.stdout.readline()) for _ in range(2)]
+    parent.kill()
+    parent.communicate(timeout=60)  # ends once nobody holds its output
+    until = time.monotonic() + 30
+    while any(alive(child) for child in children):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def alive(process):
+    try:
+        with open(f"/proc/{process}/stat") as file:
+            return file.read().split()[2] != "Z"
+    except OSError:
+        return False

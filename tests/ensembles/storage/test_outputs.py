@@ -1,0 +1,144 @@
+"""Finished results are kept or extended, never replaced; and what else lies there is spared."""
+
+import pytest
+
+from flocsim.ensembles import cli, runner
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
+from flocsim.errors import FileError, UsageError
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.small_study import small_config, write_small
+
+SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}
+
+
+def go(folder, mode=NEW, overwrite=False, **more):
+    """Run the study of spheres in the folder into r.h5; how it Ended."""
+    config = small_config(folder, SPHERES | more)
+    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode, overwrite=overwrite)
+
+
+@pytest.fixture
+def finished(tmp_path):
+    """A folder with finished results."""
+    go(tmp_path)
+    return tmp_path
+
+
+def results_in(folder):
+    """{name: bytes} of results and journals."""
+    return {path.name: path.read_bytes() for path in folder.glob("r.*")}
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("mode", [NEW, RESTART])
+def test_finished_results_are_in_the_way(finished, mode, seed):
+    before = results_in(finished)
+    said = r"r\.h5 exists already.*--resume.*--overwrite"
+    with pytest.raises(SharedError, match=said) as caught:
+        go(finished, mode, seed=seed)
+    assert isinstance(caught.value.args[0], UsageError)
+    assert results_in(finished) == before
+
+
+def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished):
+    (finished / "r.h5.journal").write_bytes(b"")
+    go_before = results_in(finished)
+    with pytest.raises(SharedError, match="exists already"):
+        go(finished, RESTART)
+    assert results_in(finished) == go_before
+
+
+def test_results_of_another_study_are_kept_under_another_name(finished, capsys):
+    old = (finished / "r.h5").read_bytes()
+    go(finished, overwrite=True, seed=2)
+    assert (finished / "r.1.h5").read_bytes() == old
+    assert read_results(finished / "r.h5").run["seed"] == 2
+    assert "is kept as r.1.h5" in capsys.readouterr().err
+    second = (finished / "r.h5").read_bytes()
+    go(finished, RESTART, overwrite=True, seed=3)
+    assert (finished / "r.2.h5").read_bytes() == second
+    assert results_in(finished).keys() == {"r.h5", "r.1.h5", "r.2.h5"}
+
+
+def test_resume_and_overwrite_extends_what_is_of_this_study(finished):
+    ended = go(finished, RESUME, overwrite=True, replicates=5)
+    assert ended.computed == 4 and results_in(finished).keys() == {"r.h5"}
+    # In a job that is requeued it sets the old ones aside once.
+    for _ in range(2):
+        go(finished, RESUME, overwrite=True, seed=2)
+    assert results_in(finished).keys() == {"r.h5", "r.1.h5"}
+
+
+def test_an_unfinished_run_does_not_replace_results_of_another_study(tmp_path, monkeypatch):
+    go(tmp_path, seed=2)
+    other = (tmp_path / "r.h5").read_bytes()
+    (tmp_path / "r.h5").unlink()
+    stop_at_the_end(monkeypatch, tmp_path)
+    (tmp_path / "r.h5").write_bytes(other)
+    with pytest.raises(SharedError, match=r"is of another study.*--overwrite"):
+        go(tmp_path, RESUME)
+    assert (tmp_path / "r.h5").read_bytes() == other
+    assert go(tmp_path, RESUME, overwrite=True).computed == 0
+    assert (tmp_path / "r.1.h5").read_bytes() == other
+
+
+def stop_at_the_end(monkeypatch, folder):
+    """Run all of a study, and fail where the results would be written."""
+
+    def fail(*_, **__):
+        raise FileError("no space left")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "write_results", fail)
+        with pytest.raises(SharedError):
+            go(folder)
+
+
+@pytest.mark.parametrize("mode", [NEW, RESUME])
+def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
+    tmp_path, monkeypatch, mode
+):
+    if mode == RESUME:
+        go(tmp_path)
+    original = runner.write_results
+
+    def appear(path, *more):
+        (tmp_path / "moving").write_bytes(b"of another program")
+        (tmp_path / "moving").replace(path)
+        original(path, *more)
+
+    monkeypatch.setattr(runner, "write_results", appear)
+    with pytest.raises(SharedError, match=r"r\.h5 .*(exists already|is there by now)"):
+        go(tmp_path, mode, replicates=5)
+    assert (tmp_path / "r.h5").read_bytes() == b"of another program"
+    monkeypatch.undo()
+    (tmp_path / "r.h5").unlink()
+    assert go(tmp_path, RESUME, replicates=5).computed == (0 if mode == NEW else 16)
+
+
+def test_damaged_results_are_set_aside_on_request(finished, capsys):
+    whole = (finished / "r.h5").read_bytes()
+    damaged = bytearray(whole)
+    damaged[len(whole) // 2] ^= 1
+    (finished / "r.h5").write_bytes(damaged)
+    with pytest.raises(SharedError, match=r"is damaged.*--overwrite keeps it"):
+        go(finished, RESUME)
+    assert go(finished, RESUME, overwrite=True).computed == 16
+    assert (finished / "r.1.h5").read_bytes() == damaged
+    (finished / "whole.h5").write_bytes(whole)
+    assert same_data(finished / "r.h5", finished / "whole.h5") == []
+
+
+def test_the_results_have_the_name_of_the_config(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = write_small(tmp_path, vertices="[1]", name="weather.toml")
+    path.write_text(path.read_text().partition("[output]")[0])
+    for folder in ("", "sub/"):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        path = path.replace(tmp_path / folder / "weather.toml")
+        assert cli.main([f"{folder}weather.toml", "--quiet", "--overwrite"]) == 0
+    assert {each.name for each in tmp_path.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
+    assert cli.main(["sub/weather.toml", "-o", "sub/other.h5", "--quiet"]) == 0
+    assert (tmp_path / "sub/other.h5").exists()

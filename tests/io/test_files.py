@@ -1,0 +1,239 @@
+"""Files are placed whole, under a name that is free or that may be given to them, or not at all."""
+
+import errno
+import os
+import re
+import stat
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from flocsim.errors import FileError
+from flocsim.io import files
+from flocsim.io.files import (
+    Old,
+    check_writable,
+    fresh_beside,
+    ordinary_target,
+    set_aside,
+    unfinished,
+    write_by_blocks,
+    write_file,
+)
+
+needs_fcntl = pytest.mark.skipif(os.name == "nt", reason="needs POSIX")
+
+
+def aside(_):
+    return Old.SET_ASIDE
+
+
+def replace(_):
+    return Old.REPLACED
+
+
+def content(folder):
+    """{name: bytes} of the files in a folder."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_new_file_is_all_that_is_there(tmp_path):
+    write_file(tmp_path / "a.txt", b"new")
+    assert content(tmp_path) == {"a.txt": b"new"}
+    (tmp_path / "usual").touch()
+    assert os.stat(tmp_path / "a.txt").st_mode == os.stat(tmp_path / "usual").st_mode
+
+
+def test_a_file_that_exists_is_kept_unless_a_rule_says_otherwise(tmp_path):
+    (tmp_path / "a.h5").write_bytes(b"old")
+    with pytest.raises(FileError, match=r"a\.h5 exists already and is left as it is"):
+        write_file(tmp_path / "a.h5", b"new")
+    assert content(tmp_path) == {"a.h5": b"old"}
+    write_file(tmp_path / "a.h5", b"second", aside)
+    write_file(tmp_path / "a.h5", b"third", aside)
+    assert content(tmp_path) == {"a.h5": b"third", "a.1.h5": b"old", "a.2.h5": b"second"}
+    write_file(tmp_path / "a.h5", b"fourth", replace)
+    assert content(tmp_path) == {"a.h5": b"fourth", "a.1.h5": b"old", "a.2.h5": b"second"}
+
+
+def test_what_appears_while_a_file_is_written_is_kept_and_so_is_the_work(tmp_path):
+    said = r"a\.h5 is there by now.* computed is in .*a\.2\.h5"
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as new:
+        new.file.write(b"work")
+        (tmp_path / "a.h5").write_bytes(b"other")
+        (tmp_path / "a.1.h5").write_bytes(b"older")
+    assert content(tmp_path) == {"a.h5": b"other", "a.1.h5": b"older", "a.2.h5": b"work"}
+
+
+def test_work_is_kept_where_the_old_file_cannot_be_moved(tmp_path, monkeypatch):
+    (tmp_path / "a.h5").write_bytes(b"old")
+
+    def refuse(path):
+        raise FileError("Operation not permitted")
+
+    monkeypatch.setattr(files, "set_aside", refuse)
+    with pytest.raises(FileError, match=r"could not be replaced.*computed is in .*a\.1\.h5"):
+        write_file(tmp_path / "a.h5", b"new", aside)
+    assert content(tmp_path) == {"a.h5": b"old", "a.1.h5": b"new"}
+
+
+def test_without_hard_links_nothing_is_replaced_either(tmp_path, monkeypatch):
+    def no_links(*_, **__):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(files.os, "link", no_links)
+    write_file(tmp_path / "a.h5", b"new")
+    assert content(tmp_path) == {"a.h5": b"new"}
+    said = r"computed is in .*b\.1\.h5"
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "b.h5") as new:
+        new.file.write(b"work")
+        (tmp_path / "b.h5").write_bytes(b"other")
+    assert content(tmp_path) == {"a.h5": b"new", "b.h5": b"other", "b.1.h5": b"work"}
+
+
+def test_many_at_once_lose_none(tmp_path):
+    """Whoever sets aside what whom has just written: every content is there in the end."""
+    texts = [f"{number}".encode() for number in range(24)]
+    threads = [
+        threading.Thread(target=write_file, args=(tmp_path / "a.h5", text, aside)) for text in texts
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(content(tmp_path).values()) == sorted(texts)
+
+
+def test_setting_aside_what_has_gone_is_no_error(tmp_path):
+    assert set_aside(tmp_path / "a.h5") is None
+    assert content(tmp_path) == {}
+
+
+@needs_fcntl
+def test_links_and_pipes_with_a_temporary_name_are_left_alone(tmp_path, monkeypatch):
+    """The names cannot be guessed; where they are all the same, none is followed or waited for."""
+    tokens = iter(["a" * 16, "b" * 16, "c" * 16])
+    monkeypatch.setattr(files.secrets, "token_hex", lambda _: next(tokens))
+    precious = tmp_path / "elsewhere" / "thesis.txt"
+    precious.parent.mkdir()
+    precious.write_bytes(b"precious")
+    prefix = files.left_over_prefix(tmp_path / "a.h5")
+    (tmp_path / f"{prefix}{'a' * 16}.unfinished").symlink_to(precious)
+    os.mkfifo(tmp_path / f"{prefix}{'b' * 16}.unfinished")
+    with pytest.raises(FileError, match="File exists"):
+        write_file(tmp_path / "a.h5", b"new")
+    with pytest.raises(FileError, match="File exists"):
+        write_file(tmp_path / "a.h5", b"new")
+    write_file(tmp_path / "a.h5", b"new")
+    assert precious.read_bytes() == b"precious"
+    assert (tmp_path / "a.h5").read_bytes() == b"new"
+
+
+@needs_fcntl
+def test_what_a_killed_job_left_is_removed_and_what_is_being_written_is_not(tmp_path):
+    code = (
+        "import os, sys\n"
+        "from flocsim.io.files import unfinished\n"
+        "with unfinished(sys.argv[1]) as new:\n"
+        "    new.file.write(b'x' * 100)\n"
+        "    print(new.path, flush=True)\n"
+        "    sys.stdin.readline()\n"
+    )
+    job = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path / "a.h5")],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    name = job.stdout.readline().strip()
+    write_file(tmp_path / "a.h5", b"mine")  # the other job is alive
+    assert os.path.exists(name)
+    job.kill()
+    job.communicate()
+    assert os.path.exists(name)
+    write_file(tmp_path / "b.h5", b"of another target")
+    assert os.path.exists(name)
+    write_file(tmp_path / "a.h5", b"again", replace)
+    assert content(tmp_path) == {"a.h5": b"again", "b.h5": b"of another target"}
+
+
+def test_names_that_would_grow_too_long_are_told_at_once(tmp_path):
+    most = os.pathconf(tmp_path, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
+    name = "n" * (most - len(".journal"))
+    check_writable(tmp_path / name, ".journal")
+    write_file(tmp_path / ("m" * most), b"the temporary name is short")
+    with pytest.raises(FileError, match="name too long"):
+        check_writable(tmp_path / (name + "n"), ".journal")
+    assert content(tmp_path).keys() == {"m" * most}
+
+
+@needs_fcntl
+@pytest.mark.parametrize(
+    "kind", ["folder", "pipe", "to_folder", "to_pipe", "loop", "null", "gone", "stdout"]
+)
+def test_only_ordinary_files_are_written_to(tmp_path, kind):
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "to_folder").symlink_to(tmp_path / "folder")
+    (tmp_path / "to_pipe").symlink_to(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "null").symlink_to(os.devnull)
+    ends = os.pipe()
+    (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{ends[1]}")
+    with open(tmp_path / "deleted", "wb") as file:
+        (tmp_path / "gone").symlink_to(f"/proc/self/fd/{file.fileno()}")
+        os.unlink(tmp_path / "deleted")
+        before = sorted(os.listdir(tmp_path))
+        for call in (check_writable, lambda path: write_file(path, b"new", aside), set_aside):
+            with pytest.raises(FileError, match=rf"{kind}\b.*(not an ordinary|many levels)"):
+                call(tmp_path / kind)
+    assert sorted(os.listdir(tmp_path)) == before
+    for end in ends:
+        os.close(end)
+
+
+@needs_fcntl
+def test_links_are_written_through(tmp_path):
+    (tmp_path / "there").mkdir()
+    for name in ("old.h5", "new.h5"):
+        (tmp_path / name).symlink_to(tmp_path / "there" / name)
+    (tmp_path / "there/old.h5").write_bytes(b"old")
+    assert ordinary_target(tmp_path / "new.h5") == tmp_path / "there/new.h5"
+    write_file(tmp_path / "new.h5", b"new")
+    write_file(tmp_path / "old.h5", b"newer", aside)
+    assert (tmp_path / "new.h5").is_symlink() and (tmp_path / "old.h5").is_symlink()
+    found = content(tmp_path / "there")
+    assert found == {"new.h5": b"new", "old.h5": b"newer", "old.1.h5": b"old"}
+
+
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    (tmp_path / "a.h5").write_bytes(b"old")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "reserve", full)
+    with pytest.raises(FileError, match=r"a\.h5 could not be written: No space left"):
+        write_by_blocks(tmp_path / "a.h5", 3, [b"new"], aside)
+    assert content(tmp_path) == {"a.h5": b"old"}
+
+
+@needs_fcntl
+def test_a_folder_that_cannot_be_listed_can_still_be_written_to(tmp_path, monkeypatch):
+    original = os.open
+
+    def unreadable(path, flags, *more, **kwargs):
+        if os.path.isdir(path):
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return original(path, flags, *more, **kwargs)
+
+    monkeypatch.setattr(files.os, "open", unreadable)
+    write_file(tmp_path / "a.h5", b"new")
+    assert (tmp_path / "a.h5").read_bytes() == b"new"
+
+
+def test_a_temporary_file_is_fresh_and_ordinary(tmp_path):
+    path, descriptor = fresh_beside(tmp_path / "a.h5")
+    assert re.fullmatch(r"\.flocsim-[0-9a-f]{12}-[0-9a-f]{16}\.unfinished", path.name)
+    assert stat.S_ISREG(os.fstat(descriptor).st_mode)
+    os.close(descriptor)
