@@ -90,6 +90,7 @@ def demo():
     """Run the quickstart study on two ranks, draw its overview, and say where both are."""
     install("mpi")
     study = [tool("python"), "-m", "flocsim.ensemble", "examples/quickstart.toml"]
+    study.append("--resume")  # what an earlier demo has finished is not run again
     launchers = [tool("mpirun"), tool("mpiexec"), ".venv/Library/bin/mpiexec.exe"]
     found = [path for path in launchers if os.path.exists(path)]
     if not found:

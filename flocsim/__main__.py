@@ -52,6 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
     except FlocsimError as error:
         print(f"flocsim: {error}", file=sys.stderr)
         return error.exit_code
+    except MemoryError:
+        print("flocsim: out of memory", file=sys.stderr)
+        return FlocsimError.exit_code
     except KeyboardInterrupt:
         print("flocsim: interrupted", file=sys.stderr)
         return 130

@@ -113,7 +113,7 @@ def test_demo_installs_once_then_runs_and_draws(stage, capsys):
     stage.add("quickstart_overview.png")
     study, plot = stage.run("demo")[0]
     python = ".venv/bin/python -m flocsim.ensemble examples/quickstart.toml"
-    assert study == ".venv/bin/mpirun -n 2 " + python
+    assert study == ".venv/bin/mpirun -n 2 " + python + " --resume"
     assert plot == ".venv/bin/flocsim plot quickstart.h5 --figures overview"
     told = capsys.readouterr().out
     assert str(stage.folder / "quickstart.h5") in told and "quickstart_overview.png" in told

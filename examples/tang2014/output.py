@@ -1,6 +1,16 @@
-"""How the scripts of the study write: figures in every format, parts of docs/reproduction.md."""
+"""How the scripts of the study write: figures in every format, pages, tables.
 
+They go into the script's own folder. What lies there and was not made by flocsim, or was changed
+since, is kept as name.1.png, name.1.md, …
+"""
+
+import csv
+import io
 from pathlib import Path
+
+from flocsim.io.files import write_file
+from flocsim.io.outputs import data_rule, figure_rule
+from flocsim.io.own_mark import marked as with_own_mark
 
 FORMATS = ("png", "pdf")
 
@@ -14,8 +24,22 @@ def save_all(figure, stem):
 
     paths = paths_of(stem)
     for path in paths:
-        save(figure, path)
+        save(figure, path, figure_rule(overwrite=True))
     return paths
+
+
+def write_page(path, text):
+    """Write a page of Markdown."""
+    write_file(path, with_own_mark(text.encode(), ".md"), figure_rule(overwrite=True))
+
+
+def write_table(path, rows):
+    """Write rows as CSV; a table that says the same already stays."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    data = text.getvalue().encode()
+    if not (path.is_file() and path.read_bytes() == data):
+        write_file(path, data, data_rule(overwrite=True))
 
 
 def marked(name, text):

@@ -1,11 +1,9 @@
 """Figures, tables and claims of a finished study: what reproduce.py writes at its end."""
 
-import csv
-
 import numpy as np
 from claims import FIT_CLAIMS, check_claims
 from claims.table import claims_table
-from output import save_all
+from output import save_all, write_page, write_table
 from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
@@ -80,17 +78,16 @@ def write_probabilities(path, study, changes):
     table = study.probabilities
     heads = ["type", "vertices", "delta", "n_total", "n_missed", "n_undecided", "n_failed"]
     heads += [f"{name}{end}" for name in ESTIMATES for end in ("", "_low", "_high")]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow([*heads, "run_again", "zone_flips", "aggregation_flips", "outcome_flips"])
-        for place in np.ndindex(*study.shape):
-            t, v, d = place
-            values = [table[name][place] for name in heads[3:]]
-            counts = [int(np.sum(getattr(changes, kind)[place]))
-                      for kind in ("zone", "aggregation", "outcome")]  # fmt: skip
-            shown = [f"{value:.6g}" for value in values]
-            rows.writerow([study.types[t], study.vertices[v], f"{study.delta[d]:g}", *shown,
-                           changes.outcome.shape[-1], *counts])  # fmt: skip
+    rows = [[*heads, "run_again", "zone_flips", "aggregation_flips", "outcome_flips"]]
+    for place in np.ndindex(*study.shape):
+        t, v, d = place
+        values = [table[name][place] for name in heads[3:]]
+        counts = [int(np.sum(getattr(changes, kind)[place]))
+                  for kind in ("zone", "aggregation", "outcome")]  # fmt: skip
+        shown = [f"{value:.6g}" for value in values]
+        rows.append([study.types[t], study.vertices[v], f"{study.delta[d]:g}", *shown,
+                     changes.outcome.shape[-1], *counts])  # fmt: skip
+    write_table(path, rows)
     print(path)
 
 
@@ -105,7 +102,7 @@ def write_readings(path, held):
     lines = []
     for name, (_, findings) in held.items():
         lines += [f"## {name}", "", claims_table(findings), ""]
-    path.write_text("\n".join(lines), "utf-8")
+    write_page(path, "\n".join(lines))
     print(path)
 
 

@@ -16,7 +16,7 @@ Writes plateau.png, .pdf and plateau.md.
 """
 
 import numpy as np
-from output import marked, save_all
+from output import marked, save_all, write_page
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.collision.encounter import Record
@@ -198,7 +198,7 @@ def main():
         "approaches": table,
     }
     text = "\n\n".join(marked(*part) for part in parts.items()) + "\n"
-    (arguments.output / "plateau.md").write_text(text, "utf-8")
+    write_page(arguments.output / "plateau.md", text)
     print(text)
 
 

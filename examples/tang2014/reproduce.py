@@ -148,7 +148,7 @@ def draw_trajectory(path, replicate, changes):
     flocsim(
         path.parent, path.stem, "trajectory", STUDY, *settings(changes), "--scene", "I,64,0",
         "--replicate", replicate, "--output", *strip, "--distance", *distance,
-        "--forces", *forces, "--animation", path.with_suffix(".gif"),
+        "--forces", *forces, "--animation", path.with_suffix(".gif"), "--overwrite",
     )  # fmt: skip
 
 
@@ -168,6 +168,7 @@ def main():
     refuse_launchers()
     folder = arguments.output
     folder.mkdir(parents=True, exist_ok=True)
+    steps.check(folder / "steps.csv")
     vertices = chosen_vertices(arguments)
     if arguments.images:
         fit_all(arguments, vertices)

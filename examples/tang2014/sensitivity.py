@@ -7,12 +7,11 @@ One process; orientations and flocs are the same for every value. Writes sensiti
 and the transitions into sensitivity.md.
 """
 
-import csv
 import time
 
 import numpy as np
 from claims.table import number_text
-from output import marked, save_all
+from output import marked, save_all, write_page, write_table
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.config.overrides import nested
@@ -108,16 +107,13 @@ def add_legend(axes):
 
 
 def write_points(path, sweeps):
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(["quantity", "value", "type", "pr_a", "low", "high", "decided", "open"])
-        for name, found in sweeps.items():
-            for place, kind in np.ndindex(found.bands[0].shape):
-                band = [f"{each[place, kind]:.4g}" for each in found.bands]
-                counts = [int(each[place, kind].sum()) for each in (found.decided, found.open)]
-                rows.writerow(
-                    [plain(name), f"{found.values[place]:.6g}", TYPES[kind], *band, *counts]
-                )
+    rows = [["quantity", "value", "type", "pr_a", "low", "high", "decided", "open"]]
+    for name, found in sweeps.items():
+        for place, kind in np.ndindex(found.bands[0].shape):
+            band = [f"{each[place, kind]:.4g}" for each in found.bands]
+            counts = [int(each[place, kind].sum()) for each in (found.decided, found.open)]
+            rows.append([plain(name), f"{found.values[place]:.6g}", TYPES[kind], *band, *counts])
+    write_table(path, rows)
 
 
 def transitions(sweeps):
@@ -156,7 +152,7 @@ def main():
     save_all(figure(sweeps), arguments.output / "sensitivity")
     write_points(arguments.output / "sensitivity.csv", sweeps)
     text = marked("transitions", transitions(sweeps)) + f"\n\n{spent}\n"
-    (arguments.output / "sensitivity.md").write_text(text, "utf-8")
+    write_page(arguments.output / "sensitivity.md", text)
     print(text)
 
 

@@ -23,6 +23,15 @@ def call(folder, name, *words):
     note(folder / "steps.csv", name, seconds, shlex.join(words))
 
 
+def check(path):
+    """End this process where something else lies in the place of the table of steps."""
+    if path.exists():
+        with path.open("rb") as file:
+            if file.readline().split() != [",".join(HEADS).encode()]:
+                print(f"{path} is no table of steps: name another folder by -o", file=sys.stderr)
+                sys.exit(2)
+
+
 def note(path, name, seconds, command):
     fresh = not path.exists()
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

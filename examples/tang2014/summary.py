@@ -8,7 +8,7 @@ from claims.robust import ALWAYS, contradicting
 from claims.table import claims_table, verdicts_table
 from claims.trends import mean_of, with_delta
 from claims.verdicts import interval_of
-from output import marked
+from output import marked, write_page
 
 from flocsim.io.confidence import proportion
 from flocsim.io.markdown import markdown_table
@@ -41,7 +41,7 @@ def write_summary(folder, study, changes, findings, readings, zones):
         parts["readings"] = verdicts_table({name: found for name, (_, found) in readings.items()})
         parts["reading-totals"] = readings_totals(readings)
     path = folder / "summary.md"
-    path.write_text("\n\n".join(marked(*part) for part in parts.items()) + "\n", "utf-8")
+    write_page(path, "\n\n".join(marked(*part) for part in parts.items()) + "\n")
     print(path)
 
 

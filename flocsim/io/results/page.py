@@ -24,7 +24,7 @@ holds its own coordinates as dimension scales, every dataset `units` and `long_n
 ```python
 import xarray
 
-table = xarray.open_dataset("results.h5", group="probabilities", engine="h5netcdf")
+table = xarray.open_dataset("study.h5", group="probabilities", engine="h5netcdf")
 table["pr_a"].sel(type="I", vertices=64, delta=0.5)
 ```
 

@@ -1,0 +1,62 @@
+"""The study's scripts write into their folder without destroying what lies there."""
+
+import csv
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+
+from flocsim.io.plots.collision import draw_distance
+
+FOLDER = Path(__file__).parents[2] / "examples" / "tang2014"
+
+
+@pytest.fixture
+def example(monkeypatch):
+    """Import a script of the example by its name."""
+    before = set(sys.modules)
+    monkeypatch.syspath_prepend(str(FOLDER))
+    yield importlib.import_module
+    for name in set(sys.modules) - before:
+        if str(FOLDER) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+
+
+def test_pages_and_figures_are_made_again_and_notes_are_kept(example, tmp_path):
+    output = example("output")
+    figure = draw_distance([0.0, 1.0], [1e-5, 2e-5])
+    for number in range(2):
+        output.write_page(tmp_path / "summary.md", f"{number}\n")
+        output.save_all(figure, tmp_path / "figure-4")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "figure-4.pdf", "figure-4.png", "summary.md"
+    ]  # fmt: skip
+    with (tmp_path / "summary.md").open("a") as page:
+        page.write("A note of my own.\n")
+    (tmp_path / "figure-4.png").write_bytes(b"a photograph")
+    output.write_page(tmp_path / "summary.md", "2\n")
+    output.save_all(figure, tmp_path / "figure-4")
+    assert "note" in (tmp_path / "summary.1.md").read_text()
+    assert (tmp_path / "figure-4.1.png").read_bytes() == b"a photograph"
+
+
+def test_tables_are_kept_where_they_differ(example, tmp_path):
+    output, path = example("output"), tmp_path / "table.csv"
+    for rows in ([["a", "b"], [1, 2]], [["a", "b"], [1, 2]], [["a", "b"], [1, 3]]):
+        output.write_table(path, rows)
+    with path.open() as file:
+        assert list(csv.reader(file)) == [["a", "b"], ["1", "3"]]
+    assert (tmp_path / "table.1.csv").read_text() == "a,b\n1,2\n"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_table_of_something_else_is_not_added_to(example, tmp_path, capsys):
+    steps, path = example("steps"), tmp_path / "steps.csv"
+    steps.check(path)
+    steps.note(path, "fits", 1.0, "flocsim fit")
+    steps.check(path)
+    path.write_text("stairs,height\n")
+    with pytest.raises(SystemExit) as caught:
+        steps.check(path)
+    assert caught.value.code == 2 and "is no table of steps" in capsys.readouterr().err
