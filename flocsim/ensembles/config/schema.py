@@ -390,7 +390,7 @@ class OutputConfig:
     file: str = read_by(
         read_text,
         "a string",
-        default="results.h5",
+        default="study.h5",
         shown='"study.h5"',
         help="results file, relative to the current folder; the default has the config's name",
     )
