@@ -58,9 +58,6 @@ def run(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("flocsim: interrupted", file=sys.stderr)
         return 130
-    except MemoryError:
-        print("flocsim: out of memory", file=sys.stderr)
-        return FlocsimError.exit_code
     except BrokenPipeError:
         # The reader of our output has gone (`| head`): not an error, but nothing more to say.
         return 0

@@ -229,7 +229,7 @@ def make_results(
         count=count,
     )
     if output:
-        write_results(output, results, reader.column, start.rule)
+        write_results(output, results, reader.column, start.replacing)
     return results
 
 

@@ -333,10 +333,10 @@ def check_writable(path: str | os.PathLike, suffix: str = "") -> None:
     """FileError now, rather than after hours, if ``path`` could not be written later.
 
     A file is made beside it, and removed, whose name is as long as the longest that will be
-    needed: that of ``path`` with ``suffix``, or with the number of a file that is set aside.
+    needed: that of ``path`` with ``suffix`` and the number of a file that is set aside.
     """
     target = ordinary_target(path)
-    longest = len(os.fsencode(target.name)) + max(len(os.fsencode(suffix)), ROOM_FOR_NUMBER)
+    longest = len(os.fsencode(target.name)) + len(os.fsencode(suffix)) + ROOM_FOR_NUMBER
     try:
         remove_left_over(target)
         probe, descriptor = fresh_beside(target, longest)

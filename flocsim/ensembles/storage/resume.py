@@ -57,8 +57,8 @@ class Beginning:
     ``history`` has date and command of the runs before; ``complete`` is what an older results
     file holds, (conditions, replicates of each), where nothing else was found. ``cpus_now`` are
     the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of;
-    ``flocs``: how many flocs its rows may be of; ``rule``: what becomes of a file at the place of the results when they
-    are written.
+    ``flocs``: how many flocs its rows may be of; ``replacing`` says what becomes of a file at the
+    place of the results when they are written.
     """
 
     store: RowStore
@@ -70,7 +70,7 @@ class Beginning:
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     flocs: int = 0
-    rule: Rule = keep
+    replacing: Rule = keep
     resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
     @property
@@ -139,9 +139,9 @@ def take_place(start: Beginning, output: str | Path, mode: str, overwrite: bool)
     """Use the results of this study that are to be extended; nothing else may lie there."""
     if os.path.lexists(ordinary_target(output)) and mode == RESUME:
         try:
-            rule = extension_rule(output)
+            replacing = extension_rule(output)
             take_results(start, output)
-            start.rule = rule
+            start.replacing = replacing
             return
         except (FileError, UsageError) as error:
             if not overwrite:

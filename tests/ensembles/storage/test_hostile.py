@@ -56,7 +56,8 @@ def test_a_sound_journal_is_taken(reader, tmp_path):
     "change",
     [
         {"first": -1}, {"first": "0"}, {"first": 2**62}, {"count": 0}, {"count": -2},
-        {"count": 2.0}, {"count": True}, {"count": 10**40}, {"type": 1}, {"type": None}, {"vertices": "1"},
+        {"count": 2.0}, {"count": True}, {"count": 10**40}, {"type": 1}, {"type": None},
+        {"vertices": "1"},
         {"delta": "0"}, {"delta": None}, {"delta": []}, {"identity": 5}, {"notes": 1},
         {"notes": [1]}, {"notes": [{"why": 1}]}, {"notes": {"a": 1}},
     ],
