@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flocsim.errors import visible
 from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.images.regions import Region, Rejection
 from flocsim.io.plots.style import (
     Figure,
     house_style,
     new_figure,
+    plain,
     set_vertex_axis,
     vertex_positions,
 )
@@ -134,7 +136,7 @@ def draw_overlay(
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
         axes.imshow(grey, cmap="gray", interpolation="nearest")
         axes.set_axis_off()
-        axes.set_title(title)
+        axes.set_title(plain(visible(title, keep="")))
         for region, fit in flocs:
             top, left = region.bbox[:2]
             # The mask has a margin of one pixel, and the fit's y counts upwards.
