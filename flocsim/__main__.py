@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from flocsim import __version__
 from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
+from flocsim.limits import check_memory, is_limited
 
 if "ensemble" in sys.argv[1:2]:
     fill_descriptors()
     install()  # before anything slow is imported
+if is_limited():
+    check_memory()
 
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
 from flocsim.ensembles.cli import silent_unless_first

@@ -29,7 +29,7 @@ ROWS = [
     ["geometry", "laws"],
     ["arrays", "hooks"],
     ["compiler", "fields", "interruption"],
-    ["constants", "errors"],
+    ["constants", "errors", "limits"],
 ]
 
 # The same inside a room: its sub-rooms and files. A room's own __init__ may import all of them.

@@ -33,7 +33,8 @@ from typing import Any
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.reads import is_in_library, names_in, where
-from flocsim.errors import KernelError
+from flocsim.errors import FlocsimError, KernelError
+from flocsim.limits import COMPILING, lacking
 
 PACKAGE = str(Path(__file__).parents[1])
 
@@ -153,12 +154,13 @@ def kept_on_disk(dispatcher: Any, name: str) -> Any:
             """The compiled function for a signature; None where there is none to be relied upon."""
             target_context.refresh()
             data = disk_cache.read(name, self.key(sig, target_context.codegen()))
-            if data is None:
-                return None
-            try:
-                return CompileResult._rebuild(target_context, *pickle.loads(data))
-            except Exception:
-                return None  # written by this code, and yet of no use: compiled anew
+            if data is not None:
+                # What fails was written by this code, and yet is of no use: it is compiled anew.
+                with contextlib.suppress(Exception):
+                    return CompileResult._rebuild(target_context, *pickle.loads(data))
+            if text := lacking(COMPILING, "compiling"):
+                raise FlocsimError(text)  # LLVM ends the process where it gets no memory
+            return None
 
         def save_overload(self, sig, data):
             """Keep what has been compiled, unless it holds addresses of this process."""

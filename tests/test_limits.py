@@ -1,0 +1,59 @@
+"""Too little address space is told in one line before a library hangs or crashes for want of it."""
+
+import os
+import resource
+import subprocess
+import sys
+
+import pytest
+
+from flocsim import limits
+from flocsim.compiler.composer import compose
+from flocsim.errors import FlocsimError
+
+
+def limited(size, *words):
+    """A command that may take so many bytes of address space, ended."""
+    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size))  # noqa: E731
+    env = {name: value for name, value in os.environ.items() if name != limits.BLAS_THREADS}
+    return subprocess.run(
+        [sys.executable, *words], preexec_fn=limit, env=env, capture_output=True, text=True,
+        timeout=60,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [150e6, 300e6, 500e6])
+@pytest.mark.parametrize("words", [["flocsim.ensemble", "none.toml"], ["flocsim", "info", "none"]])
+def test_too_little_to_load_the_libraries_is_one_line(size, words):
+    done = limited(int(size), "-m", *words)
+    [line] = done.stderr.splitlines()
+    assert done.returncode == 70
+    assert line.startswith(f"flocsim: the address space is limited to {size / 1e6:.0f} MB")
+    assert "ulimit -v" in line
+
+
+def test_enough_to_load_them_is_enough():
+    done = limited(int(limits.LOADING), "-m", "flocsim.ensemble", "none.toml")
+    assert done.returncode == 2
+    assert done.stderr.startswith("none.toml: there is no such file")
+
+
+def entry(x):
+    return 5.0 * x + 2.0
+
+
+def test_too_little_to_compile_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
+    monkeypatch.setattr(limits, "address_space", lambda: 1e9)
+    with pytest.raises(FlocsimError, match="limited to 1000 MB, and compiling takes 1500 MB"):
+        compose(entry, {})(1.0)
+    monkeypatch.setattr(limits, "address_space", lambda: 2e9)
+    assert compose(entry, {})(1.0) == 7.0
+
+
+def test_without_a_limit_nothing_is_changed(monkeypatch):
+    monkeypatch.delenv(limits.BLAS_THREADS, raising=False)
+    monkeypatch.setattr(limits, "address_space", lambda: float("inf"))
+    limits.check_memory()
+    assert limits.BLAS_THREADS not in os.environ
+    assert limits.lacking(limits.COMPILING, "compiling") == ""
