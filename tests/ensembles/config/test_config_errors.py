@@ -129,7 +129,7 @@ def test_what_is_missing_is_said(tmp_path, text, said):
         (b"seed = \n", ":1: not valid TOML: Invalid value (column 8)"),
         (b"\xff\xfe\x00", "byte 0 is not UTF-8 text"),
         (b"\x89HDF\r\n\x1a\n", "byte 0 is not UTF-8 text"),
-        (b"a = " + b"[" * 10**4, "nested too deeply"),
+        (b"a = " + b"[" * 10**4, "a line of more than 10000 letters"),
         (b"a = " + b"1" * 5000, "not valid TOML"),
         (b"#" * 2 * 10**6, "larger than 100 kB"),
     ],

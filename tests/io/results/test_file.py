@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import FileError, UsageError, visible
 from flocsim.io import files
 from flocsim.io.provenance import provenance
 from flocsim.io.results.file import (
@@ -153,7 +153,7 @@ def test_unwritable_places_are_told(tmp_path, place):
     (tmp_path / "file").touch()
     (tmp_path / "folder").mkdir()
     before = sorted(tmp_path.iterdir())
-    with pytest.raises(FileError, match=re.escape(place)) as caught:
+    with pytest.raises(FileError, match=re.escape(visible(place))) as caught:
         write_results(tmp_path / place, make_results(**SMALL))
     assert caught.value.exit_code == 74
     assert "\n" not in str(caught.value)
