@@ -40,6 +40,8 @@ def settings():
     if sys.platform == "linux":
         without = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
         chosen["C library without AVX2, FMA"] = {"GLIBC_TUNABLES": without}
+    chosen["linear algebra of Haswell"] = {"OPENBLAS_CORETYPE": "Haswell"}
+    chosen["linear algebra of Prescott"] = {"OPENBLAS_CORETYPE": "Prescott"}
     chosen["numba for a plain processor"] = {"NUMBA_CPU_NAME": "generic"}
     return chosen
 

@@ -24,12 +24,13 @@ from flocsim.ensembles.parallel.messages import ExitCode, Plan
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
+from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
-from flocsim.ensembles.storage.identity import identity_of, short
+from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
 from flocsim.ensembles.storage.resume import Beginning, begin
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
-from flocsim.errors import FlocsimError
+from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import STOPPED
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
@@ -142,7 +143,7 @@ def lead(
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
-        compile_in_turn(study, comm)
+        compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
         progress.say(f"compiled or loaded in {time.monotonic() - began:.1f} s")
     progress.start(remaining)
     coordinator = Coordinator(comm, state, progress.report)
@@ -177,11 +178,20 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
         raise SharedError(error) from error
 
 
-def compile_in_turn(study, comm):
-    """Every kind of code is compiled by one rank; then all load what the others made."""
+def compile_in_turn(study, comm, stored=()):
+    """Every kind of code is compiled by one rank; then all load what the others made.
+
+    UsageError where the first rows are not the same on all ranks, and as ``stored``.
+    """
     study.compile(study.kinds[comm.rank :: comm.size])
     comm.barrier()
-    study.compile(study.kinds)
+    rows = first_rows.packed(study.compile(study.kinds))
+    told = comm.gather((rows, arithmetic_digest()))
+    with sharing_errors(comm):
+        if told and (line := first_rows.difference(study, *zip(*told, strict=True), dict(stored))):
+            raise UsageError(line)
+    if isinstance(go_on := comm.broadcast(None), ExitCode):
+        raise RankZeroFailed(go_on.code)
 
 
 def make_state(study: Study, start: Beginning, ranks: int) -> StudyState:

@@ -130,7 +130,9 @@ class Study:
         vertices = self.config.shapes.vertices
         return sorted({n > 1: n for n in vertices}.values())
 
-    def compile(self, kinds: Iterable[int]) -> None:
-        """Compile, or load from the disk, what these numbers of vertices need, by running it."""
-        for vertices in kinds:
-            self.run(0, vertices, self.config.scene.delta[0], 0)
+    def compile(self, kinds: Iterable[int]) -> dict[int, dict | None]:
+        """Compile, or load from the disk, what these numbers of vertices need, by running it.
+
+        {N: row of the first replicate of the first condition of that N}.
+        """
+        return {n: self.run(0, n, self.config.scene.delta[0], 0) for n in kinds}

@@ -75,7 +75,7 @@ def kernel_of(force, law, fluid):
     """The function of a force that a law calls."""
     if family(law) == "body":
         return force.kernel_in(fluid)
-    if law.endswith("derivatives") and force.slope is not None:
+    if law.endswith("derivatives") and getattr(force, "slope", None) is not None:
         return force.slope
     return getattr(
         force, {"slip_limit": "slip_limit", "contact_event": "events"}.get(law, "kernel")

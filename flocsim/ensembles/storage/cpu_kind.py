@@ -20,7 +20,8 @@ def cpu_kind() -> dict:
 
     ``cpu``: LLVM's name of the machine's; ``compiled_for`` and ``features``: what numba makes code
     for, NUMBA_CPU_NAME and NUMBA_CPU_FEATURES heeded; ``numpy``: the instructions that numpy uses,
-    NPY_DISABLE_CPU_FEATURES heeded; ``libm``: the C library, which computes exp and log.
+    NPY_DISABLE_CPU_FEATURES heeded; ``libm``: the C library, which computes exp and log; what
+    was set for it and for the linear algebra.
     """
     import llvmlite.binding as llvm
     import numba
@@ -33,7 +34,8 @@ def cpu_kind() -> dict:
     simd = numpy.show_config(mode="dicts").get("SIMD Extensions", {})
     libm = [" ".join(platform.libc_ver()).strip() or platform.platform()]
     libm += ["SVML"] if config.USING_SVML else []
-    libm += [os.environ["GLIBC_TUNABLES"]] if os.environ.get("GLIBC_TUNABLES") else []
+    for name in ("GLIBC_TUNABLES", "OPENBLAS_CORETYPE"):
+        libm += [os.environ[name]] if os.environ.get(name) else []
     return {
         "cpu": cpu,
         "compiled_for": config.CPU_NAME or cpu,

@@ -20,6 +20,9 @@ from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
+from flocsim.geometry.contact.circle_tree import outlines_of
+from flocsim.geometry.shapes.resize import resized
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
 
 VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file", "own"}}
@@ -158,20 +161,40 @@ def kernel_facts(config):
 
 
 def arithmetic_digest():
-    """A hash of how this machine rounds sin, exp and their like.
+    """A hash of how this machine rounds sin, exp and their like, and what is made of them.
 
-    numpy and the C library choose their code for these by the processor: on another kind of it
-    rows differ in their last digits, and so do the flocs.
+    numpy, its linear algebra and the C library choose their code by the processor: on another kind
+    of it rows differ in their last digits, and so do the flocs.
     """
-    x = np.linspace(0.01, 3.0, 1000)
-    pairs = list(zip(x.tolist(), x[::-1].tolist(), strict=True))
-    found = [each(x) for each in (np.sin, np.cos, np.exp, np.expm1, np.log)]
-    found += [each(x, x[::-1]) for each in (np.hypot, np.arctan2, np.power)]
-    for one in (math.sin, math.cos, math.exp, math.expm1, math.log):
+    rng = np.random.Generator(np.random.Philox(1))
+    x, y, z = rng.uniform(0.0, 20.0, SAMPLES), rng.uniform(0.01, 3.0, SAMPLES), rng.random(SAMPLES)
+    found = [each(x) for each in (np.sin, np.cos, np.tan, np.exp, np.expm1)]
+    found += [np.log(y), np.arccos(z), np.hypot(x, y), np.arctan2(x, y), np.power(y, x)]
+    pairs = list(zip(x.tolist(), y.tolist(), strict=True))
+    for one in (math.sin, math.cos, math.tan, math.exp, math.expm1, math.atan):
         found.append(np.array([one(a) for a, _ in pairs]))
-    for two in (math.hypot, math.atan2, math.pow):
+    found.append(np.array([math.log(b) for _, b in pairs]))
+    for two in (math.hypot, math.atan2):
         found.append(np.array([two(a, b) for a, b in pairs]))
+    found.append(np.array([math.pow(b, a) for a, b in pairs]))
+    found += [np.linalg.solve(m, [1.0, 0.3]) for m in y[:400].reshape(-1, 2, 2)]
+    found += [np.einsum("ij,ij->i", x.reshape(-1, 2), z.reshape(-1, 2))]
+    for points in (3, 16, 64):
+        found.append(star_numbers(points))
     return digest(np.concatenate(found))
+
+
+SAMPLES = 4000
+"""At so many places functions are looked at: some differ at one in a thousand."""
+
+
+def star_numbers(points):
+    """What becomes of a star of so many points until a replicate can start with it."""
+    turn = 2.0 * np.pi * np.arange(points) / points
+    rays = 5.0 + np.sin(3.0 * turn + 0.4)
+    star = SpheroPolygon(np.column_stack([rays * np.cos(turn), rays * np.sin(turn)]), 0.3)
+    body = resized(star, 1.641e-5, 1e-6)
+    return np.concatenate([shape_numbers(body), np.ravel(outlines_of([body]).tree)])
 
 
 def physics_digest(root: Path = PACKAGE) -> str:

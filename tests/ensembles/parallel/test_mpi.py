@@ -303,3 +303,27 @@ def test_a_communicator_of_one():
 
 def test_the_launcher_beside_this_python_is_the_one_that_is_tested():
     assert mpirun() == str(BESIDE_PYTHON / "mpirun")
+
+
+def test_ranks_that_round_otherwise_are_refused_before_the_first_replicate(serial):
+    other = ["env", "OPENBLAS_CORETYPE=Prescott", "GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA"]
+    words = ["small.toml", "--output", "mixed.h5", "--set", "shapes.vertices=[1]"]
+    first = command(*words, ranks=1)
+    second = command(*words)
+    done = subprocess.run(
+        [*first, ":", "-n", "1", *other, *second],
+        cwd=serial, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    lines = [line for line in done.stderr.splitlines() if line.startswith("flocsim: ")]
+    digests = {digest_under(each) for each in ([], other)}
+    if len(digests) == 1:
+        pytest.skip("this machine rounds the same under that setting")
+    assert done.returncode == 2
+    assert len([line for line in lines if "rounding" in line or "rounds" in line]) == 1
+    assert not (serial / "mixed.h5").exists()
+
+
+def digest_under(words):
+    code = "from flocsim.ensembles.storage.identity import arithmetic_digest as a; print(a())"
+    done = subprocess.run([*words, sys.executable, "-c", code], capture_output=True, text=True)
+    return done.stdout

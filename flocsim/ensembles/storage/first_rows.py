@@ -1,0 +1,65 @@
+"""The rows that a run computes first, held against those of other ranks and of earlier runs.
+
+Whatever makes two machines, or two days, compute otherwise, the identity of a study may not see it.
+Every rank runs one replicate of each kind of code before the study begins; where its bytes are not
+those of all other ranks, and of the file that is gone on with, nothing is added to it.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from flocsim.ensembles.chunks import COLUMNS, ROW, Condition
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.study import Study
+
+Rows = dict[int, bytes]
+"""{N: the row of the first replicate of the first condition of that N}."""
+
+
+def packed(rows: Mapping[int, dict | None]) -> Rows:
+    """The rows of Study.compile as bytes."""
+    return {
+        n: np.array(tuple(row[name] for name in COLUMNS), ROW).tobytes()
+        for n, row in rows.items() if row is not None
+    }  # fmt: skip
+
+
+def stored_rows(study: Study, store: RowStore) -> Rows:
+    """The same rows as a journal or an older results file has them, where it does."""
+    scene, found = study.config.scene, {}
+    for n in study.kinds:
+        condition = Condition(scene.conditions[0][0], n, scene.delta[0])
+        place = store.conditions.index(condition)
+        if any(first == 0 < stop for first, stop in store.intervals(place)):
+            values = (store.read(place, name, 0, 1)[0] for name in COLUMNS)
+            found[n] = np.array(tuple(values), ROW).tobytes()
+    return found
+
+
+def difference(study: Study, ranks: Sequence[Rows], arithmetic: Sequence[str], stored: Rows) -> str:
+    """What was computed otherwise, in one line; "" for nothing.
+
+    ``ranks`` and ``arithmetic``: the Rows of all ranks, and how they round (arithmetic_digest).
+    """
+    scene = study.config.scene
+    for rank, each in enumerate(arithmetic):
+        if each != arithmetic[0]:
+            return (
+                f"rank {rank} rounds sin, exp and the like otherwise than rank 0 (another kind of "
+                "processor, another C library or numpy): give the job machines of one kind"
+            )
+    for n in study.kinds:
+        which = f"replicate 0 of type {scene.conditions[0][0]}, N = {n}, delta {scene.delta[0]:g}"
+        for rank, rows in enumerate(ranks):
+            if rows.get(n) != ranks[0].get(n):
+                return (
+                    f"{which} comes out otherwise on rank {rank} than on rank 0: give the job "
+                    "machines of one kind, or leave out what is random in a force of your own"
+                )
+        if n in stored and stored[n] != ranks[0].get(n):
+            return (
+                f"{which} comes out otherwise here than it is in the file: go on where the run was "
+                "begun, or begin anew by --restart"
+            )
+    return ""
