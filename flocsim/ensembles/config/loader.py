@@ -19,27 +19,32 @@ from flocsim.ensembles.config.schema import (
     contradictions,
     keys_of,
 )
-from flocsim.ensembles.config.toml_text import parse, read_text_file
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 
 
-def load_config(path: str | os.PathLike, overrides: dict | None = None) -> Config:
+def load_config(
+    path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
+) -> Config:
     """The config file at ``path`` as a Config, checked and with its preset filled in.
 
     ``overrides``: nested dict laid over the file, e.g. ``{"output": {"file": "b.h5"}}``; None
-    values in it count as not given. Raises ConfigError with one line per problem,
-    "FILE:LINE: key …: what was found, what is allowed".
+    values in it count as not given. ``sources``: what of the file and of the modules that it names
+    has been read already; all that is read now is noted there. Raises ConfigError with one line per
+    problem, "FILE:LINE: key …: what was found, what is allowed".
     """
-    text = read_text_file(path)
+    sources = sources or Sources()
+    text = sources.text(path)
     overrides, folder = overrides or {}, Path(path).parent
     problems = Problems(file=str(path), text=text, overrides=overrides)
     table = lay_over(parse(path, text), overrides)
     preset = table.get("preset")
     if isinstance(preset, str):
         table = lay_over(PRESETS.get(preset, {}), table)
-    reader = Reader(folder, problems)
+    reader = Reader(folder, problems, sources)
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):
@@ -51,11 +56,13 @@ def load_config(path: str | os.PathLike, overrides: dict | None = None) -> Confi
 class Reader:
     """Reads the tables of one config file; what is wrong is noted in ``problems`` and left out.
 
-    ``folder`` is where the file lies, and the modules and libraries that it names.
+    ``folder`` is where the file lies, and the modules and libraries that it names; ``sources`` has
+    what was read of them.
     """
 
     folder: Path
     problems: Problems
+    sources: Sources
 
     def config_parts(self, table):
         for key in table:
@@ -156,7 +163,7 @@ class Reader:
         None, and a note, where something is wrong with it.
         """
         try:
-            own_class = load_class(table["class"], self.folder, kind)
+            own_class = load_class(table["class"], self.folder, kind, self.sources)
         except Misfit as error:
             self.problems.misfit((*place, "class"), error)
             return None

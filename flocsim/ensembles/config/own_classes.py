@@ -18,6 +18,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.problems import misfit
+from flocsim.ensembles.config.sources import Neighbours, Sources
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, Force, PairForce
@@ -59,10 +60,11 @@ def full_name(own: object) -> str:
     return f"{type(own).__module__}:{type(own).__qualname__}"
 
 
-def load_class(name: object, folder: Path, kind: Kind) -> type:
+def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None = None) -> type:
     """The class ``name`` = "module:Class" of a Kind; the module lies in ``folder`` or is installed.
 
-    Misfit for a name of another form. ConfigError, of one line without the key, for a module that
+    ``sources``: what of it has been read already, by rank 0 of a job. Misfit for a name of another
+    form. ConfigError, of one line without the key, for a module that
     is missing or raises, and for a class that is missing, of another kind, or not whole.
     """
     if not isinstance(name, str):
@@ -70,7 +72,7 @@ def load_class(name: object, folder: Path, kind: Kind) -> type:
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise misfit(f"'module:Class' such as {kind.example!r}", name)
-    module = load_module(module_name, folder)
+    module = load_module(module_name, folder, sources or Sources())
     where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
     if not hasattr(module, class_name):
         known = [
@@ -133,30 +135,39 @@ def check_shape(shape: Shape) -> None:
         raise ConfigError("scaled(2.0) must be a shape of four times the area")
 
 
-def load_module(name, folder):
+def load_module(name, folder, sources):
     """The module, from ``folder`` where a file of its name lies there, else as installed.
 
     While it loads it may import its neighbours; sys.path is left as it was.
     """
     path, entry = folder / f"{name}.py", str(folder.resolve())
     sys.path.insert(0, entry)
+    neighbours = Neighbours(sources, folder)
+    # Where Python looks into folders: what is built in comes before.
+    finders = [getattr(each, "__name__", "") for each in sys.meta_path]
+    sys.meta_path.insert(finders.index("PathFinder") if "PathFinder" in finders else 0, neighbours)
+    importlib.invalidate_caches()
     try:
-        return run_file(name, path) if path.is_file() else importlib.import_module(name)
+        if sources.has(path, folder):
+            return run_file(name, path, sources.module(path, folder))
+        return importlib.import_module(name)
     except (Exception, SystemExit) as error:
         raise ConfigError(why_not(name, folder, error)) from error
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
+        with contextlib.suppress(ValueError):
+            sys.meta_path.remove(neighbours)
 
 
-def run_file(name, path):
-    """Run a module's file, under its name in sys.modules so that pickle and inspect find it.
+def run_file(name, path, source):
+    """Run a module's source, under its name in sys.modules so that pickle and inspect find it.
 
     A file that has not changed is not run again. It is compiled here: Python's cache tells
     versions by a time in whole seconds and could bring back the physics before the last edit.
     ConfigError where a module of this name, but not of this file, is loaded already.
     """
-    file, source = str(path.resolve()), path.read_bytes()
+    file = str(path.resolve())
     known = sys.modules.get(name)
     if known is not None and not hasattr(known, SOURCE):
         if os.path.realpath(getattr(known, "__file__", None) or "") != file:
