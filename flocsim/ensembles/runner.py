@@ -9,11 +9,12 @@ import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, total
+from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
@@ -27,7 +28,7 @@ from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
-from flocsim.ensembles.storage.resume import Beginning, begin
+from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError, UsageError
@@ -41,13 +42,19 @@ from flocsim.io.terminal import Progress
 
 @attrs.define
 class Ended:
-    """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well."""
+    """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well.
+
+    ``kept``: finished replicates that ``journal`` holds, which is seen to be there; ``count``:
+    with how many of each condition the study has ended.
+    """
 
     code: int = 0
     results: Results | None = None
     computed: int = 0
     kept: int = 0
     wall_time: float = 0.0
+    journal: str = ""
+    count: int = -1
 
 
 class SharedError(Exception):
@@ -65,13 +72,13 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     the same whatever the number of ranks.
     """
     comm = comm or SerialCommunicator()
-    study, cpus = make_study(config, comm)
-    if comm.rank > 0:
-        return follow(study, comm).results
-    store = RowStore(MemoryJournal(), study.conditions)
-    start = Beginning(store, identity_of(study), cpus_now=cpus)
     try:
-        return lead(study, start, comm, Progress(study.size, quiet)).results
+        joint = join(config, comm)
+        if comm.rank > 0:
+            return follow(joint.study, comm).results
+        store = RowStore(MemoryJournal(), joint.study.conditions)
+        start = Beginning(store, joint.identity, cpus_now=joint.cpus)
+        return lead(joint.study, start, comm, Progress(joint.study.size, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
 
@@ -83,39 +90,63 @@ def run_to_file(
     """Run a config's study into the results file ``output``: how it Ended.
 
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
-    finished goes into a journal beside the file, and from there into the file when all is.
-    ``overwrite``: what lies at ``output`` and is not to be extended is kept under another name.
+    finished goes into a journal beside the file, and from there into the file when all is. Rank 0
+    locks it before it does anything else, and to the end. ``overwrite``: what lies at ``output``
+    and is not to be extended is kept under another name.
     """
-    study, cpus = make_study(config, comm)
     if comm.rank > 0:
-        return follow(study, comm)
-    progress = Progress(study.size, quiet)
+        return follow(join(config, comm).study, comm)
     with sharing_errors(comm):
-        start = begin(study, identity_of(study), output, mode, cpus, overwrite)
-    with start.resources:
-        for remark in start.remarks:
+        journal, remarks = claim(output, mode, overwrite)
+    with contextlib.ExitStack() as resources:
+        resources.callback(journal.release)
+        joint = join(config, comm)
+        progress = Progress(joint.study.size, quiet)
+        with sharing_errors(comm):
+            start = begin(joint.study, joint.identity, output, mode, journal, joint.cpus, overwrite)
+        resources.enter_context(start.resources)
+        for remark in [*remarks, *start.remarks]:
             progress.warn(remark)
-        ended = lead(study, start, comm, progress, output)
-        if ended.code == 0:
-            start.journal.remove()
+        ended = lead(joint.study, start, comm, progress, output)
+        if ended.code == 0 and start.has_more(ended.count):
+            progress.warn(
+                f"{journal.path} has rows beyond what was asked for, and stays: --resume takes "
+                "them up where more is asked for"
+            )
+        elif ended.code == 0:
+            journal.remove()
     return ended
 
 
-def make_study(config: Config, comm: Communicator) -> tuple[Study, list[dict]]:
-    """(Study, kinds of CPU) of a job: the Study on every rank, the kinds of all ranks on rank 0.
+@attrs.frozen
+class Joint:
+    """What all ranks have agreed on; ``cpus`` on rank 0 alone: the kinds of CPU of all ranks."""
 
-    Rank 0 grows or reads the flocs for all.
-    """
-    flocs = flocs_of(config) if comm.rank == 0 else None
-    study = Study(config, flocs=comm.broadcast(flocs))
-    return study, distinct(comm.gather(cpu_kind()) or [])
+    study: Study
+    identity: dict
+    cpus: list[dict]
+
+
+def join(config: Config, comm: Communicator) -> Joint:
+    """Make the Study on every rank; rank 0 grows or reads the flocs for all."""
+    with sharing_errors(comm):
+        flocs = flocs_of(config) if comm.rank == 0 else None
+    study = Study(config, flocs=hear(comm, flocs))
+    identity = identity_of(study) if comm.rank == 0 else {}
+    return Joint(study, identity, distinct(comm.gather(cpu_kind()) or []))
+
+
+def hear(comm: Communicator, value: Any) -> Any:
+    """Rank 0's value on all ranks; RankZeroFailed where it has none, and says why itself."""
+    value = comm.broadcast(value)
+    if isinstance(value, ExitCode):
+        raise RankZeroFailed(value.code)
+    return value
 
 
 def follow(study: Study, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
-    plan = comm.broadcast(None)
-    if isinstance(plan, ExitCode):
-        raise RankZeroFailed(plan.code)
+    plan = hear(comm, None)
     if plan.remaining:
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
@@ -135,7 +166,8 @@ def lead(
     They are written into the file ``output`` if given.
     """
     began = time.monotonic()
-    state = make_state(study, start, comm.size)
+    with sharing_errors(comm):
+        state = make_state(study, start, comm.size)
     remaining = state.schedule.remaining
     key = short(start.identity)
     progress.say(announcement(study, comm.size, study.size - remaining))
@@ -154,8 +186,9 @@ def lead(
         start.journal.sync()
         progress.finish()
         final = state.schedule.final
-        kept = sum(total(each) for each in start.found(study.config.replicates))
+        kept = start.in_journal()
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, kept)
+        ended.count, ended.journal = final, str(start.journal.path)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm.size, output)
@@ -204,7 +237,7 @@ def make_state(study: Study, start: Beginning, ranks: int) -> StudyState:
         for interval in intervals
     )
     return StudyState(
-        Schedule.of(found, borders(stop, replicates), ranks),
+        Schedule.of(found, looks(borders(stop, replicates), start.at_least), ranks),
         start.store,
         StopRule(stop, start.store),
         allowed=stop.failed * study.size,
@@ -213,14 +246,21 @@ def make_state(study: Study, start: Beginning, ranks: int) -> StudyState:
     )
 
 
+def looks(borders: list[int], least: int) -> list[int]:
+    """Where the rule looks, and nowhere below what the results file has of each condition."""
+    return sorted({max(border, least) for border in borders})
+
+
 def make_results(
     study: Study, start: Beginning, state: StudyState, ended: Ended, ranks: int,
     output: str | Path | None,
 ) -> Results:  # fmt: skip
     """The Results of a finished study; written to ``output`` where there is one."""
-    count = state.schedule.final
-    if output and start.complete == (study.conditions, count):
-        return read_results(output, replicates=False)  # as it is: nothing has been added
+    count, in_memory = state.schedule.final, output is None
+    if output and (old := start.store.old) is not None and start.is_covered(count):
+        if (tuple(old.places), old.count) == (study.conditions, count):
+            return read_results(output, replicates=False)  # as it is: nothing has been added
+        output = None  # it has more than was asked for, and keeps it
     config = study.config
     reader = Reader(start.store, (*study.shape[:3], count))
     probabilities, pooled, differences = summarize(reader)
@@ -229,7 +269,7 @@ def make_results(
         types=tuple(name for name, _, _ in config.scene.conditions),
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
-        replicates=None if output else reader.arrays(COLUMNS),
+        replicates=reader.arrays(COLUMNS) if in_memory else None,
         probabilities=probabilities,
         run=facts(study, start, state.notes, ended, ranks),
         failures=FAILURES,

@@ -14,6 +14,7 @@ from flocsim.ensembles.parallel.messages import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
+from flocsim.io.journal.records import data_digest
 
 MOST_NOTES = 1000
 """Notes on failed replicates that are kept."""
@@ -67,7 +68,8 @@ class StudyState:
         if result.count:
             condition, first, _ = result.chunk
             offset = self.store.journal.append(result.record) + result.data_start
-            self.store.add(condition, first, first + result.count, offset)
+            digest = data_digest(result.record)
+            self.store.add(condition, first, first + result.count, offset, digest)
         self.computed += result.count
         self.schedule.give_back(result.chunk, result.count)
         self.failed += result.failed

@@ -1,4 +1,8 @@
-"""Where a study begins: with nothing, or with what a journal and an older results file hold."""
+"""Where a study begins: with nothing, or with what a journal and an older results file hold.
+
+First comes the lock (`claim`), then everything else is looked at. Rows only ever get more: what a
+journal or a results file has beyond what is asked for stays where it is, or the run is refused.
+"""
 
 import contextlib
 import os
@@ -18,11 +22,12 @@ from flocsim.ensembles.chunks import (
     layout,
     named,
     rows_of,
+    total,
 )
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
-from flocsim.ensembles.storage.row_store import OldTable, RowStore
+from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
 from flocsim.ensembles.storage.stored_json import is_session, stored
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, FlocsimError, UsageError
@@ -36,7 +41,7 @@ from flocsim.io.results.file import BLOCK, UNREADABLE, opened, read_scalar
 from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
-"""What to do about an unfinished run: refuse to touch it, go on with it, throw it away."""
+"""What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
 
 WAYS = (
     "extend it by --resume if it is of this study, or add --overwrite, which keeps the old one "
@@ -54,11 +59,13 @@ class Beginning:
     """What a study starts from.
 
     ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
-    ``history`` has date and command of the runs before; ``complete`` is what an older results
-    file holds, (conditions, replicates of each), where nothing else was found. ``cpus_now`` are
-    the kinds of CPU that this run computes on, ``cpus_found`` those that the found rows are of;
-    ``flocs``: how many flocs its rows may be of; ``replacing`` says what becomes of a file at the
-    place of the results when they are written.
+    ``history`` has date and command of the runs before. ``cpus_now`` are the kinds of CPU that
+    this run computes on, ``cpus_found`` those that the found rows are of; ``flocs``: how many flocs
+    its rows may be of; ``replacing`` says what becomes of a file at the place of the results when
+    they are written. ``rule`` is the rule that ends the study early, as the journal has it;
+    ``unasked`` says what rows the journal has of other conditions, and ``farthest`` how far it has
+    them of these (those beyond the end of a run with the same rule left out): they are not to go
+    with it. ``at_least``: replicates that each condition has in the results file already.
     """
 
     store: RowStore
@@ -66,7 +73,10 @@ class Beginning:
     remarks: list[str] = attrs.Factory(list)
     notes: list[dict] = attrs.Factory(list)
     history: list[dict] = attrs.Factory(list)
-    complete: tuple[tuple[Condition, ...], int] | None = None
+    rule: list | None = None
+    unasked: list[Condition] = attrs.Factory(list)
+    farthest: int = 0
+    at_least: int = 0
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     flocs: int = 0
@@ -78,6 +88,24 @@ class Beginning:
         """Where finished chunks go."""
         return self.store.journal
 
+    def is_covered(self, count: int) -> bool:
+        """Whether the older results file has so many replicates of all conditions already."""
+        old = self.store.old
+        return (
+            old is not None
+            and count <= old.count
+            and all(condition in old.places for condition in self.store.conditions)
+        )
+
+    def has_more(self, count: int) -> bool:
+        """Whether the journal has rows that results of so many replicates will not have."""
+        return bool(self.unasked) or self.farthest > count
+
+    def in_journal(self) -> int:
+        """How many replicates of these conditions the journal has."""
+        places = range(len(self.store.conditions))
+        return sum(total(self.store.intervals(place, in_journal=True)) for place in places)
+
     def found(self, count: int) -> list[list[Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""
         whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
@@ -86,45 +114,71 @@ class Beginning:
         ]
 
 
+def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journal, list[str]]:
+    """(the locked journal of a results file, remarks): from now on no other job writes there.
+
+    Waits for a job that is about to end, and looks at everything only then. Raises UsageError
+    where an unfinished run is in the way, or results are that are neither to be extended nor to be
+    set aside (``overwrite``); FileError where the journal cannot be opened, is none, or another
+    job goes on writing it.
+    """
+    path = journal_path(output)
+    journal, remarks = Journal(path), []
+    try:
+        if not journal.has_lock:
+            remarks.append(
+                f"the file system of {path} has no locks: see that no two jobs write there"
+            )
+        if mode != RESUME and not overwrite:
+            check_free(output)  # before an unfinished run is put aside
+        if journal.is_blank:
+            journal.begin_anew()
+        elif mode == RESTART:
+            remarks.append(f"the unfinished run is kept as {journal.put_aside()}")
+        elif not journal.is_journal:
+            raise FileError(
+                f"{path} is no journal of flocsim, or damaged from its start: move it away"
+            )
+        elif mode == NEW:
+            raise UsageError(
+                f"{path} holds an unfinished run: go on with it by --resume, or begin anew by "
+                "--restart, which keeps it under another name"
+            )
+    except Exception:
+        journal.release()
+        raise
+    return journal, remarks
+
+
 def begin(
     study: Study,
     identity: dict,
     output: str | Path,
     mode: str,
+    journal: Journal,
     cpus: Sequence[dict] = (),
     overwrite: bool = False,
 ) -> Beginning:
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
-    Raises UsageError where an unfinished run is in the way, or is one of another config, of other
-    shapes or other physics, or where anything but results of this study to be extended lies at
-    ``output``; with ``overwrite`` that is set aside. FileError where the journal cannot be opened.
+    ``journal``: as `claim` gave it. Raises UsageError where what lies there is of another config,
+    of other shapes or other physics, has rows that this study would drop, or is anything but
+    results of this study to be extended; with ``overwrite`` that is set aside.
     """
-    path = journal_path(output)
-    if mode != RESUME and not overwrite:
-        check_free(output)  # before an unfinished run is thrown away
-    if mode == NEW and path.exists() and path.stat().st_size:
-        raise UsageError(
-            f"{path} holds an unfinished run: go on with it by --resume, or throw it away by "
-            "--restart"
-        )
-    if mode == RESTART:
-        with contextlib.suppress(OSError):
-            os.unlink(path)
-    journal = Journal(path)
     start = Beginning(RowStore(journal, study.conditions), identity, cpus_now=list(cpus))
-    start.flocs = len(study.flocs)
-    start.resources.callback(journal.close)
+    start.rule, start.flocs = rule_of(study), len(study.flocs)
+    start.resources.callback(journal.release)
     try:
         take_journal(start)
         take_place(start, output, mode, overwrite)
+        refuse_fewer(start, output, study.config.replicates)
         session = {
             "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
-            "command": shlex.join(sys.argv), "cpus": start.cpus_now,
+            "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": start.rule,
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
-        journal.drop_if_empty()
+        start.resources.close()
         raise
     return start
 
@@ -153,13 +207,38 @@ def take_place(start: Beginning, output: str | Path, mode: str, overwrite: bool)
         start.remarks.append(f"{output} is kept as {aside.name}")
 
 
+def rule_of(study):
+    """The rule that ends the study early, as JSON gives it back; None where there is none."""
+    stop = study.config.stop
+    return None if stop.half_width is None else [stop.half_width, list(stop.of), stop.least]
+
+
+def refuse_fewer(start, output, replicates):
+    """UsageError where the results file has rows that a new one in its place would not have."""
+    old = start.store.old
+    if old is None or start.is_covered(replicates):
+        return
+    asked = set(start.store.conditions)
+    left_out = [condition for condition in old.places if condition not in asked]
+    if left_out or old.count > replicates:
+        what = "; ".join(
+            ([f"{len(left_out)} conditions such as {spelled(left_out[0])}"] if left_out else [])
+            + ([f"{old.count} replicates of each"] if old.count > replicates else [])
+        )
+        raise UsageError(
+            f"{output} has rows that this run does not ask for ({what}), and others are missing "
+            "in it: ask for all of them together, or name another output"
+        )
+    start.at_least = old.count
+
+
+def spelled(condition):
+    return f"type {condition.type}, N = {condition.vertices}, delta {condition.delta:g}"
+
+
 def take_journal(start: Beginning) -> None:
     """Find the chunks in the journal; UsageError where they are those of another study."""
     journal: Any = start.journal
-    if journal.damage and not journal.records and not journal.is_cut_short:
-        raise FileError(
-            f"{journal.path} is no journal of flocsim, or damaged from its start: move it away"
-        )
     sessions = [record.description for record in journal.records if record.kind == SESSION]
     if not all(is_session(each) for each in sessions):
         raise FileError(f"{journal.path} was begun by no flocsim: move it away")
@@ -168,14 +247,14 @@ def take_journal(start: Beginning) -> None:
         refuse_other(start, journal.path, description["identity"])
         if description["layout"] != layout():
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
-    known = {*(each["short"] for each in sessions), short(start.identity)}
+    known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
     places = {condition: place for place, condition in enumerate(start.store.conditions)}
-    cpus = []
+    session: dict = {}
     for record in journal.records:
         if record.kind == SESSION:
-            cpus = record.description.get("cpus", [])
+            session = record.description
         elif record.kind == CHUNK and fits(record.description, record.length):
-            take_chunk(start, record, known, places, cpus)
+            take_chunk(start, record, known, places, session)
         elif record.kind == CHUNK:
             start.remarks.append(
                 f"{journal.path}: {named(record.description)}: it is not as flocsim writes it: "
@@ -189,7 +268,7 @@ def take_journal(start: Beginning) -> None:
 
 
 ELSEWHERE = "name another output"
-REMEDY = f"{ELSEWHERE}, or throw it away by --restart"
+REMEDY = f"{ELSEWHERE}, or begin anew by --restart, which keeps it under another name"
 
 
 def refuse_other(start, path, stored, remedy=REMEDY):
@@ -202,10 +281,10 @@ def refuse_other(start, path, stored, remedy=REMEDY):
         raise UsageError(f"{path} is of another study: {shown}{more}; {remedy}")
 
 
-def take_chunk(start, record, known, places, cpus):
+def take_chunk(start, record, known, places, session):
     """Note where a chunk's rows lie, if they are of a condition of this study.
 
-    ``cpus``: the kinds of CPU of the run that wrote it.
+    ``session``: the description of the run that wrote it.
     """
     about = record.description
     if about["identity"] not in known:
@@ -214,22 +293,27 @@ def take_chunk(start, record, known, places, cpus):
         )
         return
     place = places.get(condition_of(about))
-    if place is not None:
-        rows = rows_of(start.journal.read(record.offset, record.length))
-        try:
-            check_rows(rows.__getitem__, len(FAILURES), start.flocs)
-        except ValueError as error:
-            start.remarks.append(f"{start.journal.path}: {named(about)}: {error}: computed again")
-            return
-        first = about["first"]
-        start.store.add(place, first, first + about["count"], record.offset)
-        start.notes += about.get("notes", [])
-        start.cpus_found = distinct([*start.cpus_found, *cpus])
+    if place is None:
+        start.unasked.append(condition_of(about))
+        return
+    rows = rows_of(start.journal.read(record.offset, record.length))
+    try:
+        check_rows(rows.__getitem__, len(FAILURES), start.flocs)
+    except ValueError as error:
+        start.remarks.append(f"{start.journal.path}: {named(about)}: {error}: computed again")
+        return
+    first = about["first"]
+    start.store.add(place, first, first + about["count"], record.offset, record.digest)
+    start.notes += about.get("notes", [])
+    start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])
+    # What is computed beyond the end that a rule has set is nobody's: so it is on any machine.
+    if start.rule is None or session.get("rule") != start.rule:
+        start.farthest = max(start.farthest, first + about["count"])
 
 
 def take_results(start, output):
     """Use the rows of an older results file; FlocsimError if they are not of this study."""
-    begun = any(start.store.counts)
+    before = stamp(os.fspath(output))
     file = start.resources.enter_context(opened(output))
     run = {name: read_scalar(dataset) for name, dataset in file["run"].items()}
     if "identity" not in run:
@@ -245,13 +329,11 @@ def take_results(start, output):
     for place, condition in enumerate(start.store.conditions):
         if condition in places and count:
             start.store.add(place, 0, count, -1)
-    start.store.old = OldTable(rows, places)
+    start.store.old = OldTable(rows, places, os.fspath(output), count, before)
     start.notes += found["failed"]
     start.cpus_found = distinct([*found["cpus"], *start.cpus_found])
     earlier = {key: run[key] for key in HISTORY if key in run}
     start.history = [*found["history"], earlier, *start.history]
-    if not begun:
-        start.complete = (tuple(places), count)
 
 
 def old_rows(start, file):

@@ -1,81 +1,176 @@
-"""Where the rows of finished replicates lie: in the journal, or in an older results file."""
+"""Where the rows of finished replicates lie: in the journal, or in an older results file.
 
-from collections.abc import Mapping
+Nothing is believed of a journal but what the digest says that this run wrote or found there.
+"""
+
+import os
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, STARTS, Condition, Interval, merged
-from flocsim.io.journal.journal import Journal, MemoryJournal
+from flocsim.ensembles.chunks import COLUMNS, ROW, STARTS, Condition, Interval, merged, missing
+from flocsim.errors import FileError
+from flocsim.io.journal.records import digest as digest_of
+from flocsim.io.results.schema import ROW_SIZE
 
-ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8")])
-"""A run of rows: its replicates, and where its data begin in the journal; −1: in the old file."""
+ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8"), ("digest", "V16")])
+"""A run of rows: its replicates, where its data begin in the journal (−1: it is in the old file),
+and their checksum."""
+
+
+MOST_HELD = 2**25
+"""Bytes of checked chunks that are kept for the next column."""
 
 
 @attrs.define(eq=False)
 class OldTable:
     """The table of replicates of a results file that is open: dataset by name.
 
-    ``places``: Condition → its place in the arrays.
+    ``places``: Condition → its place in the arrays; ``path``: of the file; ``count``: replicates of
+    each; ``before``: what `stamp` said of the file before its checksum was found right.
     """
 
     datasets: Mapping[str, Any]
     places: Mapping[Condition, tuple[int, int, int]]
+    path: str = ""
+    count: int = 0
+    before: tuple | None = None
 
     def read(self, condition: Condition, name: str, first: int, stop: int) -> np.ndarray:
-        return self.datasets[name][(*self.places[condition], slice(first, stop))]
+        """Values of a column; FileError where the open file has been written to meanwhile."""
+        values = self.datasets[name][(*self.places[condition], slice(first, stop))]
+        now = stamp(self.path) if self.before else None
+        # Another file of that name is none of ours: this one is open and cannot be reached.
+        if self.before and now and now[0] == self.before[0] and now != self.before:
+            raise FileError(
+                f"{self.path} was changed by another program while it was extended: put the "
+                "original back, and go on with --resume"
+            )
+        return values
+
+
+def stamp(path: str) -> tuple | None:
+    """What tells that a file is another one, or was written to; None where there is none."""
+    try:
+        about = os.stat(path)
+    except OSError:
+        return None
+    return (about.st_dev, about.st_ino), about.st_size, about.st_mtime_ns
 
 
 @attrs.define(eq=False)
 class RowStore:
-    """Finds rows by condition and replicate. Few bytes per chunk, none per row."""
+    """Finds rows by condition and replicate. Few bytes per chunk, none per row.
 
-    journal: Journal | MemoryJournal
+    ``journal``: a Journal, a MemoryJournal or a ReadOnlyJournal.
+    """
+
+    journal: Any
     conditions: tuple[Condition, ...]
     old: OldTable | None = None
     entries: list[np.ndarray] = attrs.field(init=False)
     counts: list[int] = attrs.field(init=False)
+    held: "OrderedDict[int, bytes]" = attrs.field(init=False, factory=OrderedDict)
+    """The chunks that were checked last: where one lies, and its data."""
+    held_size: int = 0
 
     def __attrs_post_init__(self):
         self.entries = [np.empty(4, ENTRY) for _ in self.conditions]
         self.counts = [0] * len(self.conditions)
 
-    def add(self, place: int, first: int, stop: int, offset: int) -> None:
+    def add(self, place: int, first: int, stop: int, offset: int, digest: bytes = b"") -> None:
         """Note where rows of the condition at a place of the list lie."""
         count = self.counts[place]
         if count == len(self.entries[place]):
             self.entries[place] = np.concatenate([self.entries[place]] * 2)
-        self.entries[place][count] = (first, stop, offset)
+        self.entries[place][count] = (first, stop, offset, digest)
         self.counts[place] = count + 1
 
     def known(self, place: int) -> np.ndarray:
         """The entries of a condition, in order of the replicates."""
         found = self.entries[place][: self.counts[place]]
-        return np.sort(found, order=("first", "stop"))
+        return found[np.lexsort((found["stop"], found["first"]))]
 
-    def intervals(self, place: int) -> list[Interval]:
-        """The replicates of a condition that exist."""
-        return merged([(int(e["first"]), int(e["stop"])) for e in self.known(place)])
+    def intervals(self, place: int, in_journal: bool = False) -> list[Interval]:
+        """The replicates of a condition that exist, or those of them that the journal has."""
+        known = self.known(place)
+        known = known[known["offset"] >= 0] if in_journal else known
+        return merged([(int(e["first"]), int(e["stop"])) for e in known])
 
     def read(
         self, place: int, name: str, first: int, stop: int, known: np.ndarray | None = None
     ) -> np.ndarray:
-        """The values of a column for replicates [first, stop), all of which exist."""
+        """The values of a column for replicates [first, stop), all of which exist.
+
+        FileError where a chunk is not what was written.
+        """
         values = np.empty(stop - first, ROW[name])
         known = self.known(place) if known is None else known
-        longest = int(np.max(known["stop"] - known["first"], initial=0))
-        near = slice(*np.searchsorted(known["first"], (first - longest, stop)))
-        for start, end, offset in known[near].tolist():
+        for start, end, offset, digest in near(known, first, stop).tolist():
             low, high = max(start, first), min(end, stop)
             if low < high:
                 if offset < 0:
                     assert self.old is not None, "rows of an older file, which is open"
                     part = self.old.read(self.conditions[place], name, low, high)
                 else:
-                    size = ROW[name].itemsize
-                    offset += (end - start) * STARTS[name] + (low - start) * size
-                    data = self.journal.read(offset, (high - low) * size)
-                    part = np.frombuffer(data, ROW[name])
+                    data = self.checked(offset, (end - start) * ROW_SIZE, digest)
+                    begin = (end - start) * STARTS[name] + (low - start) * ROW[name].itemsize
+                    part = np.frombuffer(data, ROW[name], high - low, begin)
                 values[low - first : high - first] = part
         return values
+
+    def rows(
+        self, place: int, first: int, stop: int, known: np.ndarray
+    ) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
+        """(first replicate, {column: values}) of runs of rows that make up [first, stop).
+
+        Every chunk's checksum is held against what is read: FileError where it is wrong, or
+        where rows are missing.
+        """
+        reached = []
+        for start, end, offset, digest in near(known, first, stop).tolist():
+            low, high = max(start, first), min(end, stop)
+            if low >= high:
+                continue
+            reached.append((low, high))
+            if offset < 0:
+                assert self.old is not None, "rows of an older file, which is open"
+                condition = self.conditions[place]
+                yield low, {name: self.old.read(condition, name, low, high) for name in COLUMNS}
+            else:
+                data = self.checked(offset, (end - start) * ROW_SIZE, digest)
+                yield low, {
+                    name: np.frombuffer(
+                        data, ROW[name], high - low,
+                        (end - start) * STARTS[name] + (low - start) * ROW[name].itemsize,
+                    )
+                    for name in COLUMNS
+                }  # fmt: skip
+        if missing(merged(reached), first, stop):
+            raise FileError(f"{self.journal.path} does not have all rows: run it again by --resume")
+
+    def checked(self, offset, length, digest):
+        """The data of a chunk, as they were written; the last ones are held."""
+        if offset not in self.held:
+            data = self.journal.read(offset, length)
+            if len(data) != length or digest_of(data, len(digest)) != digest:
+                raise FileError(
+                    f"{self.journal.path} is damaged from byte {offset} to {offset + length}, or "
+                    "was changed since it was written: run it again by --resume, which computes "
+                    "what is missing"
+                )
+            self.held[offset] = data
+            self.held_size += length
+            while self.held_size > MOST_HELD and len(self.held) > 1:
+                self.held_size -= len(self.held.popitem(last=False)[1])
+        self.held.move_to_end(offset)
+        return self.held[offset]
+
+
+def near(known: np.ndarray, first: int, stop: int) -> np.ndarray:
+    """Those of the entries of a condition, in order, that may hold some of [first, stop)."""
+    longest = int(np.max(known["stop"] - known["first"], initial=0))
+    return known[slice(*np.searchsorted(known["first"], (first - longest, stop)))]

@@ -1,7 +1,8 @@
 """The journal of an unfinished study: finished chunks, appended as they come, whole or not at all.
 
-One process writes it, rank 0's. What a killed process left half written is cut off when the file
-is opened again; a chunk that was damaged later is named, passed over and computed again.
+One process writes it, rank 0's, by the one descriptor that it has locked. What a killed process
+left half written is cut off when the file is opened again; a chunk that was damaged later is named,
+passed over and computed again.
 """
 
 import contextlib
@@ -11,13 +12,11 @@ import time
 from pathlib import Path
 
 from flocsim.errors import FileError
-from flocsim.io.files import ordinary_target, sync_folder, unwritable
-from flocsim.io.journal.records import MARK, Damage, Record, scan
+from flocsim.io.files import ordinary_target, unwritable
+from flocsim.io.journal.locked_file import LockedFile
+from flocsim.io.journal.records import MARK, SESSION, Damage, Record, kind_of, scan
 
 SUFFIX = ".journal"
-
-LOCK_SECONDS = 10.0
-"""Seconds to wait for a job that is just dying to let go of the journal."""
 
 SYNC_SECONDS = 5.0
 """Seconds between two syncs to the disk: what a power cut may cost. A kill costs nothing."""
@@ -29,93 +28,137 @@ def journal_path(results: str | Path) -> Path:
     return target.with_name(target.name + SUFFIX)
 
 
-def lock(file, path):
-    try:
-        import fcntl
-    except ImportError:
-        return
-    until = time.monotonic() + LOCK_SECONDS
-    while True:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return
-        except BlockingIOError:
-            if time.monotonic() > until:
-                raise FileError(
-                    f"{path} is being written by another job: wait for it, or name another output"
-                ) from None
-            time.sleep(0.05)
-        except OSError:
-            return  # a file system without locks
-
-
 class Journal:
-    """An open journal. ``records`` and ``damage`` are what was found in it."""
+    """An open journal. ``records`` and ``damage`` are what was found in it; ``end`` is where the
+    next record goes, ``known`` how long this process has left the file."""
 
     def __init__(self, path: Path) -> None:
         """Open, lock and read the journal at ``path``, or start one; FileError if impossible."""
         self.path = path
+        self.records: list[Record] = []
+        self.damage: list[Damage] = []
+        self.open()
+
+    def open(self):
+        self.file = LockedFile(self.path)
         try:
-            self.file = open(path, "a+b", buffering=0)  # noqa: SIM115 (closed by `close`)
+            self.read_all()
         except OSError as error:
-            raise unwritable(path, error) from error
-        lock(self.file, path)
-        with open(path, "rb") as reader:
-            # A first record that was cut short is no reason to refuse the file.
-            self.is_cut_short = MARK.startswith(reader.read(len(MARK)))
+            self.file.close()
+            raise unwritable(self.path, error) from error
+        self.known = self.size()
+        self.synced = time.monotonic()
+
+    def read_all(self):
+        with open(self.file.descriptor, "rb", closefd=False) as reader:
             found = list(scan(reader))
+            self.end = reader.seek(0, os.SEEK_END)
+            reader.seek(0)
+            begun = MARK.startswith(reader.read(len(MARK))) or not found
         self.damage = [each for each in found if isinstance(each, Damage)]
         self.records = [each for each in found if not isinstance(each, Damage)]
-        self.end = found[-1].start if found and isinstance(found[-1], Damage) else self.size()
-        self.synced = time.monotonic()
-        sync_folder(path.parent)
+        if found and isinstance(found[-1], Damage):
+            self.end = found[-1].start
+        self.is_journal = bool(self.records) or begun
+        only_begun = all(each.kind == SESSION for each in self.records)
+        self.is_blank = self.is_journal and only_begun and all(each.is_cut for each in self.damage)
+
+    @property
+    def has_lock(self) -> bool:
+        """False on a file system without locks."""
+        return self.file.has_lock
 
     def size(self) -> int:
-        return self.file.seek(0, os.SEEK_END)
+        return os.fstat(self.file.descriptor).st_size
 
     def append(self, record: bytes) -> int:
         """Append a record's bytes; the place at which they begin. FileError where that fails,
         and then the journal is what it was before."""
-        start = self.end
+        start, descriptor = self.end, self.file.descriptor
         try:
-            if self.size() > start:  # what a killed process has left half written
-                self.file.truncate(start)
+            self.trim()
             view = memoryview(record)
             while view:
-                view = view[self.file.write(view) :]
-            self.end += len(record)
+                written = os.pwrite(descriptor, view, self.end)
+                view, self.end = view[written:], self.end + written
+            self.known = self.end
+            self.is_blank &= kind_of(record) == SESSION
             if time.monotonic() - self.synced > SYNC_SECONDS:
                 self.sync()
         except OSError as error:
+            if isinstance(error, FileError):
+                raise
             with contextlib.suppress(OSError):
-                self.file.truncate(start)
-            self.end = start
+                os.ftruncate(descriptor, start)
+            self.end = self.known = start
             raise unwritable(self.path, error) from error
         return start
 
+    def trim(self):
+        """Cut off what a killed process has left half written; FileError where the file is not as
+        this process has left it: without locks two jobs may write one."""
+        if not self.is_as_left():
+            raise FileError(
+                f"{self.path} was changed by another program while this run wrote to it; what is "
+                "whole in it stays: see that nothing else writes there, and go on with --resume"
+            )
+        if self.known > self.end:
+            os.ftruncate(self.file.descriptor, self.end)
+            self.known = self.end
+
+    def is_as_left(self):
+        """Whether the file is as long as this process knows it."""
+        try:
+            return self.size() == self.known
+        except OSError:
+            return False
+
     def read(self, offset: int, length: int) -> bytes:
-        return os.pread(self.file.fileno(), length, offset)
+        """Bytes of the file, as they are now: check them against their digest."""
+        try:
+            return os.pread(self.file.descriptor, length, offset)
+        except OSError as error:
+            raise FileError(f"{self.path} could not be read: {error.strerror}") from error
 
     def sync(self) -> None:
+        """See that all that was appended is on the disk, under the journal's own name.
+
+        A name that somebody has deleted is given back; FileError where another file has it.
+        """
         try:
-            os.fsync(self.file.fileno())
+            os.fsync(self.file.descriptor)
         except OSError as error:
             raise unwritable(self.path, error) from error
+        if not self.file.is_in_place():
+            self.file.put_back()
         self.synced = time.monotonic()
 
+    def begin_anew(self) -> None:
+        """Forget what is in the file, where there is nothing that was computed."""
+        assert self.is_blank, "a journal with rows in it"
+        self.records, self.damage = [], []
+        self.end = 0
+
+    def put_aside(self) -> Path:
+        """Keep the file under another name, which is returned, and start a new one in its place.
+
+        FileError where another job takes the place first.
+        """
+        target = self.file.put_aside()
+        self.file.close()
+        self.open()
+        return target
+
     def remove(self) -> None:
-        """Delete the file: what was in it is in the results."""
-        with contextlib.suppress(OSError):
-            os.unlink(self.path)
+        """Delete the file, and no other of its name: what was in it is in the results."""
+        if self.is_as_left():
+            self.file.unlink()
         self.file.close()
 
-    def close(self) -> None:
-        self.file.close()
-
-    def drop_if_empty(self) -> None:
-        """Let go of the file, and leave none behind in which there is nothing."""
-        if self.size() == 0:
-            self.remove()
+    def release(self) -> None:
+        """Let go of the file; none is left behind that holds nothing computed."""
+        if self.is_blank and self.is_as_left():
+            self.file.unlink()
         self.file.close()
 
 
@@ -124,8 +167,6 @@ class MemoryJournal:
 
     def __init__(self) -> None:
         self.file = io.BytesIO()
-        self.records: list[Record] = []
-        self.damage: list[Damage] = []
         self.path = "memory"
 
     def append(self, record: bytes) -> int:

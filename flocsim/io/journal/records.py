@@ -6,7 +6,8 @@
     data         bytes
 
 Little-endian. The lengths are believed only where the head's checksum is right; where it is not,
-the next record is looked for by its mark.
+the next record is looked for by its mark. A file that was made to keep its reader busy is given up
+after a while: what is left of it then counts as damaged.
 """
 
 import hashlib
@@ -24,7 +25,10 @@ HEAD = struct.Struct("<8sIIQ16s8s")
 CHECKED = HEAD.size - 8
 LONGEST_DESCRIPTION = 2**24
 LONGEST_DATA = 2**32
-BLOCK = 2**20
+BLOCK = 2**16
+
+MOST_WASTE = 2**28
+"""Bytes that are read behind marks that turn out to be none, beside twice the file's own."""
 
 SESSION, CHUNK = 1, 2
 """Kinds: what a run was started with; rows of finished replicates."""
@@ -32,21 +36,26 @@ SESSION, CHUNK = 1, 2
 
 @attrs.frozen
 class Record:
-    """One whole record: its kind, its description, and where its data lie in the file."""
+    """One whole record: its kind, its description, where its data lie, and their digest."""
 
     kind: int
     description: dict[str, Any]
     offset: int
     length: int
+    digest: bytes
 
 
 @attrs.frozen
 class Damage:
-    """Bytes [start, stop) of a journal that are no whole record, and what they held, if known."""
+    """Bytes [start, stop) of a journal that are no whole record, and what they held, if known.
+
+    ``is_cut``: what a killed process leaves, the beginning of a record at the end of the file.
+    """
 
     start: int
     stop: int
     description: dict[str, Any] | None = None
+    is_cut: bool = False
 
 
 def digest(data, size):
@@ -59,23 +68,36 @@ def encode(kind: int, description: dict[str, Any], data: bytes = b"") -> bytes:
     return b"".join([head, digest(head + words, 8), words, data])
 
 
+def data_digest(record: bytes) -> bytes:
+    """The checksum of the data of an encoded record, as its head says it."""
+    return HEAD.unpack_from(record)[4]
+
+
+def kind_of(record: bytes) -> int:
+    return HEAD.unpack_from(record)[1]
+
+
 def read_head(file, offset):
-    """(kind, description, offset of the data, length, checksum) of the record there, or None."""
+    """(kind, description, offset of the data, length, digest) of the record there, or None.
+
+    Beside it the bytes that were read for it.
+    """
     file.seek(offset)
     head = file.read(HEAD.size)
     if len(head) < HEAD.size or not head.startswith(MARK):
-        return None
-    _, kind, words_length, length, data_digest, head_digest = HEAD.unpack(head)
+        return None, len(head)
+    _, kind, words_length, length, expected, head_digest = HEAD.unpack(head)
     if words_length > LONGEST_DESCRIPTION or length > LONGEST_DATA:
-        return None
+        return None, len(head)
     words = file.read(words_length)
+    read = len(head) + len(words)
     if digest(head[:CHECKED] + words, 8) != head_digest:
-        return None
+        return None, read
     try:
         description = read_json(words, {})
     except ValueError:
-        return None  # its checksum is right, but no flocsim has written it
-    return kind, description, offset + HEAD.size + words_length, length, data_digest
+        return None, read  # its checksum is right, but no flocsim has written it
+    return (kind, description, offset + HEAD.size + words_length, length, expected), read
 
 
 def next_mark(file, start):
@@ -92,24 +114,54 @@ def next_mark(file, start):
     return None
 
 
+def digest_of_part(file, offset, length):
+    """(digest, length) of the data there, which may be shorter than asked for."""
+    file.seek(offset)
+    found, left = hashlib.blake2b(digest_size=16), length
+    while left and (block := file.read(min(left, BLOCK))):
+        found.update(block)
+        left -= len(block)
+    return found.digest(), length - left
+
+
+def begins_a_record(file, place, end):
+    """Whether the bytes from a place to the end are the beginning of a record, cut short."""
+    file.seek(place)
+    head = file.read(HEAD.size)
+    if len(head) < HEAD.size:
+        return head[: len(MARK)] == MARK[: len(head)]
+    mark, _, words_length, _, _, _ = HEAD.unpack(head)
+    return (
+        mark == MARK
+        and words_length <= LONGEST_DESCRIPTION
+        and (place + HEAD.size + words_length > end)
+    )
+
+
 def scan(file: BinaryIO) -> Iterator[Record | Damage]:
     """Every Record and Damage of an open journal, in order; each byte is in one of them."""
     end = file.seek(0, 2)
-    place = 0
+    place, allowed = 0, 2 * end + MOST_WASTE
+    damaged = None
     while place < end:
-        found = read_head(file, place)
+        found, read = read_head(file, place)
         if found is None:
-            following = next_mark(file, place + 1)
-            following = end if following is None else following
-            yield Damage(place, following)
+            damaged = place if damaged is None else damaged
+            allowed -= read + BLOCK
+            following = next_mark(file, place + 1) if allowed > 0 else None
+            if following is None:
+                yield Damage(damaged, end, is_cut=begins_a_record(file, damaged, end))
+                return
             place = following
             continue
+        if damaged is not None:
+            yield Damage(damaged, place)
+            damaged = None
         kind, description, offset, length, expected = found
-        file.seek(offset)
-        data = file.read(length)
-        stop = offset + len(data)
-        if len(data) == length and digest(data, 16) == expected:
-            yield Record(kind, description, offset, length)
+        seen, there = digest_of_part(file, offset, length)
+        stop = offset + there
+        if there == length and seen == expected:
+            yield Record(kind, description, offset, length, expected)
         else:
-            yield Damage(place, stop, description)
+            yield Damage(place, stop, description, is_cut=there < length)
         place = stop

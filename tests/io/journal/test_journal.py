@@ -1,7 +1,10 @@
 """The journal: records whole or not at all, every damage found, nothing wrong believed."""
 
 import errno
+import hashlib
 import io
+import os
+import time
 
 import pytest
 from hypothesis import given
@@ -9,9 +12,17 @@ from hypothesis import strategies as st
 
 from flocsim.errors import FileError
 from flocsim.io.files import Old, seal, write_by_blocks
-from flocsim.io.journal import journal as module
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
-from flocsim.io.journal.records import CHUNK, MARK, SESSION, Damage, Record, encode, scan
+from flocsim.io.journal.records import (
+    CHUNK,
+    HEAD,
+    MARK,
+    SESSION,
+    Damage,
+    Record,
+    encode,
+    scan,
+)
 
 RECORDS = [
     encode(SESSION, {"short": "abc"}),
@@ -89,7 +100,7 @@ def test_a_half_written_record_is_cut_off_by_the_next(tmp_path):
     offset = journal.append(RECORDS[1])
     assert offset == sum(map(len, RECORDS[:3]))
     assert journal.read(offset, len(RECORDS[1])) == RECORDS[1]
-    journal.close()
+    journal.release()
     assert firsts(read(path.read_bytes())) == [0, 1, 0]
 
 
@@ -98,39 +109,107 @@ def test_damage_in_the_middle_stays_where_it_is(tmp_path):
     data[len(RECORDS[0]) + 100] ^= 1
     journal = Journal(written(tmp_path, bytes(data)))
     journal.append(RECORDS[1])
-    journal.close()
+    journal.release()
     assert journal.path.read_bytes() == bytes(data) + RECORDS[1]
 
 
-class FullDisk(io.BytesIO):
-    """A file that takes a few bytes more, then none."""
-
-    def write(self, data):
-        """Half of it the first time."""
-        if self.tell() > 10:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return super().write(bytes(data)[:20])
-
-
-def test_a_full_disk_leaves_the_journal_as_it_was(tmp_path):
+def test_a_full_disk_leaves_the_journal_as_it_was(tmp_path, monkeypatch):
     journal = Journal(tmp_path / "r.h5.journal")
-    journal.file.close()
-    journal.file = FullDisk()
+
+    def pwrite(descriptor, data, place, original=os.pwrite):
+        if place > 10:  # it takes a few bytes, then none
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return original(descriptor, bytes(data)[:20], place)
+
+    monkeypatch.setattr(os, "pwrite", pwrite)
     with pytest.raises(FileError, match="No space left") as caught:
         journal.append(RECORDS[1])
     assert caught.value.exit_code == 74
-    assert journal.file.getvalue() == b""
+    assert journal.path.read_bytes() == b""
     assert journal.end == 0
+    monkeypatch.undo()
+    assert journal.append(RECORDS[1]) == 0
+    journal.release()
+    assert journal.path.read_bytes() == RECORDS[1]
 
 
-def test_two_jobs_do_not_write_one_journal(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "LOCK_SECONDS", 0.1)
-    first = Journal(tmp_path / "r.h5.journal")
-    with pytest.raises(FileError, match="being written by another job"):
-        Journal(tmp_path / "r.h5.journal")
-    first.close()
-    Journal(tmp_path / "r.h5.journal").remove()
+def test_a_journal_without_a_whole_chunk_holds_nothing(tmp_path):
+    for data in (b"", MARK[:3], RECORDS[0], RECORDS[0] * 2 + RECORDS[1][:-1]):
+        journal = Journal(written(tmp_path, data))
+        assert journal.is_blank
+        journal.begin_anew()
+        journal.append(RECORDS[0])
+        assert journal.path.read_bytes() == RECORDS[0]
+        journal.release()
+        assert not journal.path.exists()
+
+
+def test_a_journal_with_rows_or_with_damage_stays(tmp_path):
+    flipped = RECORDS[0] + RECORDS[1][:-1] + b"?"
+    for data in (WHOLE, RECORDS[1], flipped, b"Dear diary,", flipped + RECORDS[0]):
+        journal = Journal(written(tmp_path, data))
+        assert not journal.is_blank
+        journal.release()
+        assert journal.path.read_bytes() == data
+
+
+def test_a_first_chunk_makes_it_stay(tmp_path):
+    journal = Journal(tmp_path / "r.h5.journal")
+    journal.append(RECORDS[0])
+    assert journal.is_blank
+    journal.append(RECORDS[1])
+    journal.release()
+    assert journal.path.read_bytes() == RECORDS[0] + RECORDS[1]
+
+
+def test_what_another_program_writes_there_is_found_before_it_is_written_over(tmp_path):
+    journal = Journal(tmp_path / "r.h5.journal")
+    journal.append(RECORDS[0])
+    with open(journal.path, "ab") as other:
+        other.write(RECORDS[2])
+    with pytest.raises(FileError, match="was changed by another program"):
+        journal.append(RECORDS[1])
+    journal.release()
+    assert firsts(read(journal.path.read_bytes())) == [1]
+
+
+def test_a_journal_that_was_deleted_is_written_back_when_it_is_synced(tmp_path):
+    journal = Journal(written(tmp_path, WHOLE))
+    journal.path.unlink()
+    journal.append(RECORDS[1])
+    journal.sync()
+    journal.append(RECORDS[1])
+    assert journal.path.read_bytes() == WHOLE + RECORDS[1] * 2
+    journal.remove()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_journal_put_aside_makes_room_for_a_new_one(tmp_path):
+    journal = Journal(written(tmp_path, WHOLE))
+    aside = journal.put_aside()
+    journal.append(RECORDS[0])
+    assert aside.read_bytes() == WHOLE
+    assert journal.path.read_bytes() == RECORDS[0]
+    journal.release()
+    assert [path.name for path in tmp_path.iterdir()] == ["r.h5.journal.1"]
+
+
+def test_many_marks_do_not_keep_the_reader_busy():
+    # Each promises a description as long as all that follows.
+    head = HEAD.pack(MARK, CHUNK, 2**23, 0, b"", b"")
+    data = head * 100_000
+    began = time.monotonic()
+    assert [(each.start, each.stop) for each in read(data)] == [(0, len(data))]
+    assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.parametrize("words", [b"[" * 100_000, b"[]", b"1", b"\xff", b"{" + b"9" * 9999])
+def test_a_description_that_no_flocsim_wrote_is_damage(words):
+    head = HEAD.pack(MARK, CHUNK, len(words), 0, hashlib.blake2b(b"", digest_size=16).digest(), b"")
+    checked = head[: HEAD.size - 8]
+    record = checked + hashlib.blake2b(checked + words, digest_size=8).digest() + words
+    [damage] = read(record)
+    assert isinstance(damage, Damage)
 
 
 def test_a_journal_that_cannot_be_opened_is_told(tmp_path):

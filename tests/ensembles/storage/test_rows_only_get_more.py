@@ -1,0 +1,361 @@
+"""Fewer replicates, types, N or δ than a file or a journal holds: what is there stays there."""
+
+import contextlib
+import os
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from flocsim.ensembles import runner
+from flocsim.ensembles.parallel import worker
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.storage import row_store
+from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
+from flocsim.ensembles.study import Study
+from flocsim.errors import FileError, KernelError, UsageError
+from flocsim.interruption import STOPPED
+from flocsim.io.journal import locked_file
+from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import CHUNK
+from flocsim.io.results.file import same_data
+from tests.ensembles.storage.test_resume import stop_after
+from tests.helpers.small_study import small_config
+
+SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
+FEWER = [
+    {"replicates": 12},
+    {"scene": {"delta": [1.0]}},
+    {"scene": {"types": ["III"], "delta": [1.0, 0.0]}, "replicates": 3},
+]
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch):
+    """Chunks of one replicate or two, so that there are many."""
+    monkeypatch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+
+
+def go_on(folder, mode=RESUME, **more):
+    """Run the study of 2 × 1 × 2 × 20 spheres in the folder; how it Ended."""
+    config = small_config(folder, SPHERES | more)
+    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The results file of an undisturbed run."""
+    folder = tmp_path_factory.mktemp("whole")
+    go_on(folder, NEW)
+    return folder / "r.h5"
+
+
+@pytest.fixture
+def finished(tmp_path, whole):
+    """A folder with these results."""
+    (tmp_path / "r.h5").write_bytes(whole.read_bytes())
+    return tmp_path
+
+
+@pytest.fixture
+def stopped(tmp_path, monkeypatch):
+    """A folder with a study that was stopped after 50 of its 80 replicates."""
+    with monkeypatch.context() as patch:
+        stop_after(patch, 50)
+        assert go_on(tmp_path, NEW).code == STOPPED
+    return tmp_path
+
+
+def names(folder):
+    """The files of a study."""
+    return sorted(path.name for path in folder.glob("r.h5*"))
+
+
+def rows_in(path):
+    """How many rows a journal has."""
+    journal = Journal(Path(path))
+    journal.file.close()
+    return sum(each.description["count"] for each in journal.records if each.kind == CHUNK)
+
+
+@pytest.mark.parametrize("fewer", FEWER)
+def test_results_with_more_than_is_asked_for_stay_and_the_rest_is_reported(
+    finished, whole, fewer, tmp_path_factory
+):
+    ended = go_on(finished, **fewer)
+    assert (ended.code, ended.computed) == (0, 0)
+    assert (finished / "r.h5").read_bytes() == whole.read_bytes()
+    assert names(finished) == ["r.h5"]
+    alone = tmp_path_factory.mktemp("alone")
+    expected = go_on(alone, NEW, **fewer).results.probabilities
+    assert ended.results.probabilities.keys() == expected.keys()
+    for name, values in expected.items():
+        assert ended.results.probabilities[name].tobytes() == values.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("mixed", "said"),
+    [
+        ({"scene": {"delta": [1.0, 0.5]}}, "2 conditions such as type I, N = 1, delta 0"),
+        ({"scene": {"delta": [1.0]}, "replicates": 30}, "2 conditions"),
+        ({"scene": {"delta": [0.0, 0.5, 1.0]}, "replicates": 10}, "20 replicates of each"),
+        ({"scene": {"types": ["I", "III", "II"], "delta": [0.0]}, "replicates": 3}, "2 conditions"),
+    ],
+)
+def test_results_that_have_more_of_one_thing_and_less_of_another_are_refused(
+    finished, whole, mixed, said
+):
+    with pytest.raises(SharedError, match="has rows that this run does not ask for") as caught:
+        go_on(finished, **mixed)
+    assert isinstance(caught.value.args[0], UsageError)
+    assert said in str(caught.value)
+    assert (finished / "r.h5").read_bytes() == whole.read_bytes()
+    assert names(finished) == ["r.h5"]
+
+
+@pytest.mark.parametrize("fewer", FEWER)
+def test_a_journal_with_more_than_is_asked_for_stays(
+    stopped, whole, fewer, tmp_path_factory, capsys
+):
+    before = rows_in(stopped / "r.h5.journal")
+    ended = go_on(stopped, **fewer)
+    assert ended.code == 0
+    assert "r.h5.journal has rows beyond what was asked for, and stays" in capsys.readouterr().err
+    assert rows_in(stopped / "r.h5.journal") == before + ended.computed
+    alone = tmp_path_factory.mktemp("alone")
+    go_on(alone, NEW, **fewer)
+    assert same_data(stopped / "r.h5", alone / "r.h5") == []
+    # Asked for all again, nothing is computed twice, and the journal has done its work.
+    assert ended.computed + go_on(stopped).computed == 30
+    assert same_data(stopped / "r.h5", whole) == []
+    assert names(stopped) == ["r.h5"]
+
+
+RULE = {"half_width": 0.5, "least": 4}
+
+
+def test_a_rule_that_would_have_ended_sooner_takes_no_rows_away(finished, whole):
+    ended = go_on(finished, replicates=100, stop=RULE)
+    assert (ended.computed, ended.results.count) == (0, 20)
+    assert (finished / "r.h5").read_bytes() == whole.read_bytes()
+
+
+def test_a_rule_that_ends_an_extended_study_keeps_the_replicates_that_are_there(finished):
+    ended = go_on(finished, replicates=100, stop=RULE, scene={"delta": [0.0, 0.5, 1.0]})
+    assert (ended.computed, ended.results.count) == (40, 20)
+
+
+def test_a_journal_that_was_begun_without_the_rule_stays(stopped):
+    before = rows_in(stopped / "r.h5.journal")
+    ended = go_on(stopped, replicates=100, stop=RULE)
+    assert ended.results.count < 20
+    assert rows_in(stopped / "r.h5.journal") == before + ended.computed
+
+
+def test_what_was_computed_beyond_the_end_of_the_same_rule_goes_with_the_journal(
+    tmp_path, monkeypatch
+):
+    config = {"replicates": 100, "stop": RULE}
+    with monkeypatch.context() as patch:
+        stop_after(patch, 10)
+        go_on(tmp_path, NEW, **config)
+    ended = go_on(tmp_path, **config)
+    assert ended.results.count < 20
+    assert names(tmp_path) == ["r.h5"]
+
+
+def test_a_journal_beside_results_of_another_study_replaces_them_not(stopped, whole):
+    go_on(stopped.parent / stopped.name, RESTART, seed=9)
+    others = (stopped / "r.h5").read_bytes()
+    (stopped / "r.h5.journal.1").rename(stopped / "r.h5.journal")
+    with pytest.raises(SharedError, match=r"r.h5 is of another study: seed is 9"):
+        go_on(stopped)
+    assert (stopped / "r.h5").read_bytes() == others
+    assert rows_in(stopped / "r.h5.journal") == 50
+
+
+def test_rows_that_were_damaged_after_they_were_found_are_computed_again(
+    stopped, whole, monkeypatch
+):
+    path = stopped / "r.h5.journal"
+
+    def make_state(*words, original=runner.make_state):
+        data = bytearray(path.read_bytes())
+        data[data.rindex(b"\x93FLOCREC", 0, data.rindex(b"\x93FLOCREC")) - 1] ^= 4
+        with open(path, "r+b") as file:
+            file.write(data)
+        return original(*words)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "make_state", make_state)
+        with pytest.raises(SharedError, match=r"journal is damaged from byte \d+ to") as caught:
+            go_on(stopped)
+    assert isinstance(caught.value.args[0], FileError)
+    assert names(stopped) == ["r.h5.journal"]
+    assert go_on(stopped).computed == 31
+    assert same_data(stopped / "r.h5", whole) == []
+
+
+def test_results_that_are_written_to_while_they_are_extended_are_not_believed(
+    finished, monkeypatch
+):
+    path = finished / "r.h5"
+
+    def read(table, *words, original=row_store.OldTable.read):
+        with open(path, "r+b") as file:
+            file.seek(5000)
+            file.write(b"?")
+        return original(table, *words)
+
+    monkeypatch.setattr(row_store.OldTable, "read", read)
+    with pytest.raises(SharedError, match="was changed by another program while it was extended"):
+        go_on(finished, replicates=22)
+    assert names(finished) == ["r.h5"]
+
+
+@pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
+def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, whole, monkeypatch, mode):
+    with monkeypatch.context() as patch:
+        # As a kill leaves it while the kernels are compiled, of another study even.
+        patch.setattr(Journal, "release", lambda journal: journal.file.close())
+        patch.setattr(Study, "compile", lambda *words: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            go_on(tmp_path, NEW, seed=7)
+    assert names(tmp_path) == ["r.h5.journal"]
+    assert go_on(tmp_path, mode).computed == 80
+    assert same_data(tmp_path / "r.h5", whole) == []
+    assert names(tmp_path) == ["r.h5"]
+
+
+def test_a_kernel_that_does_not_compile_leaves_no_journal(tmp_path, monkeypatch):
+    def compile(study, kinds):
+        raise KernelError("brush.py:3: no")
+
+    monkeypatch.setattr(Study, "compile", compile)
+    with pytest.raises(KernelError):
+        go_on(tmp_path, NEW)
+    assert names(tmp_path) == []
+
+
+def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, monkeypatch):
+    monkeypatch.setattr("flocsim.ensembles.parallel.coordinator.stop_requested", lambda: True)
+    ended = go_on(tmp_path, NEW)
+    assert (ended.code, ended.kept) == (STOPPED, 0)
+    assert names(tmp_path) == []
+
+
+def test_what_is_promised_counts_the_journal_and_not_the_results(finished, monkeypatch):
+    stop_after(monkeypatch, 5)
+    ended = go_on(finished, replicates=30)
+    assert (ended.code, ended.kept) == (STOPPED, 5)
+    assert ended.journal == str(finished / "r.h5.journal")
+    assert rows_in(ended.journal) == 5
+
+
+def test_a_journal_that_is_deleted_meanwhile_is_there_when_it_is_promised(
+    tmp_path, monkeypatch, whole
+):
+    seen = []
+
+    def append(journal, record, original=Journal.append):
+        seen.append(journal)
+        if len(seen) == 20:
+            journal.path.unlink()
+        return original(journal, record)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", append)
+        stop_after(patch, 30)
+        ended = go_on(tmp_path, NEW)
+    assert (ended.code, ended.kept) == (STOPPED, 30)
+    assert rows_in(ended.journal) == 30
+    assert go_on(tmp_path).computed == 50
+    assert same_data(tmp_path / "r.h5", whole) == []
+
+
+def test_a_journal_that_another_file_has_replaced_is_kept_under_another_name(tmp_path, monkeypatch):
+    path = tmp_path / "r.h5.journal"
+
+    def append(journal, record, original=Journal.append):
+        if journal.end > 4000:
+            with contextlib.suppress(FileNotFoundError):
+                path.unlink()
+            path.write_text("of another job")
+        return original(journal, record)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", append)
+        stop_after(patch, 30)
+        with pytest.raises(SharedError, match="was replaced by another file") as caught:
+            go_on(tmp_path, NEW)
+    assert caught.value.args[0].exit_code == 74
+    assert path.read_text() == "of another job"
+    assert rows_in(tmp_path / "r.h5.journal.1") == 30
+    assert not (tmp_path / "r.h5").exists()
+
+
+@pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
+def test_a_job_that_waited_for_another_looks_at_its_results_anew(
+    finished, whole, monkeypatch, mode
+):
+    path = finished / "r.h5"
+    path.rename(finished / "ready.h5")
+    first = Journal(finished / "r.h5.journal")
+
+    def finish():
+        time.sleep(0.3)
+        os.rename(finished / "ready.h5", path)
+        first.remove()
+
+    ending = threading.Thread(target=finish)
+    ending.start()
+    try:
+        if mode == RESUME:
+            assert go_on(finished, mode).computed == 0
+        else:
+            with pytest.raises(SharedError, match="exists already and is left as it is") as caught:
+                go_on(finished, mode)
+            assert caught.value.args[0].exit_code == 2
+    finally:
+        ending.join()
+    assert path.read_bytes() == whole.read_bytes()
+    assert names(finished) == ["r.h5"]
+
+
+@pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
+def test_a_running_job_is_not_disturbed(stopped, monkeypatch, mode):
+    monkeypatch.setattr(locked_file, "LOCK_SECONDS", 0.1)
+    path = stopped / "r.h5.journal"
+    before = path.read_bytes()
+    running = Journal(path)
+    with pytest.raises(SharedError, match="is being written by another job"):
+        go_on(stopped, mode)
+    assert running.file.is_in_place()
+    running.release()
+    assert path.read_bytes() == before
+
+
+def test_the_lock_is_held_before_anything_is_grown_and_to_the_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(locked_file, "LOCK_SECONDS", 0.0)
+    busy = []
+
+    def probe(*words, original):
+        with pytest.raises(FileError, match="another job"):
+            claim(tmp_path / "r.h5", RESUME)
+        busy.append(True)
+        return original(*words)
+
+    for name in ("flocs_of", "identity_of", "make_results"):
+        original = getattr(runner, name)
+        monkeypatch.setattr(runner, name, lambda *words, o=original: probe(*words, original=o))
+    go_on(tmp_path, NEW)
+    assert len(busy) == 3
+
+
+def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(locked_file, "lock", lambda *words: None)
+    assert go_on(tmp_path, NEW).code == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert "has no locks: see that no two jobs write there" in line
