@@ -16,7 +16,7 @@ if is_limited():
     check_memory()
 
 from flocsim.commands import ensemble, fit, info, init, plot, trajectory, work_precision
-from flocsim.ensembles.cli import silent_unless_first
+from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
 COMMANDS = (init, fit, ensemble, trajectory, plot, work_precision, info)
@@ -38,8 +38,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; the exit code. Errors are one line on stderr."""
     with plain_streams():
         plain_warnings()
-        with silent_unless_first():
-            arguments = make_parser().parse_args(argv)
+        words = sys.argv[1:] if argv is None else argv
+        if "ensemble" in words[:1]:
+            arguments = parse_on_all_ranks(make_parser(), argv)
+        else:
+            with silent_unless_first():
+                arguments = make_parser().parse_args(argv)
         code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

@@ -7,6 +7,7 @@ import math
 import sys
 import traceback
 from collections.abc import Sequence
+from typing import Any
 
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
@@ -14,14 +15,18 @@ from flocsim.ensembles.parallel.communicator import (
     StopRequested,
     find_communicator,
     launched_rank,
+    launched_size,
 )
 from flocsim.ensembles.parallel.heartbeat import SECONDS
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
 INTERNAL = 70
+
+UNSHARED = ("quiet", "run", "command")
+"""Arguments in which ranks may differ: the others say what is run."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
@@ -51,7 +56,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     )  # fmt: skip
     begin.add_argument(
         "--restart", action="store_const", const="restart", dest="mode",
-        help="throw an unfinished run away and start anew (finished results: --overwrite)",
+        help="start anew; an unfinished run is kept under another name (finished results: "
+        "--overwrite)",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.add_argument("--dry-run", action="store_true", help="say what would be run, and stop")
@@ -73,12 +79,12 @@ def overrides(arguments: argparse.Namespace) -> dict:
     return given
 
 
-def checked_config(arguments):
+def checked_config(arguments, sources):
     """The config, found to make a study whose results can be written where they should go."""
     from flocsim.ensembles.config.loader import load_config
     from flocsim.ensembles.preflight import check_study, inputs_of
 
-    config = load_config(arguments.config, overrides(arguments))
+    config = load_config(arguments.config, overrides(arguments), sources)
     check_study(config)
     if not arguments.dry_run:
         check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
@@ -95,18 +101,48 @@ def results_of(config, arguments):
 
 
 def agree(comm, arguments):
-    """The config on every rank; where one rank cannot load it, none goes on."""
+    """(config, 0) on every rank, made of what rank 0 has read; (None, exit code) on every rank
+    where one of them was started with other words or cannot make it."""
     config, problem = None, None
     try:
-        config = checked_config(arguments)
+        config = own_config(comm, arguments)
     except FlocsimError as error:
         problem = (str(error), error.exit_code)
-    problems = [each for each in comm.all_gather(problem) if each is not None]
+    problems = [each for each in comm.gather(problem) or [] if each is not None]
+    code = comm.broadcast(problems[0][1] if problems else 0)
     if problems:
-        if comm.rank == 0:
-            tell(problems[0][0], sys.stderr)
-        return None, problems[0][1]
-    return config, 0
+        tell(problems[0][0], sys.stderr)
+    return (None, code) if code else (config, 0)
+
+
+def own_config(comm, arguments):
+    """This rank's config, of the text and the modules that rank 0 has read; None where it has not.
+
+    So an edited file is read before or after the edit, by all.
+    """
+    from flocsim.ensembles.config.loader import load_config
+    from flocsim.ensembles.config.sources import Sources
+    from flocsim.ensembles.parallel.agreement import Launch, refuse_other_words
+
+    words = {name: value for name, value in vars(arguments).items() if name not in UNSHARED}
+    if comm.rank == 0:
+        launch, sources = None, Sources()
+        try:
+            config = checked_config(arguments, sources)
+            launch = Launch(words, sources)
+        finally:
+            comm.broadcast(launch)
+        return config
+    from flocsim.ensembles import runner  # noqa: F401 (takes its time, while rank 0 reads)
+
+    launch = comm.broadcast(None)
+    if launch is None:
+        return None
+    refuse_other_words(comm.rank, launch, words)
+    try:
+        return load_config(arguments.config, overrides(arguments), launch.sources)
+    except ConfigError as error:
+        raise ConfigError(f"rank {comm.rank}: {error}") from error
 
 
 def study(config, comm, arguments):
@@ -125,11 +161,12 @@ def study(config, comm, arguments):
     if ended.code == STOPPED:
         if comm.rank == 0:
             who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
-            tell(
-                f"flocsim: stopped by {who}: {ended.kept} finished replicates are in "
-                f"{output}.journal; go on with --resume",
-                sys.stderr,
+            what = (
+                f"{ended.kept} finished replicates are in {ended.journal}; go on with --resume"
+                if ended.kept
+                else "none of its replicates was finished; begin again with --resume"
             )
+            tell(f"flocsim: stopped by {who}: {what}", sys.stderr)
         return STOPPED
     if comm.rank > 0:
         return 0
@@ -205,20 +242,15 @@ def guarded(comm, arguments):
         return end_all(comm, text, INTERNAL)
 
 
-def join_ranks(arguments):
-    """The ranks of the job: those that a launcher started, or --jobs processes."""
+def what_is_wrong(arguments, comm):
+    """What is wrong with --jobs or --heartbeat here; "" where nothing is."""
     if not 0.0 <= arguments.heartbeat < math.inf:
-        raise UsageError(f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}")
-    comm = find_communicator()
-    if arguments.jobs == 1 or arguments.dry_run:
-        return comm
+        return f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}"
     if arguments.jobs < 1:
-        raise UsageError(f"--jobs must be at least 1, found {arguments.jobs}")
-    if comm.size > 1:
-        raise UsageError("--jobs is for runs without an MPI launcher: leave out one of the two")
-    from flocsim.ensembles.parallel.processes import start_processes
-
-    return start_processes(arguments.jobs, on_process, arguments)
+        return f"--jobs must be at least 1, found {arguments.jobs}"
+    if arguments.jobs > 1 and comm.size > 1 and not arguments.dry_run:
+        return "--jobs is for runs without an MPI launcher: leave out one of the two"
+    return ""
 
 
 def on_process(comm, arguments):
@@ -227,12 +259,59 @@ def on_process(comm, arguments):
 
 
 def run_command(arguments: argparse.Namespace) -> int:
+    comm: Communicator = SerialCommunicator()
     try:
-        comm = join_ranks(arguments)
+        comm = find_communicator()
+        wrong = what_is_wrong(arguments, comm)
+        code = refused_anywhere(comm, UsageError.exit_code if wrong else None)
+        if code is not None:
+            if wrong and comm.rank == 0:
+                tell(f"flocsim: {wrong}", sys.stderr)
+            return code
+        if arguments.jobs > 1 and not arguments.dry_run:
+            from flocsim.ensembles.parallel.processes import start_processes
+
+            comm = start_processes(arguments.jobs, on_process, arguments)
     except FlocsimError as error:
-        return end_all(SerialCommunicator(), str(error), error.exit_code)
+        return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
     return guarded(comm, arguments)
+
+
+def refused_anywhere(comm: Communicator, code: int | None = None) -> int | None:
+    """The exit code where the arguments of a rank were refused, as the others would wait for it.
+
+    ``code``: that of this rank, None where it can go on; 0 where it printed a help.
+    """
+    codes = comm.gather(code) or []
+    which = [rank for rank, each in enumerate(codes) if each is not None]
+    if which and len(which) < len(codes):
+        tell(
+            f"flocsim: rank {which[0]} was started with words that are no study's: start all "
+            "ranks with the same",
+            sys.stderr,
+        )
+        return comm.broadcast(UsageError.exit_code)
+    return comm.broadcast(codes[0] if which else None)
+
+
+def parse_on_all_ranks(parser: argparse.ArgumentParser, words: Sequence[str] | None) -> Any:
+    """The arguments; where they are refused, or are for a help, all ranks end together.
+
+    One rank says why. SystemExit as from argparse.
+    """
+    with silent_unless_first():
+        try:
+            return parser.parse_args(words)
+        except SystemExit as end:
+            if launched_size() in (0, 1):
+                raise
+            code = end.code if isinstance(end.code, int) else UsageError.exit_code
+    try:
+        ended = refused_anywhere(find_communicator(), code)
+    except FlocsimError:
+        ended = code
+    raise SystemExit(ended)
 
 
 @contextlib.contextmanager
@@ -252,8 +331,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
     )
     with plain_streams():
-        with silent_unless_first():
-            arguments = add_arguments(parser).parse_args(argv)
+        arguments = parse_on_all_ranks(add_arguments(parser), argv)
         code = run_command(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

@@ -19,6 +19,7 @@ from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, summarize
+from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
 from flocsim.ensembles.parallel.communicator import Communicator, SerialCommunicator
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
@@ -27,7 +28,7 @@ from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
-from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
+from flocsim.ensembles.storage.identity import arithmetic_digest, short
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
@@ -128,12 +129,36 @@ class Joint:
 
 
 def join(config: Config, comm: Communicator) -> Joint:
-    """Make the Study on every rank; rank 0 grows or reads the flocs for all."""
+    """Make the Study on every rank, and see that all would compute the same rows.
+
+    Rank 0 grows or reads the flocs for all. Where any rank would compute something else, or has
+    other versions, none goes on: UsageError on rank 0, RankZeroFailed on the others.
+    """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
     study = Study(config, flocs=hear(comm, flocs))
-    identity = identity_of(study) if comm.rank == 0 else {}
-    return Joint(study, identity, distinct(comm.gather(cpu_kind()) or []))
+    own, line = own_facts(study, comm)
+    leader = hear(comm, own)
+    if own is not None:
+        line = disagreement(comm.rank, leader, own)
+    answers = comm.gather((line, cpu_kind()))
+    with sharing_errors(comm):
+        unlike = [line for line, _ in answers or [] if line]
+        if unlike:
+            more = f" ({len(unlike)} ranks differ)" if len(unlike) > 1 else ""
+            raise UsageError(unlike[0] + more)
+    return Joint(study, leader.identity, distinct([kind for _, kind in answers or []]))
+
+
+def own_facts(study: Study, comm: Communicator) -> tuple[Facts | None, str]:
+    """(Facts of this rank, ""), or (None, why there are none); rank 0 speaks for itself."""
+    if comm.rank == 0:
+        with sharing_errors(comm):
+            return facts_of(study), ""
+    try:
+        return facts_of(study), ""
+    except FlocsimError as error:
+        return None, f"rank {comm.rank}: {error}"
 
 
 def hear(comm: Communicator, value: Any) -> Any:

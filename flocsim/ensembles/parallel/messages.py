@@ -1,5 +1,6 @@
 """What the ranks say to each other while a study runs.
 
+rank 0 → another rank         the flocs and the Facts of its study (or ExitCode, wherever it fails)
 every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
 rank 0 → another rank         Plan, once (or ExitCode, where the study cannot begin)
                               Assignment or Dismissal, in answer to a Request

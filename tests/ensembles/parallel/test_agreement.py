@@ -1,0 +1,252 @@
+"""No two ranks of a job run two things: rank 0 hands out what it has read, the rest is compared."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from flocsim.ensembles import runner
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.parallel import agreement
+from flocsim.ensembles.parallel.agreement import Facts, Launch, disagreement, refuse_other_words
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.errors import KernelError, UsageError
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.own_force import write_own
+from tests.helpers.small_study import (
+    SMALL,
+    command,
+    mpirun,
+    run_command,
+    small_config,
+    write_small,
+    write_star_library,
+)
+
+HERE = Facts({"seed": 1, "kernels.spheres": "ab", "code": "cd"}, {"version of numpy": "2.0"}, "n0")
+
+
+@pytest.mark.parametrize(
+    ("identity", "versions", "said"),
+    [
+        ({"seed": 2}, {}, "seed 2 where rank 0 has 1"),
+        ({"kernels.spheres": "xy"}, {}, "other code that is compiled (spheres)"),
+        ({"code": "xy"}, {}, "other flocsim's own code"),
+        ({"flocs.4": "xy"}, {}, "other flocs (4)"),
+        ({"code": "xy", "seed": 2}, {}, "seed 2 where rank 0 has 1, other flocsim's own code"),
+        ({"code": "xy"}, {"version of numpy": "2.1"}, "version of numpy '2.1' where rank 0 has"),
+        ({}, {"version of numba": "0.6"}, "version of numba '0.6' where rank 0 has nothing"),
+    ],
+)
+def test_a_rank_that_would_compute_something_else_is_named(identity, versions, said):
+    other = Facts(HERE.identity | identity, HERE.versions | versions, "n1")
+    line = disagreement(3, HERE, other)
+    assert line.startswith(f"rank 3 on {agreement.platform.node()} has ")
+    assert said in line
+    assert "unlike rank 0 on n0" in line
+    assert "\n" not in line
+    assert disagreement(3, HERE, HERE) == ""
+
+
+def test_other_words_are_refused():
+    launch = Launch({"config": "a.toml", "seed": None}, Sources(), "n0")
+    refuse_other_words(1, launch, {"config": "a.toml", "seed": None})
+    with pytest.raises(UsageError, match=r"config 'b.toml' where rank 0 has 'a.toml', unlike"):
+        refuse_other_words(1, launch, {"config": "b.toml", "seed": None})
+
+
+def test_the_versions_of_all_that_computes_are_compared():
+    found = agreement.versions()
+    assert {"version of numpy", "version of numba", "version of flocsim"} < found.keys()
+    assert sys.version == found["version of Python"]
+
+
+class Pair(SerialCommunicator):
+    """Rank 0 of two; rank 1 answers as it is told to."""
+
+    size = 2
+
+    def __init__(self, answer):
+        super().__init__()
+        self.answer, self.heard = answer, []
+
+    def send(self, to, message):
+        """What rank 1 would hear."""
+        self.heard.append(message)
+
+    def gather(self, value):
+        """The answers of both."""
+        return [value, self.answer(value)]
+
+
+def test_a_disagreement_ends_rank_0_with_one_line_and_the_others_with_its_code(tmp_path):
+    comm = Pair(lambda own: ("rank 1 on n1 has seed 2", own[1]))
+    config = small_config(tmp_path, {"shapes": {"vertices": [1]}})
+    with pytest.raises(SharedError, match="rank 1 on n1 has seed 2"):
+        run_to_file(config, comm, tmp_path / "r.h5", "new")
+    assert comm.heard[-1].code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+def test_a_kernel_that_cannot_be_hashed_ends_all_ranks(tmp_path, monkeypatch):
+    def refuse(study):
+        raise KernelError("mine.py:3: no")
+
+    monkeypatch.setattr(runner, "facts_of", refuse)
+    comm = Pair(lambda own: own)
+    with pytest.raises(SharedError, match=r"mine.py:3: no"):
+        run_to_file(small_config(tmp_path), comm, tmp_path / "r.h5", "new")
+    assert comm.heard[-1].code == 2
+
+
+def mixed(folder, *jobs, timeout=60):
+    """Run several command lines as ranks of one job."""
+    words = [mpirun()]
+    for job in jobs:
+        words += [*(":" if len(words) > 1 else ""), "-n", "1", *command(*job)]
+    return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=timeout)
+
+
+def test_ranks_with_two_configs_are_refused(tmp_path):
+    write_small(tmp_path, name="a.toml", vertices="[1]")
+    write_small(tmp_path, name="b.toml", vertices="[1]", seed="2")
+    done = mixed(tmp_path, ["a.toml"], ["b.toml"])
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "rank 1 on " in line
+    assert "has config 'b.toml' where rank 0 has 'a.toml'" in line
+    assert not list(tmp_path.glob("small.h5*"))
+
+
+OTHERS = [
+    ["--seed", "5"],
+    ["--set", "scene.delta=[0.5]"],
+    ["--resume"],
+    ["--bogus"],  # ends before it has joined the others
+    ["--help"],
+    ["--jobs", "2"],
+]
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_ranks_with_other_words_are_refused(tmp_path, other):
+    write_small(tmp_path, vertices="[1]")
+    done = mixed(tmp_path, ["small.toml"], ["small.toml", *other])
+    assert (done.returncode, done.stdout) == (2, "")
+    [line] = done.stderr.splitlines()
+    assert "rank 1 " in line
+    assert not list(tmp_path.glob("small.h5*"))
+
+
+EDITS = """\
+import os, pathlib
+from flocsim.ensembles.config import sources
+if os.environ.get("FLOCSIM_EDIT"):
+    text = sources.Sources.text
+
+    def edited(self, path):
+        found = text(self, path)
+        pathlib.Path(path).write_text(found.replace("seed = 1", "seed = 9"))
+        module = pathlib.Path("neighbour.py")
+        return found
+
+    sources.Sources.text = edited
+    module = sources.Sources.module
+
+    def replaced(self, path, folder):
+        found = module(self, path, folder)
+        pathlib.Path(path).write_bytes(found.replace(b"-1.0", b"+1.0"))
+        return found
+
+    sources.Sources.module = replaced
+"""
+"""A module that edits the config and the user's modules as soon as they have been read."""
+
+
+@pytest.mark.parametrize("ranks", [None, 2])
+def test_files_that_are_edited_during_the_start_are_read_once(tmp_path, ranks):
+    path = write_own(tmp_path)
+    before = path.read_text()
+    (tmp_path / "sitecustomize.py").write_text(EDITS)
+    env = os.environ | {"FLOCSIM_EDIT": "1"}
+    env["PYTHONPATH"] = os.pathsep.join([str(tmp_path), env.get("PYTHONPATH", "")])
+    words = [] if ranks else ["--jobs", "2"]
+    done = run_command(tmp_path, "small.toml", "--quiet", *words, ranks=ranks, env=env)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "seed = 9" in path.read_text()
+    assert "+1.0" in (tmp_path / "neighbour.py").read_text()
+    path.write_text(before)
+    write_own(tmp_path)
+    done = run_command(tmp_path, "small.toml", "--quiet", "-o", "alone.h5")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert same_data(tmp_path / "small.h5", tmp_path / "alone.h5") == []
+    assert read_results(tmp_path / "small.h5").run["ranks"] == 2
+
+
+DIFFERS = """\
+import os
+if os.environ.get("PMI_RANK") == "1":
+    from flocsim.ensembles.parallel import agreement
+
+    found = agreement.versions()
+    agreement.versions = lambda: found | {"version of numpy": "0.9"}
+"""
+
+
+def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
+    write_small(tmp_path, vertices="[1]")
+    (tmp_path / "sitecustomize.py").write_text(DIFFERS)
+    env = os.environ | {}
+    env["PYTHONPATH"] = os.pathsep.join([str(tmp_path), env.get("PYTHONPATH", "")])
+    done = run_command(tmp_path, "small.toml", ranks=3, env=env, timeout=60)
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "rank 1 on " in line
+    assert "has version of numpy '0.9' where rank 0 has" in line
+    assert not list(tmp_path.glob("small.h5*"))
+
+
+DEPENDS = "import os\nFACTOR = -1.0 if os.environ.get('PMI_RANK') == '0' else -2.0\n"
+
+
+def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
+    write_own(tmp_path)
+    (tmp_path / "neighbour.py").write_text(DEPENDS)
+    done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
+    assert done.returncode == 2
+    [line] = done.stderr.splitlines()
+    assert "rank 1 on " in line
+    assert "other code that is compiled (spheres)" in line
+    assert not list(tmp_path.glob("small.h5*"))
+
+
+def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monkeypatch):
+    library = tmp_path / "stars.h5"
+    write_star_library(library)
+    text = SMALL.replace("[shapes]", '[shapes]\nsource = "library"\nfile = "stars.h5"')
+    config = load_config(write_small(tmp_path, text, vertices="[4]", replicates="2"))
+    comm = Pair(lambda own: own)
+    monkeypatch.setattr(comm, "send", lambda to, message: library.unlink(missing_ok=True))
+    joint = runner.join(config, comm)
+    assert len(joint.study.flocs) == 3
+    assert not library.exists()
+
+
+def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
+    write_small(tmp_path, vertices="[1]")
+    words = command("small.toml", "--quiet")
+    jobs = [
+        subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)
+    ]
+    errors = [job.communicate(timeout=60)[1] for job in jobs]
+    codes = sorted(job.returncode for job in jobs)
+    # Where one has ended before the other begins, the file it leaves is not the other's business.
+    assert codes in ([0, 2], [0, 0])
+    assert "Traceback" not in "".join(errors)
+    if codes == [0, 2]:
+        [line] = "".join(errors).splitlines()
+        assert "was just written by another job" in line
+    assert read_results(tmp_path / "small.h5").count == 3
