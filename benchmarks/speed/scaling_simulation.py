@@ -16,6 +16,7 @@ from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import data_digest
 from flocsim.io.results.schema import ROW_SIZE
 
 LATENCY = SLEEP + 1e-4
@@ -113,7 +114,8 @@ def measure_assembly(store, folder):
     record = chunk_record(store.conditions[0], 0, rows, "key")
     for first in range(0, count + 8192, 8192):
         offset = store.journal.append(record)
-        store.add(0, first, first + 8192, offset + len(record) - 8192 * ROW_SIZE)
+        start = offset + len(record) - 8192 * ROW_SIZE
+        store.add(0, first, first + 8192, start, data_digest(record))
     began = time.perf_counter()
     reader = Reader(store, (1, 1, 1, count))
     reader.known = [np.sort(store.entries[0][60 : store.counts[0]], order="first")]
