@@ -218,6 +218,10 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
     )  # fmt: skip
     said = [job.stdout.readline(), job.stdout.readline()]
     assert "compiled or loaded" in said[1]
+    journal = serial / f"late{ranks}.h5.journal"
+    size = journal.stat().st_size
+    while journal.stat().st_size == size:  # until a chunk is finished
+        time.sleep(0.01)
     began = time.monotonic()
     os.killpg(job.pid, signal.SIGINT)
     _, errors = job.communicate(timeout=30)
