@@ -18,8 +18,9 @@ from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
-from flocsim.ensembles.estimates.summary import Reader, summarize
+from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
+from flocsim.ensembles.parallel.assembly import assemble, assist
 from flocsim.ensembles.parallel.communicator import Communicator, SerialCommunicator
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
@@ -36,7 +37,8 @@ from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import STOPPED
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
-from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.file import read_results
+from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results
 from flocsim.io.terminal import Progress
 
@@ -176,7 +178,7 @@ def follow(study: Study, comm: Communicator) -> Ended:
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
     run_chunks(study, RemoteCoordinator(comm), plan.key)
-    code = comm.receive(0, heed_signals=False).code
+    code = assist(study, comm).code
     if code not in (0, STOPPED):
         raise RankZeroFailed(code)
     return Ended(code)
@@ -216,7 +218,7 @@ def lead(
         ended.count, ended.journal = final, str(start.journal.path)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
-            ended.results = make_results(study, start, state, ended, comm.size, output)
+            ended.results = make_results(study, start, state, ended, comm, output, progress)
     comm.broadcast(ExitCode(ended.code))
     return ended
 
@@ -277,35 +279,48 @@ def looks(borders: list[int], least: int) -> list[int]:
 
 
 def make_results(
-    study: Study, start: Beginning, state: StudyState, ended: Ended, ranks: int,
-    output: str | Path | None,
+    study: Study, start: Beginning, state: StudyState, ended: Ended, comm: Communicator,
+    output: str | Path | None, progress: Progress,
 ) -> Results:  # fmt: skip
-    """The Results of a finished study; written to ``output`` where there is one."""
+    """The Results of a finished study; written to ``output``, by all ranks, where there is one."""
     count, in_memory = state.schedule.final, output is None
     if output and (old := start.store.old) is not None and start.is_covered(count):
         if (tuple(old.places), old.count) == (study.conditions, count):
             return read_results(output, replicates=False)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
-    config = study.config
     reader = Reader(start.store, (*study.shape[:3], count))
-    probabilities, pooled, differences = summarize(reader)
-    names: tuple = tuple(floc.name for floc in study.flocs)
-    results = Results(
+    run = facts(study, start, state.notes, ended, comm.size)
+    if output is None:
+        sums = sums_of(reader, 0, count)
+        return results_of(study, count, sums, run, reader.arrays(COLUMNS) if in_memory else None)
+    # Its tables have no values yet, but their places: where the rows go follows from them.
+    draft = results_of(study, count, sums_of(reader, 0, 0), run)
+    with new_row_file(output, draft, start.replacing) as file:
+        sums, digests = assemble(reader, file, comm, study.conditions, progress.warn)
+        results = results_of(study, count, sums, run)
+        file.complete(results, digests)
+    return results
+
+
+def results_of(
+    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None
+) -> Results:
+    """The Results of so many replicates of each condition from their Sums."""
+    config = study.config
+    probabilities, pooled, differences = tables_of(sums)
+    return Results(
         types=tuple(name for name, _, _ in config.scene.conditions),
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
-        replicates=reader.arrays(COLUMNS) if in_memory else None,
+        replicates=replicates,
         probabilities=probabilities,
-        run=facts(study, start, state.notes, ended, ranks),
+        run=run,
         failures=FAILURES,
-        flocs=names,
+        flocs=tuple(floc.name for floc in study.flocs),
         pooled=pooled,
         differences=differences,
         count=count,
     )
-    if output:
-        write_results(output, results, reader.column, start.replacing)
-    return results
 
 
 def facts(study, start, notes, ended, ranks):

@@ -12,17 +12,19 @@ import itertools
 import os
 import secrets
 import stat
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 import attrs
 
 from flocsim.errors import FileError
+from flocsim.io.pieces import is_in_pieces, size_of_pieces
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
 SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
+DAMAGED = "is damaged, its checksum is wrong: use a copy or run it again"
 BLOCK = 2**20
 """Bytes that are read at a time."""
 
@@ -107,23 +109,6 @@ def write_file(path: str | os.PathLike, data: bytes, rule: Rule = keep) -> None:
     """Put ``data`` at ``path``, whole or not at all; FileError and ``rule`` as in `unfinished`."""
     with unfinished(path, rule) as new:
         new.file.write(data)
-
-
-def write_by_blocks(
-    path: str | os.PathLike, size: int, blocks: Iterable[bytes], rule: Rule = keep
-) -> None:
-    """Put ``blocks`` (in order, ``size`` bytes in all) at ``path``, sealed; never a part of them.
-
-    For files larger than the memory. The space is taken before the first block, so that a full
-    disk is found at once. FileError and ``rule`` as in `unfinished`.
-    """
-    with unfinished(path, rule) as new:
-        reserve(new.file.fileno(), size + SEAL_LENGTH)
-        digest = hashlib.blake2b(digest_size=32)
-        for block in blocks:
-            digest.update(block)
-            new.file.write(block)
-        new.file.write(seal_of(digest))
 
 
 def fresh_beside(target: Path, length: int = 0) -> tuple[Path, int]:
@@ -385,6 +370,10 @@ def check_seal(path, file):
     """The size of the data before the seal; FileError where either is wrong."""
     if not file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
         raise FileError(f"{path} is not an HDF5 file: name a file that flocsim wrote")
+    if is_in_pieces(file):
+        if (size := size_of_pieces(file)) is None:
+            raise FileError(f"{path} {DAMAGED}")
+        return size
     size = max(file.seek(0, os.SEEK_END) - SEAL_LENGTH, 0)
     file.seek(size)
     tail = file.read()
@@ -399,5 +388,5 @@ def check_seal(path, file):
         digest.update(block)
         left -= len(block)
     if seal_of(digest) != tail:
-        raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
+        raise FileError(f"{path} {DAMAGED}")
     return size

@@ -11,12 +11,12 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``run``            scalars: config text, versions, machine, wall times
 
 All that may differ between two runs of one config is in ``run``, so `same_data` can compare the
-rest byte for byte. The file ends in a checksum behind the HDF5 data (see `flocsim.io.files`), is
-checked before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.layout`).
+rest byte for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.pieces`), is
+checked before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
 """
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.files import Rule, checked_sealed, keep, write_by_blocks
+from flocsim.io.files import Rule, checked_sealed, keep
 from flocsim.io.hdf5.structure import structure_of
 from flocsim.io.results.checks import (
     CODED,
@@ -34,7 +34,8 @@ from flocsim.io.results.checks import (
     check_structure,
     check_tables,
 )
-from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION, frame_of, numbers
+from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
+from flocsim.io.results.row_file import ROWS, new_row_file
 from flocsim.io.results.schema import (
     CLASSES,
     DIFFERENCES,
@@ -63,30 +64,23 @@ BLOCK = 262_144
 """Replicates of a condition that are read together."""
 
 
-def write_results(
-    path: str | Path,
-    results: Results,
-    columns: Callable[[str], Iterable[bytes]] | None = None,
-    rule: Rule = keep,
-) -> None:
+def write_results(path: str | Path, results: Results, rule: Rule = keep) -> None:
     """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
 
-    ``columns(name)`` gives the values of a column of the table of replicates as an iterator of
-    bytes, in the order of the file: for tables larger than the memory. Without it, they are taken
-    from ``results.replicates``. ``rule`` says what becomes of a file that is there.
+    ``rule`` says what becomes of a file that is there. A table of replicates that is larger than
+    the memory: `flocsim.io.results.row_file`.
     """
-
-    def in_memory(name):
-        array = results.replicates[name]
-        return [np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()]
-
-    columns = columns or in_memory
-    frame = frame_of(results)
-    streams = [
-        (offset, length, numbers(results.count) if name == "replicate" else columns(name))
-        for offset, length, name in frame.streams
-    ]
-    write_by_blocks(path, frame.image.length, frame.image.blocks(streams), rule)
+    flat = {
+        name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(-1)
+        for name, array in (results.replicates or {}).items()
+    }
+    with new_row_file(path, results, rule) as file:
+        digests = {}
+        for block in range(file.plan.blocks):
+            rows = slice(block * ROWS, (block + 1) * ROWS)
+            columns = {name: values[rows] for name, values in flat.items()}
+            digests[block] = file.write_block(block, columns)
+        file.complete(results, digests)
 
 
 def read_results(path: str | Path, replicates: bool = True) -> Results:

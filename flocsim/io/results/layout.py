@@ -1,12 +1,11 @@
 """How a results file is laid out: its groups, their coordinates, and where large values go.
 
 HDF5 lays out the large datasets and writes all that describes them, into a SparseImage; their
-values go to the disk without it, a block at a time. So memory stays flat, and a full disk is never
+values go to the disk without it (`row_file`). So memory stays flat, and a full disk is never
 met inside HDF5, where it can end the process.
 """
 
 import io
-from collections.abc import Iterable, Iterator
 
 import attrs
 import numpy as np
@@ -27,7 +26,6 @@ from flocsim.io.results.schema import (
 
 FORMAT = "flocsim results"
 SCHEMA_VERSION = 2
-BLOCK_ROWS = 65_536
 
 
 class SparseImage(io.RawIOBase):
@@ -77,15 +75,6 @@ class SparseImage(io.RawIOBase):
             if low < high:
                 found[low - start : high - start] = data[low - place : high - place]
         return bytes(found)
-
-    def blocks(self, streams: Iterable[tuple[int, int, Iterable[bytes]]]) -> Iterator[bytes]:
-        """All bytes in order; ``streams`` are (offset, length, iterator of bytes) of the values."""
-        place = 0
-        for offset, length, values in sorted(streams, key=lambda stream: stream[0]):
-            yield self.content(place, offset)
-            yield from values
-            place = offset + length
-        yield self.content(place, self.length)
 
 
 @attrs.define
@@ -195,9 +184,3 @@ def write_coordinate(group, axis, values):
 def annotate_scale(scale, axis):
     unit, text = COORDINATES[axis]
     scale.attrs.update({"units": unit, "long_name": text})
-
-
-def numbers(count: int) -> Iterator[bytes]:
-    """The bytes of 0, 1, … as they stand in the file, a block at a time."""
-    for first in range(0, count, BLOCK_ROWS):
-        yield np.arange(first, min(first + BLOCK_ROWS, count), dtype="<i8").tobytes()

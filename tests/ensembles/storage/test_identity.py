@@ -18,6 +18,7 @@ NOT_PHYSICS = {
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/files.py": "how files are written",
+    "io/pieces.py": "how files are sealed",
     "io/journal/records.py": "how rows are stored, sealed by checksums",
     "ensembles/config/": "reads values, and these are compared themselves",
     "ensembles/chunks.py": "how rows are stored; the columns are compared on their own",

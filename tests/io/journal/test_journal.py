@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.errors import FileError
-from flocsim.io.files import Old, seal, write_by_blocks
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import (
     CHUNK,
@@ -223,23 +222,3 @@ def test_a_journal_in_memory_reads_what_it_was_given():
     journal = MemoryJournal()
     assert [journal.append(record) for record in RECORDS[:2]] == [0, len(RECORDS[0])]
     assert journal.read(len(RECORDS[0]), len(RECORDS[1])) == RECORDS[1]
-
-
-def test_a_file_written_by_blocks_is_the_file_written_at_once(tmp_path):
-    blocks = [b"\x89HDF\r\n\x1a\n", b"abc" * 1000, b""]
-    data = b"".join(blocks)
-    write_by_blocks(tmp_path / "a.h5", len(data), iter(blocks))
-    assert (tmp_path / "a.h5").read_bytes() == seal(data)
-    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
-
-
-def test_blocks_that_fail_leave_the_old_file(tmp_path):
-    def failing():
-        yield b"abc"
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    (tmp_path / "a.h5").write_bytes(b"old")
-    with pytest.raises(FileError, match="No space left"):
-        write_by_blocks(tmp_path / "a.h5", 100, failing(), lambda _: Old.REPLACED)
-    assert (tmp_path / "a.h5").read_bytes() == b"old"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

@@ -1,0 +1,182 @@
+"""A results file while its rows are written, by several processes at once.
+
+Where each value goes is known before any value (`layout`). Rows are counted through all
+conditions in the order of the file; ROWS of them are a *block*, and the part of a block that lies
+in one column is a piece of the seal (`flocsim.io.pieces`): whoever writes a block seals it as well.
+What is between the columns, and the tables, come last, from the process that began the file; until
+then it starts with a token, by which others know that they see the same file, and is no HDF5 file.
+"""
+
+import contextlib
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from flocsim.errors import FileError
+from flocsim.io.files import Rule, keep, reserve, unfinished
+from flocsim.io.pieces import PIECE, digest_of, seal_of_pieces, seal_size
+from flocsim.io.results.layout import frame_of
+from flocsim.io.results.schema import REPLICATES, Results
+
+ROWS = 32_768
+"""Rows of a block, 3.7 MB."""
+
+NUMBERS = "replicate"
+"""The column of replicates' numbers, which is as long as one condition."""
+
+TOKEN_SIZE = 32
+
+
+@attrs.frozen(eq=False)
+class Plan:
+    """Where everything goes: ``columns`` {name: (offset, bytes of a value, values)}.
+
+    ``size``: bytes of the file without its seal; ``rows``: of all conditions together.
+    """
+
+    size: int
+    rows: int
+    columns: dict[str, tuple[int, int, int]]
+
+    @property
+    def blocks(self) -> int:
+        return -(-self.rows // ROWS)
+
+    def pieces_of(self, block: int) -> list[tuple[str, int, int]]:
+        """(column, first value, values) of a block: which pieces it is made of."""
+        start = block * ROWS
+        ends = ((name, min(start + ROWS, count)) for name, (_, _, count) in self.columns.items())
+        return [(name, start, end - start) for name, end in ends if start < end]
+
+    def cuts(self) -> np.ndarray:
+        """The table (PIECE) of the whole file, without digests; frame and columns in order."""
+        lengths, place = [], 0
+        for offset, size, count in self.in_order():
+            lengths += [offset - place] if offset > place else []
+            lengths += [size * min(ROWS, count - first) for first in range(0, count, ROWS)]
+            place = offset + size * count
+        lengths += [self.size - place] if self.size > place else []
+        table = np.zeros(len(lengths), PIECE)
+        table["length"] = lengths
+        return table
+
+    def in_order(self) -> list[tuple[int, int, int]]:
+        return sorted(self.columns.values())
+
+    def gaps(self) -> Iterator[tuple[int, int]]:
+        """[start, stop) of all that is not in a column."""
+        place = 0
+        for offset, size, count in self.in_order():
+            if offset > place:
+                yield place, offset
+            place = offset + size * count
+        if self.size > place:
+            yield place, self.size
+
+
+def plan_of(frame, rows):
+    """The Plan of a Frame."""
+    kinds = {name: np.dtype(about[0]).itemsize for name, about in REPLICATES.items()}
+    kinds[NUMBERS] = 8
+    columns = {
+        name: (offset, kinds[name], length // kinds[name]) for offset, length, name in frame.streams
+    }
+    return Plan(frame.image.length, rows, columns)
+
+
+@attrs.define(eq=False)
+class RowFile:
+    """An open file to which rows go, by any process that sees it."""
+
+    path: str
+    token: bytes
+    plan: Plan
+    descriptor: int
+
+    def write_block(self, block: int, columns: Mapping[str, np.ndarray]) -> list[bytes]:
+        """Write a block's rows, the values of each column; the digests of its pieces in order."""
+        digests = []
+        for name, first, count in self.plan.pieces_of(block):
+            offset, size, _ = self.plan.columns[name]
+            if name == NUMBERS:
+                values = np.arange(first, first + count, dtype="<i8")
+            else:
+                values = np.ascontiguousarray(columns[name])
+            data = values.reshape(-1).view("u1").data
+            if len(data) != size * count:
+                raise ValueError(f"{name} of block {block} has {len(data)} bytes")
+            write_all(self.descriptor, data, offset + first * size)
+            digests.append(digest_of(data))
+        return digests
+
+    def check_block(self, block: int, digests: list[bytes]) -> bool:
+        """Whether a block stands in the file as it was written."""
+        for (name, first, count), digest in zip(self.plan.pieces_of(block), digests, strict=True):
+            offset, size, _ = self.plan.columns[name]
+            if digest_of(os.pread(self.descriptor, size * count, offset + first * size)) != digest:
+                return False
+        return True
+
+    def sync(self) -> None:
+        os.fsync(self.descriptor)
+
+    def complete(self, results: Results, digests: Mapping[int, list[bytes]]) -> None:
+        """Write all that is not in a column, and the seal; ``digests`` are those of each block."""
+        frame = frame_of(results)
+        plan = plan_of(frame, self.plan.rows)
+        if (plan.size, plan.columns) != (self.plan.size, self.plan.columns):
+            raise ValueError("the tables have moved the columns")
+        table = plan.cuts()
+        starts = np.concatenate([[0], np.cumsum(table["length"][:-1], dtype=np.int64)])
+        number = {int(start): place for place, start in enumerate(starts)}
+        for block, found in digests.items():
+            for (name, first, _), digest in zip(plan.pieces_of(block), found, strict=True):
+                offset, size, _ = plan.columns[name]
+                table["digest"][number[offset + first * size]] = digest
+        for start, stop in plan.gaps():
+            data = frame.image.content(start, stop)
+            table["digest"][number[start]] = digest_of(data)
+            write_all(self.descriptor, memoryview(data), start)
+        write_all(self.descriptor, memoryview(seal_of_pieces(table)), plan.size)
+
+
+def write_all(descriptor: int, data: memoryview, place: int) -> None:
+    while data:
+        written = os.pwrite(descriptor, data, place)
+        data, place = data[written:], place + written
+
+
+@contextlib.contextmanager
+def new_row_file(path: str | Path, draft: Results, rule: Rule = keep) -> Iterator[RowFile]:
+    """A RowFile that takes its place at ``path`` when it is left, or never; FileError.
+
+    ``draft``: Results as they will be, but for the values in tables and columns. The space is
+    taken at once, so that a full disk is found before anything is computed. ``rule`` says what
+    becomes of a file that is there.
+    """
+    frame = frame_of(draft)
+    plan = plan_of(frame, int(np.prod(draft.shape)) * draft.count)
+    with unfinished(path, rule) as new:
+        token = secrets.token_bytes(TOKEN_SIZE)
+        reserve(new.file.fileno(), plan.size + seal_size(len(plan.cuts())))
+        write_all(new.file.fileno(), memoryview(token), 0)
+        yield RowFile(os.fspath(new.path), token, plan, new.file.fileno())
+
+
+@contextlib.contextmanager
+def shared_row_file(path: str, token: bytes, plan: Plan) -> Iterator[RowFile]:
+    """The RowFile that another process has begun; FileError where this one does not see it."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0))
+    except OSError as error:
+        raise FileError(f"{path} cannot be seen here: {error.strerror}") from error
+    try:
+        if os.pread(descriptor, TOKEN_SIZE, 0) != token:
+            raise FileError(f"{path} is another file here: the ranks share no file system")
+        yield RowFile(path, token, plan, descriptor)
+    finally:
+        os.close(descriptor)
