@@ -16,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,24 +40,22 @@ SHARE_OLD = 0.2
 
 
 def made_up_rows(seed, count):
-    """Rows as if of a study: any bytes that fit together."""
-    rng = np.random.default_rng(seed)
+    """Rows as if of a study, any that fit together; fewer are the first of more."""
     rows = np.zeros(count, ROW)
-    for name in COLUMNS:
-        if ROW[name].kind == "f":
-            rows[name] = rng.random(count)
-        elif ROW[name].itemsize > 1:
-            rows[name] = rng.integers(0, 1000, count)
-    rows["outcome"] = rng.integers(0, 6, count)
+    for number, name in enumerate(COLUMNS):
+        drawn = np.random.default_rng([seed, number]).random(count)
+        rows[name] = drawn if ROW[name].kind == "f" else (100.0 * drawn).astype("i8")
+    rows["outcome"] %= 6
     inside = np.array([1, 1, 0, 0, NOT_APPLICABLE, NOT_APPLICABLE], "u1")
     rows["inside"] = inside[rows["outcome"]]
+    rows["failure"] = 0
     return rows
 
 
 def write_study(folder, replicates, first=0, longest=16_384):
     """A folder with a config and the journal of a run that has got all replicates from ``first``.
 
-    Chunks of up to ``longest`` rows, in any order.
+    A condition after the other, its chunks of up to ``longest`` rows in any order.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "study.toml").write_text(
@@ -66,22 +65,19 @@ def write_study(folder, replicates, first=0, longest=16_384):
     identity = identity_of(study)
     key = short(identity)
     rng = random.Random(replicates)
-    chunks = []
-    for place in range(len(study.conditions)):
-        start = first
-        while start < replicates:
-            stop = min(start + rng.randint(1, longest), replicates)
-            chunks.append((place, start, stop))
-            start = stop
-    rng.shuffle(chunks)
     session = {"identity": identity, "short": key, "layout": layout(), "date": "",
                "command": "", "cpus": []}  # fmt: skip
-    every = {place: made_up_rows(place, replicates) for place in range(len(study.conditions))}
     with open(journal_path(folder / "study.h5"), "wb") as file:
         file.write(encode(SESSION, session))
-        for place, start, stop in chunks:
-            rows = every[place][start:stop]
-            file.write(chunk_record(study.conditions[place], start, rows, key))
+        for place, condition in enumerate(study.conditions):
+            rows = made_up_rows(place, replicates)
+            starts = [first]
+            while starts[-1] < replicates:
+                starts.append(min(starts[-1] + rng.randint(1, longest), replicates))
+            chunks = list(pairwise(starts))
+            rng.shuffle(chunks)
+            for start, stop in chunks:
+                file.write(chunk_record(condition, start, rows[start:stop], key))
     return folder
 
 

@@ -12,7 +12,7 @@ from flocsim.ensembles.report import format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, FileError, visible
-from flocsim.io.results.file import OUTCOMES, read_results, replicate_totals
+from flocsim.io.results.file import OUTCOMES, read_overview, read_results
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
@@ -40,10 +40,11 @@ def run(args: Namespace) -> int:
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
-    results = read_results(args.results, replicates=False)
     if not args.config:
-        print(results_text(args.results, results, replicate_totals(args.results)))
-    elif results.run.get("config"):
+        print(results_text(args.results, *read_overview(args.results)))
+        return 0
+    results = read_results(args.results, replicates=False)
+    if results.run.get("config"):
         sys.stdout.write(str(results.run["config"]))
     else:
         raise FileError(f"{args.results} holds no config: it was not written by flocsim ensemble")

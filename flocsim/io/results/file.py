@@ -54,8 +54,8 @@ __all__ = [
     "REPLICATES",
     "TABLE",
     "Results",
+    "read_overview",
     "read_results",
-    "replicate_totals",
     "same_data",
     "write_results",
 ]
@@ -90,24 +90,39 @@ def read_results(path: str | Path, replicates: bool = True) -> Results:
     on the disk.
     """
     with opened(path) as file:
-        table, rows = file["probabilities"], file["replicates"]
-        results = Results(
-            types=table["type"].asstr()[()],
-            vertices=table["vertices"][()],
-            delta=table["delta"][()],
-            replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
-            probabilities={name: table[name][()] for name in TABLE},
-            run={name: read_scalar(dataset) for name, dataset in file["run"].items()},
-            failures=rows["failure"].attrs["flag_meanings"].split(),
-            flocs=file["flocs/floc"].asstr()[()] if "flocs" in file else (),
-            pooled=read_group(file, "pooled", POOLED),
-            differences=read_group(file, "differences", DIFFERENCES),
-            count=len(rows["replicate"]),
-        )
-        check_tables(results)
-        if results.replicates is not None:
-            check_rows(results.replicates.__getitem__, len(results.failures), len(results.flocs))
-        return results
+        return results_in(file, replicates)
+
+
+def read_overview(path: str | Path) -> tuple[Results, "Totals"]:
+    """The Results in a file without its table of replicates, and the Totals of that table.
+
+    For files larger than the memory; FileError as `read_results`.
+    """
+    with opened(path) as file:
+        results = results_in(file, replicates=False)
+        return results, totals_in(file["replicates"], len(results.failures))
+
+
+def results_in(file, replicates):
+    """The Results in an open file."""
+    table, rows = file["probabilities"], file["replicates"]
+    results = Results(
+        types=table["type"].asstr()[()],
+        vertices=table["vertices"][()],
+        delta=table["delta"][()],
+        replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
+        probabilities={name: table[name][()] for name in TABLE},
+        run={name: read_scalar(dataset) for name, dataset in file["run"].items()},
+        failures=rows["failure"].attrs["flag_meanings"].split(),
+        flocs=file["flocs/floc"].asstr()[()] if "flocs" in file else (),
+        pooled=read_group(file, "pooled", POOLED),
+        differences=read_group(file, "differences", DIFFERENCES),
+        count=len(rows["replicate"]),
+    )
+    check_tables(results)
+    if results.replicates is not None:
+        check_rows(results.replicates.__getitem__, len(results.failures), len(results.flocs))
+    return results
 
 
 def read_group(file, name, schema):
@@ -141,20 +156,25 @@ class Totals:
         self.rejected += int(rejected.sum())
 
 
-def replicate_totals(path: str | Path) -> Totals:
-    """The Totals of a file, which may be larger than the memory; FileError as `read_results`."""
-    with opened(path) as file:
-        rows = file["replicates"]
-        reasons = len(rows["failure"].attrs["flag_meanings"].split())
-        totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
-        *shape, count = rows["outcome"].shape
-        for place in np.ndindex(*shape):
-            for first in range(0, count, BLOCK):
-                part = (*place, slice(first, first + BLOCK))
-                columns = {name: rows[name][part] for name in CODED}
-                check_codes(columns, reasons)
-                totals.add(*columns.values())
-        return totals
+def totals_in(rows, reasons):
+    """The Totals of an open table of replicates with so many reasons of failure."""
+    totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
+    for part in parts_of(rows["outcome"].shape):
+        columns = {name: rows[name][part] for name in CODED}
+        check_codes(columns, reasons)
+        totals.add(*columns.values())
+    return totals
+
+
+def parts_of(shape):
+    """Places of an array's values, some of one condition at a time; () of a single value."""
+    if not shape:
+        yield ()
+        return
+    *outer, count = shape
+    for place in np.ndindex(*outer):
+        for first in range(0, count, BLOCK):
+            yield (*place, slice(first, first + BLOCK))
 
 
 @contextlib.contextmanager
@@ -216,13 +236,18 @@ def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
     """
 
     def content(dataset):
-        values = dataset[()]
-        stored = values.tolist() if values.dtype.kind == "O" else values.tobytes()
-        return values.shape, str(values.dtype), stored
+        """Its values, some at a time: all of a file may be larger than the memory."""
+        for part in parts_of(dataset.shape):
+            values = dataset[part]
+            yield values.tolist() if dataset.dtype.kind == "O" else values.tobytes()
+
+    def agree(one, other):
+        if (one.shape, str(one.dtype)) != (other.shape, str(other.dtype)):
+            return False
+        pairs = zip(content(one), content(other), strict=True)
+        return all(mine == yours for mine, yours in pairs)
 
     with opened(path_a) as a, opened(path_b) as b:
         names = {f"{group}/{name}" for file in (a, b) for group in file if group != "run"
                  for name in file[group]}  # fmt: skip
-        return sorted(
-            n for n in names if n not in a or n not in b or content(a[n]) != content(b[n])
-        )
+        return sorted(n for n in names if n not in a or n not in b or not agree(a[n], b[n]))

@@ -1,0 +1,308 @@
+"""The results file made by several ranks: the same bytes, and nothing believed that is not seen."""
+
+import os
+import queue
+import random
+import subprocess
+import sys
+import tempfile
+import threading
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.faults.assembly import finish_here, kill_once, prepare, write_study
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.estimates.summary import Reader, sums_of
+from flocsim.ensembles.parallel import assembly
+from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
+from flocsim.ensembles.parallel.messages import ExitCode
+from flocsim.ensembles.runner import results_of
+from flocsim.ensembles.storage.identity import identity_of
+from flocsim.ensembles.storage.resume import RESUME, begin
+from flocsim.ensembles.study import Study
+from flocsim.errors import FileError, FlocsimError
+from flocsim.io.journal.journal import journal_path
+from flocsim.io.results import row_file
+from flocsim.io.results.file import same_data
+from flocsim.io.results.row_file import RowFile, new_row_file, shared_row_file
+from tests.helpers.small_study import mpirun, run_command
+
+REPLICATES = 12_000
+"""Of ten conditions: four blocks, the last one short."""
+
+
+class Threads(Communicator):
+    """Ranks that are threads of this process."""
+
+    def __init__(self, rank, size, queues):
+        super().__init__()
+        self.rank, self.size, self.queues = rank, size, queues
+        self.sent = []
+
+    def send(self, to, message):
+        self.sent.append(message)
+        self.queues[self.rank, to].put(message)
+
+    def arrived(self):
+        for source in range(self.size):
+            waiting = self.queues[source, self.rank]
+            while not waiting.empty():
+                yield source, waiting.get()
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """{name: folder} of a study whose rows are all in a journal, and of one that is extended."""
+    return prepare(tmp_path_factory.mktemp("assembly"), REPLICATES)
+
+
+@pytest.fixture(scope="module")
+def reference(folders, tmp_path_factory):
+    """The results of one process."""
+    return finish_here(copied(folders["new file"], tmp_path_factory.mktemp("reference")))
+
+
+def copied(folder, to):
+    """A copy of a study's folder."""
+    for path in folder.iterdir():
+        (to / path.name).write_bytes(path.read_bytes())
+    return to
+
+
+@cache
+def study_and_identity(text):
+    """Of a config's text."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "study.toml")
+        path.write_text(text)
+        study = Study(load_config(path))
+    return study, identity_of(study)
+
+
+def assemble(folder, ranks):
+    """Make the results of a folder's study by threads: (file, warnings, what rank 0 sent)."""
+    study, identity = study_and_identity((folder / "study.toml").read_text())
+    queues = {(a, b): queue.SimpleQueue() for a in range(ranks) for b in range(ranks)}
+    comms = [Threads(rank, ranks, queues) for rank in range(ranks)]
+    others = [threading.Thread(target=assembly.assist, args=(study, each)) for each in comms[1:]]
+    for thread in others:
+        thread.start()
+    warnings = []
+    try:
+        start = begin(study, identity, folder / "study.h5", RESUME)
+        with start.resources:
+            reader = Reader(start.store, study.shape)
+            draft = results_of(study, REPLICATES, sums_of(reader, 0, 0), {"note": "same"})
+            with new_row_file(folder / "made.h5", draft) as file:
+                sums, digests = assembly.assemble(
+                    reader, file, comms[0], study.conditions, warnings.append
+                )
+                file.complete(results_of(study, REPLICATES, sums, {"note": "same"}), digests)
+    finally:
+        sent = list(comms[0].sent)
+        comms[0].broadcast(ExitCode(0))
+        for thread in others:
+            thread.join()
+    return folder / "made.h5", warnings, sent
+
+
+@pytest.fixture(scope="module")
+def by_one_rank(folders, tmp_path_factory):
+    """What `assemble` makes with one rank."""
+    return assemble(copied(folders["new file"], tmp_path_factory.mktemp("one")), 1)[0]
+
+
+@pytest.mark.parametrize("name", ["new file", "extended file"])
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4, 7])
+def test_any_number_of_ranks_writes_the_same_file(
+    folders, reference, by_one_rank, tmp_path, name, ranks
+):
+    made, warnings, sent = assemble(copied(folders[name], tmp_path), ranks)
+    assert same_data(made, reference) == []
+    assert warnings == []
+    shares = [each for each in sent if isinstance(each, assembly.Share)]
+    assert len(shares) == min(ranks - 1, 4)
+    written = [share.task.blocks for share in shares if share.task.blocks != (0, 0)]
+    assert [written[0][0], written[-1][1]] == [4 // ranks or 1, 4] if written else ranks == 1
+    assert made.read_bytes() == by_one_rank.read_bytes()
+
+
+def test_few_ranks_have_all_to_do_and_many_have_some():
+    tasks = assembly.cut(rows=10**8, replicates=10**6, blocks=3052, ranks=10_000)
+    for part in ("blocks", "counted"):
+        found = [getattr(task, part) for task in tasks if np.diff(getattr(task, part))[0]]
+        ends = sorted(found)
+        whole = 3052 if part == "blocks" else 10**6
+        assert [ends[0][0], ends[-1][1]] == [0, whole]
+        assert all(one[1] == other[0] for one, other in pairwise(ends))
+    assert not any(np.diff(task.blocks)[0] and np.diff(task.counted)[0] for task in tasks)
+
+
+@pytest.mark.parametrize("words", [["--jobs", 3], [], None])
+def test_the_command_writes_the_same_bytes(folders, reference, tmp_path, words):
+    folder = copied(folders["extended file"], tmp_path)
+    more = {"ranks": 3} if words == [] else {}
+    done = run_command(folder, "study.toml", "--resume", "--quiet", *(words or []), **more)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert same_data(folder / "study.h5", reference) == []
+    assert sorted(path.name for path in folder.iterdir()) == ["study.h5", "study.toml"]
+
+
+def test_without_a_common_file_system_rank_0_does_it_alone(
+    folders, reference, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(row_file, "TOKEN_SIZE", 16)
+
+    def elsewhere(path, token, plan):
+        return shared_row_file(path, bytes(16), plan)
+
+    monkeypatch.setattr(assembly, "shared_row_file", elsewhere)
+    made, warnings, _ = assemble(copied(folders["new file"], tmp_path), 3)
+    assert same_data(made, reference) == []
+    [line] = warnings
+    assert "2 of 3 ranks could not write their share of the results" in line
+    assert "the ranks share no file system" in line
+
+
+def test_a_file_of_another_job_is_not_written_to(tmp_path):
+    path = tmp_path / "x"
+    path.write_bytes(b"of another job" * 10)
+    plan = row_file.Plan(0, 0, {})
+    (tmp_path / "link").symlink_to(path)
+    cases = [("x", bytes(32), "share no file system"), ("absent", bytes(32), "cannot be seen here"),
+             ("link", path.read_bytes()[:32], "cannot be seen here")]  # fmt: skip
+    for name, token, said in cases:
+        with pytest.raises(FileError, match=said), shared_row_file(tmp_path / name, token, plan):
+            pass
+
+
+class Elsewhere:
+    """The machine's name: another for each thread."""
+
+    @staticmethod
+    def node():
+        return threading.current_thread().name
+
+
+def test_what_another_machine_has_written_is_read_before_it_is_believed(
+    folders, reference, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(assembly, "platform", Elsewhere)
+    write, lost = RowFile.write_block, []
+
+    def lose_one(file, block, columns):
+        found = write(file, block, columns)
+        if block == 2 and not lost and threading.current_thread() is not threading.main_thread():
+            lost.append(block)
+            os.pwrite(file.descriptor, bytes(100), file.plan.columns["steps"][0] + 8 * 70_000)
+        return found
+
+    monkeypatch.setattr(RowFile, "write_block", lose_one)
+    made, warnings, sent = assemble(copied(folders["new file"], tmp_path), 3)
+    assert lost == [2]
+    assert len([each for each in sent if isinstance(each, assembly.Check)]) == 2
+    assert same_data(made, reference) == []
+    assert warnings == []
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monkeypatch, ranks):
+    folder = copied(folders["new file"], tmp_path)
+    path = journal_path(folder / "study.h5")
+    begun = assembly.cut
+
+    def damage(*words, **more):
+        with open(path, "r+b") as file:
+            file.seek(path.stat().st_size // 2)
+            byte = file.read(1)
+            file.seek(-1, os.SEEK_CUR)
+            file.write(bytes([byte[0] ^ 4]))
+        return begun(*words, **more)
+
+    monkeypatch.setattr(assembly, "cut", damage)
+    size = path.stat().st_size
+    with pytest.raises(FileError, match=f"{path.name} is damaged from byte"):
+        assemble(folder, ranks)
+    assert path.stat().st_size >= size
+    names = sorted(each.name for each in folder.iterdir())
+    assert names == ["study.h5.journal", "study.toml"]
+
+
+def test_counts_that_differ_from_what_was_written_are_told(folders, tmp_path, monkeypatch):
+    def one_more(reader, first, stop):
+        sums = sums_of(reader, first, stop)
+        sums["n_missed"][0, 0, 0] += 1
+        return sums
+
+    monkeypatch.setattr(assembly, "sums_of", one_more)
+    with pytest.raises(FlocsimError, match=r"n_missed of .* the journal is not read alike"):
+        assemble(copied(folders["new file"], tmp_path), 2)
+    assert not (tmp_path / "made.h5").exists()
+
+
+def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path, monkeypatch):
+    folder = copied(folders["extended file"], tmp_path)
+    found = assembly.old_columns
+
+    def other(table):
+        columns = found(table)
+        with open(folder / "study.h5", "ab") as file:
+            file.write(b"?")
+        return columns
+
+    monkeypatch.setattr(assembly, "old_columns", other)
+    made, [line], _ = assemble(folder, 2)
+    assert "study.h5 is another file here" in line
+    assert made.exists()
+
+
+def test_a_signal_ends_it_and_leaves_nothing_behind(folders, tmp_path, monkeypatch):
+    folder = copied(folders["new file"], tmp_path)
+    monkeypatch.setattr(assembly, "stop_requested", lambda: True)
+    before = journal_path(folder / "study.h5").read_bytes()
+    with pytest.raises(StopRequested):
+        assemble(folder, 3)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "study.h5.journal", "study.toml",
+    ]  # fmt: skip
+    assert journal_path(folder / "study.h5").read_bytes().startswith(before)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("new file", "mpirun -n 2"), ("extended file", "--jobs 2")]
+)
+def test_a_kill_while_the_file_is_made_loses_nothing(folders, reference, name, kind):
+    if kind.startswith("mpirun"):
+        mpirun()
+    found = kill_once(folders[name], kind, "group", random.Random(1), 0.01, reference)
+    problem, _, hung, _ = found
+    assert (problem, hung) == ("", False)
+
+
+PEAKS = """\
+import contextlib, io, resource, sys
+from flocsim.__main__ import main
+from flocsim.commands.plot import read_content
+from flocsim.io.results.file import same_data
+
+for path in sys.argv[1:]:
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert main(["info", path]) == 0
+    read_content(path)
+    assert same_data(path, path) == []
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+def test_readers_of_a_large_file_take_no_more_memory_than_of_a_small_one(reference, tmp_path):
+    large = finish_here(write_study(tmp_path, 5 * REPLICATES))
+    done = subprocess.run(
+        [sys.executable, "-c", PEAKS, reference, large], capture_output=True, text=True, check=True
+    )
+    before, after = map(float, done.stdout.split())
+    assert large.stat().st_size > 50e6
+    assert after - before < 12.0
