@@ -91,6 +91,12 @@ def listens(pid):
     return False
 
 
+def errors_of(folder):
+    """Where what a job says on stderr goes: not to its own disk, which may be full. There mpirun
+    cannot write either, and ends with 255 whatever its ranks end with."""
+    return folder.with_name(f"{folder.name}-errors.txt")
+
+
 @attrs.define
 class Job:
     """A running study in its folder."""
@@ -103,7 +109,7 @@ class Job:
     @classmethod
     def start(cls, folder, kind, **more):
         """Start the study in a way; ``more`` are options of Popen."""
-        errors = open(folder / "errors.txt", "w+b")  # noqa: SIM115 (closed by `finish`)
+        errors = open(errors_of(folder), "w+b")  # noqa: SIM115 (closed by `finish`)
         process = subprocess.Popen(
             command(kind), cwd=folder, stdout=subprocess.DEVNULL, stderr=errors,
             start_new_session=True, **more,

@@ -6,9 +6,9 @@ import time
 import attrs
 import numpy as np
 
+from benchmarks.speed.assembly_costs import BANDWIDTHS
 from flocsim.ensembles.chunks import ROW, Condition, chunk_record
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.summary import Reader, summarize
 from flocsim.ensembles.parallel.communicator import SLEEP
 from flocsim.ensembles.parallel.messages import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, chunk_seconds
@@ -51,12 +51,10 @@ class Costs:
 
 @attrs.frozen
 class RankZeroCosts:
-    """``answer`` [s] to take in a chunk and hand out another; ``rows`` written, ``assembly``: rows
-    made into a results file [1/s]."""
+    """``answer`` [s] to take in a chunk and hand out another; ``rows`` written [1/s]."""
 
     answer: float
     rows: float
-    assembly: float
 
 
 def measure_costs(count):
@@ -102,29 +100,7 @@ def measure_rank_zero(folder):
         store.journal.sync()
         rates[rows] = (time.perf_counter() - began) / count
     per_row = (rates[8192] - rates[1]) / 8191
-    return RankZeroCosts(rates[1], 1.0 / per_row, measure_assembly(store, folder))
-
-
-def measure_assembly(store, folder):
-    """Rows per second that rank 0 makes into tables and columns."""
-    from flocsim.io.files import write_by_blocks
-
-    count, rows = 200_000, np.zeros(8192, ROW)
-    rows["inside"] = 1  # all of them of class A
-    record = chunk_record(store.conditions[0], 0, rows, "key")
-    for first in range(0, count + 8192, 8192):
-        offset = store.journal.append(record)
-        start = offset + len(record) - 8192 * ROW_SIZE
-        store.add(0, first, first + 8192, start, data_digest(record))
-    began = time.perf_counter()
-    reader = Reader(store, (1, 1, 1, count))
-    reader.known = [np.sort(store.entries[0][60 : store.counts[0]], order="first")]
-    parts = (block for name in ROW.names for block in reader.column(name))
-    write_by_blocks(folder / "columns", count * ROW_SIZE, parts)
-    written = time.perf_counter() - began
-    began = time.perf_counter()
-    summarize(reader)
-    return count / (written + time.perf_counter() - began)
+    return RankZeroCosts(rates[1], 1.0 / per_row)
 
 
 def run_length(cost, chunk, seconds, rng):
@@ -141,7 +117,7 @@ def run_length(cost, chunk, seconds, rng):
     return done, took * done / count
 
 
-def simulate(ranks, replicates, costs, rank_zero):
+def simulate(ranks, replicates, costs, rank_zero, assembly):
     """A row of the table: a study of so many replicates on so many ranks."""
     rng = np.random.default_rng(ranks)
     every = [np.array(each) for each in costs.conditions]
@@ -150,21 +126,23 @@ def simulate(ranks, replicates, costs, rank_zero):
     seconds = chunk_seconds(ranks)
     # (time at which a request arrives, rank, its chunk, how much of that is done)
     requests = [(LATENCY, rank, None, 0) for rank in range(ranks)]
-    free, busy, work, idle = 0.0, 0.0, 0.0, []
+    free, busy, work, idle, chunks = 0.0, 0.0, 0.0, [], 0
     while requests:
         now, rank, chunk, done = heapq.heappop(requests)
         served = rank_zero.answer + done / rank_zero.rows
         free, busy = max(now, free) + served, busy + served
         if chunk is not None:
             schedule.give_back(chunk, done)
+            chunks += 1
         idle.append(rank)
         while idle and (new := schedule.take()) is not None:
             count, took = run_length(every[new.condition], new, seconds, rng)
             work += took
             heapq.heappush(requests, (free + took + 2.0 * LATENCY, idle.pop(), new, count))
-    assembly = per_condition * len(every) / rank_zero.assembly
     ideal = work / ranks
+    parts = assembly.parts(ranks, len(every), per_condition, chunks)
+    ends = [free + parts.total(speed) for speed in BANDWIDTHS]
     return (
-        ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free, assembly,
-        ideal / (free + assembly),
+        ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free,
+        parts.rank_zero, parts.others, *(ideal / end for end in ends),
     )  # fmt: skip

@@ -5,6 +5,7 @@ it: a damaged HDF5 file can crash its reader or keep it busy for ever, a wrong c
 """
 
 import contextlib
+import ctypes
 import enum
 import errno
 import hashlib
@@ -27,6 +28,9 @@ SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
 DAMAGED = "is damaged, its checksum is wrong: use a copy or run it again"
 BLOCK = 2**20
 """Bytes that are read at a time."""
+
+NO_SPACE_TAKEN = {errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
+"""What file systems answer that cannot take the space of a file beforehand."""
 
 UNFINISHED = ".unfinished"
 """How the name of a file that is still being written ends."""
@@ -250,15 +254,21 @@ def set_aside(path: str | os.PathLike) -> Path | None:
 
 
 def reserve(descriptor, size):
-    """Take the space of a file on the disk, where the system can; OSError where it is full."""
-    if not hasattr(os, "posix_fallocate"):
-        return
+    """Take the space of a file on the disk, where the system can; OSError where it is full.
+
+    Not by posix_fallocate, which writes a byte to every block where the file system cannot.
+    """
     try:
-        os.posix_fallocate(descriptor, 0, size)
-    except OSError as error:
-        # Some file systems cannot; then a full disk shows when it is written to.
-        if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
-            raise
+        fallocate = ctypes.CDLL(None, use_errno=True).fallocate
+    except (AttributeError, OSError, TypeError):
+        return
+    fallocate.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64)
+    while fallocate(descriptor, 0, 0, size):
+        number = ctypes.get_errno()
+        if number in NO_SPACE_TAKEN:
+            return  # a full disk shows when it is written to
+        if number != errno.EINTR:
+            raise OSError(number, os.strerror(number))
 
 
 def seal_of(digest):

@@ -20,13 +20,13 @@ from flocsim.ensembles.estimates.statistics import checked_codes, count
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
-from flocsim.ensembles.storage.row_store import RowStore, near
+from flocsim.ensembles.storage.row_store import RowStore, longest, near
 from flocsim.ensembles.storage.shared_rows import OldColumns, ReadOnlyJournal, old_columns
 from flocsim.errors import FlocsimError
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file
 
-COUNTED_ROWS = 262_144
+COUNTED_ROWS = 524_288
 """Rows for whose sums a rank is asked, at least: an answer has as many numbers as many ranks'."""
 
 
@@ -187,8 +187,8 @@ def share_of(count, number, of):
     return (count * number // of, count * (number + 1) // of) if number < of else (0, 0)
 
 
-def known_in(task: Task, reader: Reader) -> dict[int, np.ndarray]:
-    """Where the rows lie that a Task needs, by condition."""
+def known_in(task: Task, reader: Reader, lengths: Sequence[int]) -> dict[int, np.ndarray]:
+    """Where the rows lie that a Task needs, by condition; ``lengths``: of the longest chunks."""
     replicates = reader.shape[-1]
     total = replicates * len(reader.known)
     first, stop = (min(block * ROWS, total) for block in task.blocks)
@@ -197,7 +197,9 @@ def known_in(task: Task, reader: Reader) -> dict[int, np.ndarray]:
         for place in range(len(reader.known)):
             low, high = wanted.get(place, task.counted)
             wanted[place] = min(low, task.counted[0]), max(high, task.counted[1])
-    return {place: near(reader.known[place], *each) for place, each in wanted.items()}
+    return {
+        place: near(reader.known[place], *each, lengths[place]) for place, each in wanted.items()
+    }
 
 
 def assemble(
@@ -212,12 +214,13 @@ def assemble(
     old = old_columns(store.old) if store.old is not None else None
     alone = comm.size == 1 or (store.old is not None and old is None)
     tasks = cut(file.plan.rows, replicates, file.plan.blocks, 1 if alone else comm.size)
-    asked = []
+    asked, lengths = [], [longest(known) for known in reader.known]
     for rank, task in enumerate(tasks):
         if rank and task != Task((0, 0), (0, 0)):
             asked.append(rank)
+            known = known_in(task, reader, lengths)
             comm.send(rank, Share(
-                task, file.path, file.token, file.plan, reader.shape, known_in(task, reader),
+                task, file.path, file.token, file.plan, reader.shape, known,
                 os.fspath(Path(store.journal.path).resolve()), old, platform.node(),
             ))  # fmt: skip
     answers = {0: carry_out(tasks[0], reader, file, stop_requested)}

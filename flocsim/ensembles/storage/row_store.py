@@ -170,7 +170,15 @@ class RowStore:
         return self.held[offset]
 
 
-def near(known: np.ndarray, first: int, stop: int) -> np.ndarray:
-    """Those of the entries of a condition, in order, that may hold some of [first, stop)."""
-    longest = int(np.max(known["stop"] - known["first"], initial=0))
-    return known[slice(*np.searchsorted(known["first"], (first - longest, stop)))]
+def longest(known: np.ndarray) -> int:
+    """Replicates of the longest of the entries of a condition."""
+    return int(np.max(known["stop"] - known["first"], initial=0))
+
+
+def near(known: np.ndarray, first: int, stop: int, length: int | None = None) -> np.ndarray:
+    """Those of the entries of a condition, in order, that may hold some of [first, stop).
+
+    ``length``: that of the longest, where it is known.
+    """
+    length = longest(known) if length is None else length
+    return known[slice(*known["first"].searchsorted((first - length, stop)))]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.faults import damage
-from benchmarks.faults.job import Job, Tally, make_study, run_here, verdict
+from benchmarks.faults.job import Job, Tally, errors_of, make_study, run_here, verdict
 from tests.helpers.small_study import mpirun
 
 
@@ -55,7 +55,7 @@ def test_a_signal_ends_with_75_and_a_journal(root, reference, kind, sign):
     started = job(folder, kind)
     code, _ = started.finish(started.send(sign, "launcher", random.Random(1)))
     assert code == 75
-    errors = (folder / "errors.txt").read_text()
+    errors = errors_of(folder).read_text()
     assert f"stopped by {sign.name}" in errors
     assert "Traceback" not in errors
     assert verdict(folder, reference) == ""
@@ -68,7 +68,7 @@ def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
     started = Job.start(folder, kind, preexec_fn=limit)
     code, _ = started.finish([started.process.pid])
     assert code == 74
-    errors = (folder / "errors.txt").read_text()
+    errors = errors_of(folder).read_text()
     assert len(errors.splitlines()) == 1
     assert "study.h5.journal could not be written: File too large" in errors
     assert verdict(folder, reference) == ""
