@@ -16,7 +16,6 @@ from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import Journal
-from flocsim.io.journal.records import data_digest
 from flocsim.io.results.schema import ROW_SIZE
 
 LATENCY = SLEEP + 1e-4

@@ -28,8 +28,11 @@ table = xarray.open_dataset("study.h5", group="probabilities", engine="h5netcdf"
 table["pr_a"].sel(type="I", vertices=64, delta=0.5)
 ```
 
-The file ends in a blake2b-256 checksum behind the HDF5 data, where HDF5 ignores it; flocsim checks
-it before HDF5 parses anything. All that may differ between two runs of one config is in the group
+Behind the HDF5 data, where HDF5 ignores them, stand blake2b-256 checksums: a table of the pieces
+that make up the file, each with its length (u8) and its digest (32 bytes), then a line with the
+number of pieces and the digest of the table, both in hexadecimal. flocsim checks all of it, a
+piece at a time, before HDF5 parses anything. (Files of earlier versions have one checksum, and are
+read as well.) All that may differ between two runs of one config is in the group
 `run`: the bytes of every other dataset are the same for any number of ranks, after any number of
 interruptions, on processors of one kind ([cluster.md](cluster.md) says what differs between kinds).
 (This page is made from the schema by `python -m flocsim.io.results.page`.)
