@@ -15,8 +15,11 @@ from flocsim.ensembles.parallel.heartbeat import Heartbeat
 from flocsim.errors import FlocsimError
 from flocsim.interruption import INTERRUPTION, LAUNCHER_RANKS, stop_requested
 
-LAUNCHER_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS")
-"""Environment variables in which launchers tell a process how many ranks there are."""
+LAUNCHER_SIZES = (
+    "PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
+)  # fmt: skip
+"""Environment variables in which launchers tell a process how many ranks there are. Slurm's is the
+last: where mpirun runs inside a step, it counts mpirun's own helpers."""
 
 SLEEP = 5e-4
 """Seconds between two looks for a message."""
@@ -163,7 +166,7 @@ def launched_size() -> int | None:
 
 def launched_rank() -> int:
     """This process's rank according to its launcher, 0 without one; needs no MPI library."""
-    said = [os.environ.get(name, "") for name in LAUNCHER_RANKS]
+    said = [os.environ.get(name, "") for name in (*LAUNCHER_RANKS, "SLURM_PROCID")]
     return next((int(rank) for rank in said if rank.isdigit()), 0)
 
 

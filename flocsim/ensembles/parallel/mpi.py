@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.parallel.communicator import Communicator, launched_rank
 from flocsim.errors import UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, end_with_parent
 
@@ -65,10 +65,12 @@ class MpiCommunicator(Communicator):
         self.concurrent = self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE
         self.given: dict[int, Any] = {}
         if launched is not None and launched != self.size:
+            if launched_rank() > 0:
+                raise SystemExit(UsageError.exit_code)  # the first says it for all
             raise UsageError(
                 f"the launcher started {launched} ranks but MPI counts {self.size}: mpirun and the "
                 "MPI library that mpi4py uses are of different kinds; use the mpirun beside this "
-                "Python"
+                "Python, or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix (Open MPI)"
             )
         INTERRUPTION.speaks = self.rank == 0
         if self.concurrent:

@@ -268,6 +268,19 @@ def test_a_launcher_of_another_kind_is_found_out(tmp_path, monkeypatch):
     assert "the launcher started 2 ranks but MPI counts 1" in line
 
 
+@pytest.mark.parametrize(("rank", "lines"), [("0", 1), ("1", 0)])
+def test_tasks_of_srun_that_are_no_ranks_do_not_run_side_by_side(
+    tmp_path, no_launcher, rank, lines
+):
+    mpirun()
+    write_small(tmp_path)
+    env = os.environ | {"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": rank}
+    done = run_command(tmp_path, "small.toml", env=env, timeout=60)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, lines)
+    assert lines == 0 or "or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
 def test_mpi_that_cannot_be_loaded_says_what_to_install(tmp_path):
     write_small(tmp_path)
     (tmp_path / "mpi4py.py").write_text("raise RuntimeError('cannot load MPI library')\n")
@@ -281,7 +294,7 @@ def test_mpi_that_cannot_be_loaded_says_what_to_install(tmp_path):
 @pytest.fixture
 def no_launcher(monkeypatch):
     """An environment without any launcher's variables."""
-    for name in LAUNCHER:
+    for name in (*LAUNCHER, "SLURM_PROCID"):
         monkeypatch.delenv(name, raising=False)
     return monkeypatch
 
@@ -290,6 +303,8 @@ def test_who_launched_this_process(no_launcher):
     assert (launched_size(), launched_rank()) == (0, 0)
     no_launcher.setenv("PMI_RANK", "3")
     assert (launched_size(), launched_rank()) == (None, 3)
+    no_launcher.setenv("SLURM_STEP_NUM_TASKS", "2")
+    assert launched_size() == 2
     no_launcher.setenv("PMI_SIZE", "4")
     assert launched_size() == 4
 
