@@ -75,6 +75,7 @@ INNER_ROWS = {
             "markdown",
             "terminal",
         ],
+        ["pieces"],
     ],
 }
 
