@@ -176,7 +176,7 @@ def main():
     """Print the table; exit code 1 if anything was wrong."""
     seed = {"type": int, "default": 1, "help": "of the damages"}
     arguments = parse_arguments(__doc__, seed=seed)
-    print_heading(("numba", "llvmlite"))
+    print_heading()
     rng = np.random.default_rng(arguments.seed)
     table = Table(
         "Damaged caches", ("way", "times", "same rows, nothing run", "hangs", "slowest [s]")

@@ -89,7 +89,7 @@ def why_unsafe(folder: Path) -> str:
         return ""  # Windows keeps a user's folders by other means
     home = home_folder()
     for each in (folder, *folder.parents):
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        with contextlib.suppress(OSError):  # what cannot be seen cannot be loaded either
             found = os.lstat(each)
             if not is_ours(found):
                 return (
@@ -124,9 +124,9 @@ def folders() -> Iterator[Path]:
 
 def is_writable(folder: Path) -> bool:
     """Whether files can be put into a folder, or it can be made."""
-    while not folder.exists() and folder != folder.parent:
+    while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
-    return not folder.is_dir() or os.access(folder, os.W_OK | os.X_OK)
+    return not os.path.isdir(folder) or os.access(folder, os.W_OK | os.X_OK)
 
 
 def file_name(name: str, key: str) -> str:
@@ -189,7 +189,7 @@ def write(name: str, key: str, data: bytes) -> None:
 
 def make_folder(folder):
     """Make a folder and those above that are missing, writable by this user alone."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         make_folder(folder.parent)
         with contextlib.suppress(FileExistsError):
             os.mkdir(folder, 0o755)

@@ -186,6 +186,28 @@ def test_what_belongs_to_others_is_refused(folder):
         assert read("law", "key") is None
 
 
+@only_root
+def test_a_folder_that_cannot_even_be_looked_into_is_one_line(folder, tmp_path, monkeypatch):
+    closed = tmp_path / "closed"
+    closed.mkdir(0o700)
+    monkeypatch.setenv("FLOCSIM_CACHE", str(closed / "cache"))
+    os.seteuid(NOBODY)
+    try:
+        with pytest.warns(UserWarning, match="no compiled code is kept") as caught:
+            assert read("law", "key") is None
+            write("law", "key", b"code")
+    finally:
+        os.seteuid(0)
+    assert len(said(caught)) == 1
+
+
+def test_a_name_that_no_folder_can_have_is_one_line(folder, monkeypatch):
+    monkeypatch.setenv("FLOCSIM_CACHE", str(folder / ("x" * 300)))
+    with pytest.warns(UserWarning, match="cannot be written") as caught:
+        assert answer() == 7.0
+    assert len(said(caught)) == 1
+
+
 def test_a_file_that_others_can_write_and_a_link_are_replaced(folder, tmp_path):
     write("law", "key", b"code")
     path = only_file(folder)

@@ -7,7 +7,7 @@ import signal
 import numpy as np
 import pytest
 
-from benchmarks.faults import damage
+from benchmarks.faults import damage, damage_cache
 from benchmarks.faults.job import Job, Tally, errors_of, make_study, run_here, verdict
 from tests.helpers.small_study import mpirun
 
@@ -80,6 +80,14 @@ def test_every_damage_is_found_and_nothing_wrong_is_believed(root, reference, mo
     tallies = damage.damage_journal(root, reference, 60, rng)
     tallies |= damage.damage_results(root, reference, 100, rng)
     assert sum(tally.faults for tally in tallies.values()) == 160
+    assert [problem for tally in tallies.values() for problem in tally.wrong] == []
+
+
+@pytest.mark.slow
+def test_no_damage_of_the_code_cache_makes_a_wrong_row_or_runs_what_was_planted(root):
+    tallies = damage_cache.damage_often(
+        root / "cache", len(damage_cache.WAYS), np.random.default_rng(3), engines=0.0
+    )
     assert [problem for tally in tallies.values() for problem in tally.wrong] == []
 
 
