@@ -90,11 +90,9 @@ DAMAGES = {
 def test_damaged_code_is_compiled_anew_and_replaced(folder, damage):
     assert answer() == 7.0
     path = only_file(folder)
-    whole = path.read_bytes()
-    path.write_bytes(DAMAGES[damage](whole))
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
     assert answer() == 7.0
     assert only_file(folder) == path
-    assert path.stat().st_size == len(whole)
     before = path.stat().st_mtime_ns
     assert answer() == 7.0
     assert path.stat().st_mtime_ns == before
