@@ -165,6 +165,13 @@ def mpirun():
     return str(launcher)
 
 
+@cache
+def launcher_kind():
+    """Whose launcher it is: "MPICH", "Open MPI" or "Intel"."""
+    said = subprocess.run([mpirun(), "--version"], capture_output=True, text=True).stdout
+    return next((name for name in ("Open MPI", "Intel") if name in said), "MPICH")
+
+
 def command(*words, ranks=None, module="flocsim.ensemble"):
     """The words of a command line of flocsim, under mpirun where ``ranks`` are given."""
     launch = [] if ranks is None else [mpirun(), "-n", str(ranks)]
