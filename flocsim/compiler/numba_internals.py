@@ -334,7 +334,11 @@ def quick_typing() -> Iterator[None]:
 @functools.cache
 def is_installed(file: str) -> bool:
     """Whether a file is numba's, another installed package's or flocsim's, and not the user's."""
-    return is_in_library(file) or file.startswith((PACKAGE, "<")) or "-packages" in file
+    import numba
+
+    # numba may be installed anywhere: a cluster's modules set PYTHONPATH.
+    known = (PACKAGE, os.path.dirname(numba.__file__) + os.sep, "<")
+    return is_in_library(file) or file.startswith(known) or "-packages" in file
 
 
 def teachers(template: Any) -> list[Any]:

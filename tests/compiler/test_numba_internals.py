@@ -174,6 +174,14 @@ def test_compiled_code_is_kept_by_ours_and_never_by_numbas_cache(fresh, tmp_path
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_a_numba_that_is_installed_anywhere_is_not_taken_for_the_users(monkeypatch):
+    is_installed = numba_internals.is_installed.__wrapped__
+    assert is_installed(numba.__file__)
+    assert not is_installed("/home/alice/numba/core/x.py")
+    monkeypatch.setattr(numba, "__file__", "/home/alice/numba/__init__.py")
+    assert is_installed("/home/alice/numba/core/x.py")
+
+
 def test_the_text_of_a_type_has_the_names_of_fields_in_their_order():
     first, second = (namedtuple("View", names) for names in ("x y", "y x"))
     texts = {type_text((types.NamedUniTuple(types.float64, 2, kind),)) for kind in (first, second)}
