@@ -29,6 +29,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.identity import identity_of, short
+from flocsim.ensembles.storage.resume import RESUME, begin, claim
 from flocsim.ensembles.study import Study
 from flocsim.io.files import read_sealed
 from flocsim.io.journal.journal import journal_path
@@ -41,7 +42,7 @@ SHARE_OLD = 0.2
 
 
 def made_up_rows(seed, count):
-    """Rows as if of a study, any that fit together; fewer are the first of more."""
+    """Rows as if of a study of spheres, any that fit together; fewer are the first of more."""
     rows = np.zeros(count, ROW)
     for number, name in enumerate(COLUMNS):
         drawn = np.random.default_rng([seed, number]).random(count)
@@ -49,7 +50,8 @@ def made_up_rows(seed, count):
     rows["outcome"] %= 6
     inside = np.array([1, 1, 0, 0, NOT_APPLICABLE, NOT_APPLICABLE], "u1")
     rows["inside"] = inside[rows["outcome"]]
-    rows["failure"] = 0
+    rows["failure"], rows["crossed_zone"] = 0, rows["inside"]
+    rows["floc_i"] = rows["floc_j"] = -1
     return rows
 
 
@@ -80,6 +82,12 @@ def write_study(folder, replicates, first=0, longest=16_384):
             for start, stop in chunks:
                 file.write(chunk_record(condition, start, rows[start:stop], key))
     return folder
+
+
+def resumed(study, identity, folder):
+    """The Beginning of a study that goes on from what is in its folder."""
+    journal, _ = claim(folder / "study.h5", RESUME)
+    return begin(study, identity, folder / "study.h5", RESUME, journal)
 
 
 def finish_here(folder):

@@ -291,12 +291,13 @@ def make_results(
     reader = Reader(start.store, (*study.shape[:3], count))
     run = facts(study, start, state.notes, ended, comm.size)
     if output is None:
-        sums = sums_of(reader, 0, count)
+        sums = sums_of(reader.codes, len(study.conditions), 0, count)
         return results_of(study, count, sums, run, reader.arrays(COLUMNS) if in_memory else None)
+    nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
     # Its tables have no values yet, but their places: where the rows go follows from them.
-    draft = results_of(study, count, sums_of(reader, 0, 0), run)
+    draft = results_of(study, count, nothing, run)
     with new_row_file(output, draft, start.replacing) as file:
-        sums, digests = assemble(reader, file, comm, study.conditions, progress.warn)
+        sums, digests = assemble(reader, file, comm, progress.warn)
         results = results_of(study, count, sums, run)
         file.complete(results, digests)
     return results

@@ -1,6 +1,6 @@
 """From the rows of all replicates to tables and columns, a block of replicates at a time."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import attrs
 import numpy as np
@@ -41,22 +41,28 @@ class Reader:
         ]
         return np.stack(parts).reshape(*self.shape[:3], stop - first)
 
+    def codes(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Outcome and inside of replicates [first, stop) of all conditions: Codes."""
+        return self.block("outcome", first, stop), self.block("inside", first, stop)
+
     def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
         """{name: array (type, vertices, delta, replicate)}, in memory."""
         return {name: self.block(name, 0, self.shape[-1]) for name in columns}
 
 
+Codes = Callable[[int, int], tuple[np.ndarray, ...]]
+"""Gives outcome and inside of replicates [first, stop), each (type, vertices, delta, replicate)."""
+
 Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
 
 
-def sums_of(reader: Reader, first: int, stop: int) -> Sums:
-    """The Sums of replicates [first, stop) of all conditions."""
-    step = max(BLOCK_ROWS // len(reader.known), 1)
+def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
+    """The Sums of replicates [first, stop) of so many conditions."""
+    step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        end = min(start + step, stop)
-        outcome, inside = (reader.block(name, start, end) for name in ("outcome", "inside"))
+        outcome, inside = codes(start, min(start + step, stop))
         checked_codes(outcome, inside)
         found = {
             **count(outcome, inside),

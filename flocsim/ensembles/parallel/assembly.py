@@ -1,122 +1,137 @@
 """From the journal to the results file: every rank writes its share of the rows, and counts.
 
-Rank 0 begins the file and cuts it into shares; a rank gets, with its share, where the rows of it
-lie, reads them from the journal, checks them and writes them to their places. What it sends back
-is small: digests of what it has written, and counts. Rank 0 adds up, writes the tables and seals
-the file. Whatever a rank could not do, having no such file, rank 0 does itself.
+Rank 0 begins the file and cuts it into shares. First a rank gets, with its share, where the rows of
+it lie, reads them from the journal, checks them and writes them to their places; it answers with
+the digests of what it has written. Then some ranks read outcomes again, from the new file, hold
+them against these digests and count them. Rank 0 adds up, writes the tables and seals the file.
+Whatever a rank could not do, having no such file, rank 0 does itself.
 """
 
 import os
 import platform
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition
-from flocsim.ensembles.estimates.statistics import checked_codes, count
+from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
 from flocsim.ensembles.storage.row_store import RowStore, longest, near
 from flocsim.ensembles.storage.shared_rows import OldColumns, ReadOnlyJournal, old_columns
-from flocsim.errors import FlocsimError
+from flocsim.errors import FileError, FlocsimError
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file
 
 COUNTED_ROWS = 524_288
-"""Rows for whose sums a rank is asked, at least: an answer has as many numbers as many ranks'."""
+"""Rows that a rank counts, at least: an answer has as many numbers as many ranks'."""
 
+CODES = ("outcome", "inside")
+"""The columns that are counted."""
 
-@attrs.frozen
-class Task:
-    """What one rank is to do: blocks [first, stop) of the file, sums of replicates [first, stop).
-
-    An empty range means nothing.
-    """
-
-    blocks: tuple[int, int]
-    counted: tuple[int, int]
+Digests = dict[int, list[bytes]]
+"""Of blocks by their numbers, those of all pieces in the order of Plan.pieces_of."""
 
 
 @attrs.frozen(eq=False)
-class Share:
-    """A Task for another rank, with all that it needs to know.
+class Place:
+    """Where the unfinished file lies, ``host``: as rank 0's machine sees it; ``shape``: types,
+    vertices, delta, replicates."""
 
-    ``shape``: types, vertices, delta, replicates; ``known``: place of a condition → where its rows
-    lie, of those in the task; ``journal``: its path; ``old``: the older results file, if any;
-    ``host``: rank 0's machine.
-    """
-
-    task: Task
     file: str
     token: bytes
     plan: Plan
     shape: tuple[int, ...]
-    known: dict[int, np.ndarray]
-    journal: str
-    old: OldColumns | None
     host: str
 
-    def carry_out(self, study: Any, comm: Communicator) -> "Done":
-        """Do the task on another rank than 0; its `Done`, with the reason where it fails."""
-        host = platform.node()
-        try:
-            with (
-                ReadOnlyJournal(self.journal) as journal,
-                shared_row_file(self.file, self.token, self.plan) as file,
-            ):
-                store = RowStore(journal, study.conditions)
-                for place, entries in self.known.items():
-                    store.entries[place], store.counts[place] = entries, len(entries)
-                if self.old is not None:
-                    store.old = self.old.opened(journal.resources)
-                done = carry_out(self.task, Reader(store, self.shape), file, is_called(comm))
-                if host != self.host:
-                    file.sync()
-        except (FlocsimError, OSError, ValueError, AssertionError) as error:
-            return Done(failed=f"rank {comm.rank} on {host}: {error}", host=host)
-        return attrs.evolve(done, host=host)
+    def opened(self):
+        return shared_row_file(self.file, self.token, self.plan)
 
 
 @attrs.frozen(eq=False)
-class Check:
-    """A request to read blocks that another rank has written: the wrong ones are answered."""
+class Answer:
+    """What came of an order: digests of written blocks, or Sums; the ``wrong`` blocks that were
+    read. ``failed`` says why nothing did."""
 
-    file: str
-    token: bytes
-    plan: Plan
-    digests: dict[int, list[bytes]]
-
-    def carry_out(self, study: Any, comm: Communicator) -> list[int]:
-        try:
-            with shared_row_file(self.file, self.token, self.plan) as file:
-                return [
-                    block for block, found in self.digests.items()
-                    if not file.check_block(block, found)
-                ]  # fmt: skip
-        except (FlocsimError, OSError):
-            return list(self.digests)
-
-
-@attrs.frozen(eq=False)
-class Done:
-    """What came of a Task: digests of each block, counts of each condition in it, and Sums.
-
-    ``failed`` says why nothing did.
-    """
-
-    digests: dict[int, list[bytes]] = attrs.Factory(dict)
-    counts: dict[int, Sums] = attrs.Factory(dict)
+    digests: Digests = attrs.Factory(dict)
     sums: Sums = attrs.Factory(dict)
+    wrong: tuple[int, ...] = ()
     failed: str = ""
     host: str = ""
 
 
+class Order:
+    """What a rank is asked to do; `work` may raise, `carry_out` answers with the reason."""
+
+    def work(self, study: Any, comm: Communicator) -> Answer:
+        raise NotImplementedError
+
+    def carry_out(self, study: Any, comm: Communicator) -> Answer:
+        host = platform.node()
+        try:
+            return attrs.evolve(self.work(study, comm), host=host)
+        except (FlocsimError, OSError, ValueError, AssertionError) as error:
+            return Answer(failed=f"rank {comm.rank} on {host}: {error}", host=host)
+
+
+@attrs.frozen(eq=False)
+class Share(Order):
+    """The order to write blocks [first, stop).
+
+    ``known``: place of a condition → where its rows lie, of those in the blocks; ``journal``: its
+    path; ``old``: the older results file, if any.
+    """
+
+    place: Place
+    blocks: Interval
+    known: dict[int, np.ndarray]
+    journal: str
+    old: OldColumns | None
+
+    def work(self, study: Any, comm: Communicator) -> Answer:
+        with ReadOnlyJournal(self.journal) as journal, self.place.opened() as file:
+            store = RowStore(journal, study.conditions)
+            for place, entries in self.known.items():
+                store.entries[place], store.counts[place] = entries, len(entries)
+            if self.old is not None:
+                store.old = self.old.opened(journal.resources)
+            reader = Reader(store, self.place.shape)
+            digests = write_blocks(self.blocks, reader, file, is_called(comm))
+            if platform.node() != self.place.host:
+                file.sync()
+        return Answer(digests)
+
+
+@attrs.frozen(eq=False)
+class Review(Order):
+    """The order to read what others have written: whole blocks, of which ``digests`` are given, and
+    outcomes of replicates [first, stop) of all conditions, to be counted.
+
+    ``codes``: block → digests of its CODES.
+    """
+
+    place: Place
+    digests: Digests
+    counted: Interval
+    codes: Digests
+
+    def work(self, study: Any, comm: Communicator) -> Answer:
+        with self.place.opened() as file:
+            wrong = [
+                block for block, found in self.digests.items() if not file.is_whole(block, found)
+            ]
+            sums: Sums = {}
+            if self.counted[0] < self.counted[1]:
+                sums = counted_in(file, self.place.shape, self.counted, self.codes)
+        return Answer(sums=sums, wrong=tuple(wrong))
+
+
 def is_called(comm: Communicator) -> Callable[[], bool]:
-    """Whether rank 0 wants this rank to drop its task: it sends nothing else meanwhile."""
+    """Whether rank 0 wants this rank to drop its share: it sends nothing else meanwhile."""
 
     def called():
         comm.take_in()
@@ -132,34 +147,29 @@ def assist(study: Any, comm: Communicator) -> ExitCode:
     return order
 
 
-def carry_out(task: Task, reader: Reader, file: RowFile, halted: Callable[[], bool]) -> Done:
-    """Do a Task, a block at a time; StopRequested where ``halted()``."""
-    done = Done()
-    for block in range(*task.blocks):
+def write_blocks(
+    blocks: Interval, reader: Reader, file: RowFile, halted: Callable[[], bool]
+) -> Digests:
+    """Write blocks of the file; StopRequested where ``halted()``."""
+    digests = {}
+    for block in range(*blocks):
         if halted():
             raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
-        rows = block_rows(reader, block, done.counts)
-        done.digests[block] = file.write_block(block, rows)
-    if task.counted[0] < task.counted[1]:
-        done = attrs.evolve(done, sums=sums_of(reader, *task.counted))
-    return done
+        digests[block] = file.write_block(block, block_rows(reader, block))
+    return digests
 
 
-def block_rows(reader: Reader, block: int, counts: dict[int, Sums]) -> dict[str, np.ndarray]:
-    """{column: values} of a block of the file; what is in it is added to ``counts``."""
+def block_rows(reader: Reader, block: int) -> dict[str, np.ndarray]:
+    """{column: values} of a block of the file."""
     replicates = reader.shape[-1]
     start = block * ROWS
     stop = min(start + ROWS, replicates * len(reader.known))
     rows = {name: np.empty(stop - start, ROW[name]) for name in COLUMNS}
     for place, first, end in runs(start, stop, replicates):
-        known = reader.known[place]
-        for low, values in reader.store.rows(place, first, end, known):
+        for low, values in reader.store.rows(place, first, end, reader.known[place]):
             at = place * replicates + low - start
             for name in COLUMNS:
                 rows[name][at : at + len(values[name])] = values[name]
-        part = slice(place * replicates + first - start, place * replicates + end - start)
-        codes = checked_codes(rows["outcome"][part], rows["inside"][part])
-        counts[place] = added(counts.get(place, {}), count(*codes))
     return rows
 
 
@@ -172,105 +182,186 @@ def runs(start: int, stop: int, replicates: int) -> Iterator[tuple[int, int, int
         start += end - first
 
 
-def cut(rows: int, replicates: int, blocks: int, ranks: int) -> list[Task]:
-    """A Task for every rank; in a long job most have no sums, and in a small one no blocks."""
-    writing, counting = min(ranks, blocks), min(ranks, replicates, max(rows // COUNTED_ROWS, 1))
-    tasks = []
-    for rank in range(ranks):
-        back = ranks - 1 - rank
-        tasks.append(Task(share_of(blocks, rank, writing), share_of(replicates, back, counting)))
-    return tasks
+def counted_in(file: RowFile, shape: Sequence[int], counted: Interval, codes: Digests) -> Sums:
+    """Sums of replicates, as they stand in the file; FileError where a digest is not right."""
+    replicates, conditions = shape[-1], int(np.prod(shape[:3]))
+    whole: set[int] = set()
+
+    def read(first: int, stop: int) -> tuple[np.ndarray, ...]:
+        for block in blocks_of((first, stop), replicates, conditions):
+            if block not in whole and not file.is_whole(block, codes[block], CODES):
+                raise FileError(f"{file.path} does not hold what was written to it")
+            whole.add(block)
+        starts = range(first, first + conditions * replicates, replicates)
+        columns = (
+            np.stack([file.values(name, start, stop - first) for start in starts]) for name in CODES
+        )
+        return tuple(column.reshape(*shape[:3], stop - first) for column in columns)
+
+    return sums_of(read, conditions, *counted)
 
 
-def share_of(count, number, of):
-    """The ``number``-th of so many equal parts of 0, 1, …, ``count`` − 1; nothing beyond them."""
-    return (count * number // of, count * (number + 1) // of) if number < of else (0, 0)
+def blocks_of(counted: Interval, replicates: int, conditions: int) -> list[int]:
+    """The blocks in which replicates [first, stop) of all conditions lie."""
+    first, stop = counted
+    found = set()
+    for start in range(0, conditions * replicates, replicates):
+        found |= set(range((start + first) // ROWS, (start + stop - 1) // ROWS + 1))
+    return sorted(found)
 
 
-def known_in(task: Task, reader: Reader, lengths: Sequence[int]) -> dict[int, np.ndarray]:
-    """Where the rows lie that a Task needs, by condition; ``lengths``: of the longest chunks."""
+def parts_of(count: int, parts: int) -> list[Interval]:
+    """So many equal parts of 0, 1, …, ``count`` − 1, none of them empty."""
+    ends = [count * number // parts for number in range(parts + 1)]
+    return list(pairwise(ends))
+
+
+def known_in(blocks: Interval, reader: Reader, lengths: Sequence[int]) -> dict[int, np.ndarray]:
+    """Where the rows of blocks lie, by condition; ``lengths``: of the longest chunks."""
     replicates = reader.shape[-1]
     total = replicates * len(reader.known)
-    first, stop = (min(block * ROWS, total) for block in task.blocks)
-    wanted = {place: (low, high) for place, low, high in runs(first, stop, replicates)}
-    if task.counted[0] < task.counted[1]:
-        for place in range(len(reader.known)):
-            low, high = wanted.get(place, task.counted)
-            wanted[place] = min(low, task.counted[0]), max(high, task.counted[1])
+    start, stop = (min(block * ROWS, total) for block in blocks)
     return {
-        place: near(reader.known[place], *each, lengths[place]) for place, each in wanted.items()
+        place: near(reader.known[place], first, end, lengths[place])
+        for place, first, end in runs(start, stop, replicates)
     }
 
 
+@attrs.define(eq=False)
+class Assembly:
+    """Rank 0's side. ``alone``: the others cannot read an older file that is not laid out plainly.
+
+    ``warn`` is told, once, where rank 0 had to do others' work.
+    """
+
+    reader: Reader
+    file: RowFile
+    comm: Communicator
+    warn: Callable[[str], object] = lambda line: None
+    place: Place = attrs.field(init=False)
+    digests: Digests = attrs.Factory(dict)
+    hosts: set[str] = attrs.Factory(lambda: {platform.node()})
+
+    def __attrs_post_init__(self):
+        file, host = self.file, platform.node()
+        self.place = Place(file.path, file.token, file.plan, self.reader.shape, host)
+
+    def ask(self, orders: dict[int, Order], own: Callable[[], Any]) -> dict[int, Answer]:
+        """Send orders to ranks, do one's ``own`` part, and wait for the answers."""
+        for rank, order in orders.items():
+            self.comm.send(rank, order)
+        own()
+        answers = {rank: self.comm.receive(rank) for rank in orders}
+        self.hosts |= {answer.host for answer in answers.values()}
+        return answers
+
+    def write(self) -> bool:
+        """Have all rows written; False where some ranks were of no use."""
+        store = self.reader.store
+        old = old_columns(store.old) if store.old is not None else None
+        alone = store.old is not None and old is None
+        blocks = self.file.plan.blocks
+        parts = parts_of(blocks, max(min(1 if alone else self.comm.size, blocks), 1))
+        lengths = [longest(known) for known in self.reader.known]
+        journal = os.fspath(Path(store.journal.path).resolve())
+        orders: dict[int, Order] = {
+            rank: Share(self.place, part, known_in(part, self.reader, lengths), journal, old)
+            for rank, part in enumerate(parts)
+            if rank
+        }
+        answers = self.ask(orders, lambda: self.write_here(parts[0]))
+        failed = [rank for rank, answer in answers.items() if answer.failed]
+        for answer in answers.values():
+            self.digests |= answer.digests
+        if failed:
+            self.warn(
+                f"{len(failed)} of {self.comm.size} ranks could not write their share of the "
+                f"results, rank 0 does it for them; {answers[failed[0]].failed}"
+            )
+        for rank in failed:
+            self.write_here(parts[rank])
+        return not (failed or alone)
+
+    def write_here(self, blocks: Interval) -> None:
+        self.digests |= write_blocks(blocks, self.reader, self.file, stop_requested)
+
+    def count(self, together: bool) -> Sums:
+        """Have all replicates counted, from what was written, ``together`` with the others.
+
+        Machines that share a file system do not always share what they keep of it: where ranks
+        are on several, each block is read again by another rank, as the journal goes once the file
+        is whole, and what is not as it was written is written again.
+        """
+        replicates = self.reader.shape[-1]
+        rows, ranks = self.file.plan.rows, self.comm.size if together else 1
+        parts = parts_of(replicates, min(ranks, replicates, max(rows // COUNTED_ROWS, 1)))
+        orders: dict[int, Order] = {}
+        reread = self.blocks_to_read() if len(self.hosts) > 1 and together else {}
+        for rank in range(1, ranks):
+            part = parts[rank] if rank < len(parts) else (0, 0)
+            digests = {block: self.digests[block] for block in reread.get(rank, ())}
+            if digests or part != (0, 0):
+                codes = self.codes_of(part) if part != (0, 0) else {}
+                orders[rank] = Review(self.place, digests, part, codes)
+        sums: list[Sums] = []
+        wrong: set[int] = set()
+
+        def own() -> None:
+            if reread:
+                with self.place.opened() as seen:
+                    wrong.update(
+                        block for block in reread[0]
+                        if not seen.is_whole(block, self.digests[block])
+                    )  # fmt: skip
+            sums.append(self.count_here(parts[0]))
+
+        answers = self.ask(orders, own)
+        for rank, answer in answers.items():
+            wrong.update(reread.get(rank, ()) if answer.failed else answer.wrong)
+        for block in sorted(wrong):
+            self.write_here((block, block + 1))
+        for rank, answer in answers.items():
+            if answer.sums:
+                sums.append(answer.sums)
+            elif rank < len(parts):
+                sums.append(self.count_here(parts[rank]))
+        total: Sums = {}
+        for each in sums:
+            total = added(total, each)
+        return total
+
+    def blocks_to_read(self):
+        """{rank: blocks to read}, none of which it has written itself; from elsewhere, if it can
+        be. What rank 0 has written is on its way first."""
+        self.file.sync()
+        blocks = self.file.plan.blocks
+        parts = parts_of(blocks, min(self.comm.size, blocks))
+        count = len(parts)
+        return {rank: range(*parts[(rank + max(count // 2, 1)) % count]) for rank in range(count)}
+
+    def codes_of(self, counted: Interval) -> Digests:
+        columns = list(self.file.plan.columns)
+        wanted = [columns.index(name) for name in CODES]
+        *outer, replicates = self.reader.shape
+        blocks = blocks_of(counted, replicates, int(np.prod(outer)))
+        return {block: [self.digests[block][column] for column in wanted] for block in blocks}
+
+    def count_here(self, counted: Interval) -> Sums:
+        try:
+            return counted_in(self.file, self.reader.shape, counted, self.codes_of(counted))
+        except FileError:
+            # Seen from here, others have not written what they say: all is written here.
+            self.write_here((0, self.file.plan.blocks))
+            return counted_in(self.file, self.reader.shape, counted, self.codes_of(counted))
+
+
 def assemble(
-    reader: Reader, file: RowFile, comm: Communicator, conditions: Sequence[Condition],
-    warn: Callable[[str], object] = lambda line: None,
-) -> tuple[Sums, dict[int, list[bytes]]]:  # fmt: skip
+    reader: Reader, file: RowFile, comm: Communicator, warn: Callable[[str], object]
+) -> tuple[Sums, Digests]:
     """Write all rows into a file, with the other ranks: (Sums of the study, digests by block).
 
-    ``warn`` is told, once, where rank 0 had to do another's work. FileError as rank 0 meets it.
+    FileError as rank 0 meets it; StopRequested where a signal comes.
     """
-    store, replicates = reader.store, reader.shape[-1]
-    old = old_columns(store.old) if store.old is not None else None
-    alone = comm.size == 1 or (store.old is not None and old is None)
-    tasks = cut(file.plan.rows, replicates, file.plan.blocks, 1 if alone else comm.size)
-    asked, lengths = [], [longest(known) for known in reader.known]
-    for rank, task in enumerate(tasks):
-        if rank and task != Task((0, 0), (0, 0)):
-            asked.append(rank)
-            known = known_in(task, reader, lengths)
-            comm.send(rank, Share(
-                task, file.path, file.token, file.plan, reader.shape, known,
-                os.fspath(Path(store.journal.path).resolve()), old, platform.node(),
-            ))  # fmt: skip
-    answers = {0: carry_out(tasks[0], reader, file, stop_requested)}
-    for rank in asked:
-        answers[rank] = comm.receive(rank)
-    failed = [rank for rank in asked if answers[rank].failed]
-    if failed:
-        warn(
-            f"{len(failed)} of {comm.size} ranks could not write their share of the results, rank "
-            f"0 does it for them; {answers[failed[0]].failed}"
-        )
-    elif len({platform.node(), *(answers[rank].host for rank in asked)}) > 1:
-        failed = not_as_written(answers, asked, file, comm)
-    for rank in failed:
-        answers[rank] = carry_out(tasks[rank], reader, file, stop_requested)
-    return merged(list(answers.values()), conditions, reader.shape)
-
-
-def not_as_written(answers, asked, file, comm):
-    """The ranks of whose blocks others see something else than was written.
-
-    Machines that share a file system do not always share what they keep of it; nothing is to be
-    believed that was not seen from elsewhere, as the journal goes once the file is whole.
-    """
-    writers = [rank for rank in asked if answers[rank].digests]
-    readers = writers[len(writers) // 2 :] + writers[: len(writers) // 2]
-    for reader, writer in zip(readers, writers, strict=True):
-        digests = answers[writer].digests
-        comm.send(reader, Check(file.path, file.token, file.plan, digests))
-    wrong = [comm.receive(reader) for reader in readers]
-    return [writer for writer, blocks in zip(writers, wrong, strict=True) if blocks]
-
-
-def merged(answers, conditions, shape):
-    """(Sums, digests by block) of all tasks; FlocsimError where written and counted differ."""
-    sums: Sums = {}
-    digests: dict[int, list[bytes]] = {}
-    counts: dict[int, Sums] = {}
-    for done in answers:
-        digests |= done.digests
-        if done.sums:
-            sums = added(sums, done.sums)
-        for place, each in done.counts.items():
-            counts[place] = added(counts.get(place, {}), each)
-    for place, condition in enumerate(conditions):
-        at = np.unravel_index(place, shape[:3])
-        for name, value in counts[place].items():
-            if not np.array_equal(sums[name][at], value):
-                raise FlocsimError(
-                    f"{name} of {condition} was found to be {sums[name][at]} and {value}: the "
-                    "journal is not read alike everywhere; go on with --resume"
-                )
-    return sums, digests
+    assembly = Assembly(reader, file, comm, warn)
+    sums = assembly.count(assembly.write())
+    return sums, assembly.digests

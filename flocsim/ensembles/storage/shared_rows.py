@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition
-from flocsim.ensembles.storage.row_store import OldTable
+from flocsim.ensembles.storage.row_store import OldTable, stamp
 from flocsim.errors import FileError
 
 SEAL_END = 64
@@ -66,26 +66,32 @@ class Column:
 
 @attrs.frozen(eq=False)
 class OldColumns:
-    """Where the columns of an older results file lie, and how it ends."""
+    """Where the columns of an older results file lie, and how it ends.
+
+    ``written``: its size and time as rank 0 saw them before it checked the seal.
+    """
 
     path: str
     ending: bytes
     offsets: Mapping[str, int]
     shape: tuple[int, ...]
     places: Mapping[Condition, tuple[int, int, int]]
+    written: tuple | None
 
     def opened(self, resources: contextlib.ExitStack) -> OldTable:
         """The table in that file, open until the resources are closed; FileError if it is not
         the same file here."""
         descriptor = open_to_read(self.path)
         resources.callback(os.close, descriptor)
-        if ending_of(descriptor) != self.ending:
+        now = stamp(self.path)
+        changed = self.written is not None and (now is None or now[1:] != self.written)
+        if changed or ending_of(descriptor) != self.ending:
             raise FileError(f"{self.path} is another file here")
         columns = {
             name: Column(descriptor, name, offset, self.shape)
             for name, offset in self.offsets.items()
         }
-        return OldTable(columns, self.places, self.path)
+        return OldTable(columns, self.places, self.path, self.shape[-1], now)
 
 
 def ending_of(descriptor):
@@ -109,4 +115,5 @@ def old_columns(table: OldTable) -> OldColumns | None:
         return None
     with contextlib.ExitStack() as resources:
         resources.callback(os.close, descriptor)
-        return OldColumns(path, ending_of(descriptor), offsets, shape, table.places)
+        written = table.before[1:] if table.before else None
+        return OldColumns(path, ending_of(descriptor), offsets, shape, table.places, written)

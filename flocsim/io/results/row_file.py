@@ -10,7 +10,7 @@ then it starts with a token, by which others know that they see the same file, a
 import contextlib
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -115,13 +115,23 @@ class RowFile:
             digests.append(digest_of(data))
         return digests
 
-    def check_block(self, block: int, digests: list[bytes]) -> bool:
-        """Whether a block stands in the file as it was written."""
-        for (name, first, count), digest in zip(self.plan.pieces_of(block), digests, strict=True):
-            offset, size, _ = self.plan.columns[name]
-            if digest_of(os.pread(self.descriptor, size * count, offset + first * size)) != digest:
-                return False
-        return True
+    def is_whole(
+        self, block: int, digests: Sequence[bytes], columns: Sequence[str] | None = None
+    ) -> bool:
+        """Whether a block, or its part in some columns, stands in the file as it was written."""
+        pieces = {name: (first, count) for name, first, count in self.plan.pieces_of(block)}
+        return all(
+            digest_of(self.bytes_of(name, *pieces[name])) == digest
+            for name, digest in zip(columns or pieces, digests, strict=True)
+        )
+
+    def values(self, column: str, first: int, count: int) -> np.ndarray:
+        """Values of a column of the table of replicates, from the file."""
+        return np.frombuffer(self.bytes_of(column, first, count), f"<{REPLICATES[column][0]}")
+
+    def bytes_of(self, column, first, count):
+        offset, size, _ = self.plan.columns[column]
+        return os.pread(self.descriptor, size * count, offset + first * size)
 
     def sync(self) -> None:
         os.fsync(self.descriptor)

@@ -11,10 +11,9 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmarks.faults.assembly import finish_here, kill_once, prepare, write_study
+from benchmarks.faults.assembly import finish_here, kill_once, prepare, resumed, write_study
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, sums_of
 from flocsim.ensembles.parallel import assembly
@@ -22,9 +21,8 @@ from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
 from flocsim.ensembles.runner import results_of
 from flocsim.ensembles.storage.identity import identity_of
-from flocsim.ensembles.storage.resume import RESUME, begin
 from flocsim.ensembles.study import Study
-from flocsim.errors import FileError, FlocsimError
+from flocsim.errors import FileError
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.results import row_file
 from flocsim.io.results.file import same_data
@@ -93,14 +91,13 @@ def assemble(folder, ranks):
         thread.start()
     warnings = []
     try:
-        start = begin(study, identity, folder / "study.h5", RESUME)
+        start = resumed(study, identity, folder)
         with start.resources:
             reader = Reader(start.store, study.shape)
-            draft = results_of(study, REPLICATES, sums_of(reader, 0, 0), {"note": "same"})
+            nothing = sums_of(reader.codes, 10, 0, 0)
+            draft = results_of(study, REPLICATES, nothing, {"note": "same"})
             with new_row_file(folder / "made.h5", draft) as file:
-                sums, digests = assembly.assemble(
-                    reader, file, comms[0], study.conditions, warnings.append
-                )
+                sums, digests = assembly.assemble(reader, file, comms[0], warnings.append)
                 file.complete(results_of(study, REPLICATES, sums, {"note": "same"}), digests)
     finally:
         sent = list(comms[0].sent)
@@ -125,21 +122,31 @@ def test_any_number_of_ranks_writes_the_same_file(
     assert same_data(made, reference) == []
     assert warnings == []
     shares = [each for each in sent if isinstance(each, assembly.Share)]
-    assert len(shares) == min(ranks - 1, 4)
-    written = [share.task.blocks for share in shares if share.task.blocks != (0, 0)]
-    assert [written[0][0], written[-1][1]] == [4 // ranks or 1, 4] if written else ranks == 1
+    assert len(shares) == min(ranks - 1, 3)
+    written = [0, *(end for share in shares for end in share.blocks)]
+    assert (
+        written[1::2]
+        == [(4 * rank // ranks if ranks < 4 else rank) for rank in range(1, ranks)][:3]
+    )
+    assert ranks == 1 or written[-1] == 4
     assert made.read_bytes() == by_one_rank.read_bytes()
 
 
-def test_few_ranks_have_all_to_do_and_many_have_some():
-    tasks = assembly.cut(rows=10**8, replicates=10**6, blocks=3052, ranks=10_000)
-    for part in ("blocks", "counted"):
-        found = [getattr(task, part) for task in tasks if np.diff(getattr(task, part))[0]]
-        ends = sorted(found)
-        whole = 3052 if part == "blocks" else 10**6
-        assert [ends[0][0], ends[-1][1]] == [0, whole]
-        assert all(one[1] == other[0] for one, other in pairwise(ends))
-    assert not any(np.diff(task.blocks)[0] and np.diff(task.counted)[0] for task in tasks)
+def test_ranks_count_as_well_and_give_the_same_tables(folders, by_one_rank, tmp_path, monkeypatch):
+    monkeypatch.setattr(assembly, "COUNTED_ROWS", 100)
+    made, _, sent = assemble(copied(folders["new file"], tmp_path), 3)
+    reviews = [each for each in sent if isinstance(each, assembly.Review)]
+    assert [each.counted for each in reviews] == [(4000, 8000), (8000, 12000)]
+    assert made.read_bytes() == by_one_rank.read_bytes()
+
+
+def test_parts_make_up_the_whole():
+    for count, parts in ((10, 3), (3052, 3052), (10**9, 10_000), (1, 1)):
+        found = assembly.parts_of(count, parts)
+        assert len(found) == parts
+        assert [found[0][0], found[-1][1]] == [0, count]
+        assert all(one[1] == other[0] for one, other in pairwise(found))
+        assert all(first < stop for first, stop in found)
 
 
 @pytest.mark.parametrize("words", [["--jobs", 3], [], None])
@@ -204,7 +211,10 @@ def test_what_another_machine_has_written_is_read_before_it_is_believed(
     monkeypatch.setattr(RowFile, "write_block", lose_one)
     made, warnings, sent = assemble(copied(folders["new file"], tmp_path), 3)
     assert lost == [2]
-    assert len([each for each in sent if isinstance(each, assembly.Check)]) == 2
+    reviewed = [
+        block for each in sent if isinstance(each, assembly.Review) for block in each.digests
+    ]
+    assert len(reviewed) == 3  # and rank 0 reads the fourth
     assert same_data(made, reference) == []
     assert warnings == []
 
@@ -213,7 +223,7 @@ def test_what_another_machine_has_written_is_read_before_it_is_believed(
 def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monkeypatch, ranks):
     folder = copied(folders["new file"], tmp_path)
     path = journal_path(folder / "study.h5")
-    begun = assembly.cut
+    begun = assembly.parts_of
 
     def damage(*words, **more):
         with open(path, "r+b") as file:
@@ -223,7 +233,7 @@ def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monke
             file.write(bytes([byte[0] ^ 4]))
         return begun(*words, **more)
 
-    monkeypatch.setattr(assembly, "cut", damage)
+    monkeypatch.setattr(assembly, "parts_of", damage)
     size = path.stat().st_size
     with pytest.raises(FileError, match=f"{path.name} is damaged from byte"):
         assemble(folder, ranks)
@@ -232,16 +242,23 @@ def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monke
     assert names == ["study.h5.journal", "study.toml"]
 
 
-def test_counts_that_differ_from_what_was_written_are_told(folders, tmp_path, monkeypatch):
-    def one_more(reader, first, stop):
-        sums = sums_of(reader, first, stop)
-        sums["n_missed"][0, 0, 0] += 1
-        return sums
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_nothing_is_counted_that_is_not_what_was_written(
+    folders, by_one_rank, tmp_path, monkeypatch, ranks
+):
+    monkeypatch.setattr(assembly, "COUNTED_ROWS", 100)
+    count, damaged = assembly.Assembly.count, []
 
-    monkeypatch.setattr(assembly, "sums_of", one_more)
-    with pytest.raises(FlocsimError, match=r"n_missed of .* the journal is not read alike"):
-        assemble(copied(folders["new file"], tmp_path), 2)
-    assert not (tmp_path / "made.h5").exists()
+    def after_damage(rank_zero, together):
+        file = rank_zero.file
+        os.pwrite(file.descriptor, b"\5" * 100, file.plan.columns["outcome"][0] + 70_000)
+        damaged.append(together)
+        return count(rank_zero, together)
+
+    monkeypatch.setattr(assembly.Assembly, "count", after_damage)
+    made, _, _ = assemble(copied(folders["new file"], tmp_path), ranks)
+    assert damaged == [True]
+    assert made.read_bytes() == by_one_rank.read_bytes()
 
 
 def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path, monkeypatch):
@@ -250,8 +267,8 @@ def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path,
 
     def other(table):
         columns = found(table)
-        with open(folder / "study.h5", "ab") as file:
-            file.write(b"?")
+        (folder / "other").write_bytes((folder / "study.h5").read_bytes() + b"?")
+        (folder / "other").replace(folder / "study.h5")
         return columns
 
     monkeypatch.setattr(assembly, "old_columns", other)
