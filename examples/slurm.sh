@@ -15,6 +15,10 @@ study=${1:?usage: sbatch slurm.sh STUDY.toml}
 # module load openmpi
 # source ~/flocsim/bin/activate
 
+# How srun and MPI find each other, where the cluster has not set it: pmix for Open MPI, pmi2 for
+# MPICH and Intel MPI; `srun --mpi=list` says what there is.
+# export SLURM_MPI_TYPE=pmix
+
 # Compiled code is shared by all jobs; it must lie where every node can read it.
 export FLOCSIM_CACHE=${FLOCSIM_CACHE:-$HOME/.cache/flocsim}
 

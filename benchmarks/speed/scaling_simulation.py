@@ -71,13 +71,13 @@ def measure_costs(count):
 
 
 def timed(study, place, replicate):
-    """Seconds of a replicate, its shapes made beforehand."""
+    """Seconds of a processor for a replicate, its shapes made beforehand."""
     from flocsim.ensembles.collision.start import draws
 
     study.encounter(*place[:2], draws(study.config.seed, replicate))
-    began = time.perf_counter()
+    began = time.process_time()
     study.run(*place, replicate)
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 def measure_rank_zero(folder):
