@@ -44,13 +44,13 @@ def read_results_file(path):
     """Read it in all ways; the values that were believed are checked."""
     from flocsim.commands.info import results_text
     from flocsim.io.results.checks import check_rows
-    from flocsim.io.results.file import read_results, replicate_totals
+    from flocsim.io.results.file import read_overview, read_results
 
     found = read_results(path)
     check_rows(found.replicates.__getitem__, len(found.failures), len(found.flocs))
     assert np.isfinite(found.delta).all()
     assert np.all(found.probabilities["n_total"] == found.count)
-    results_text("r.h5", found, replicate_totals(path))
+    results_text("r.h5", found, read_overview(path)[1])
 
 
 def read_library_file(path):
@@ -149,7 +149,7 @@ class JournalReader:
                     check_rows(rows.__getitem__, len(FAILURES), 0)
             assert all(remark.isprintable() for remark in start.remarks), start.remarks
         finally:
-            journal.close()
+            journal.release()
 
 
 def reader(name, folder):

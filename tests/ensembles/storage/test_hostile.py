@@ -44,7 +44,7 @@ def taken(reader, folder, records):
         take_journal(start)
         return start, sum(stop - first for each in start.found(2**50) for first, stop in each)
     finally:
-        journal.close()
+        journal.release()
 
 
 def test_a_sound_journal_is_taken(reader, tmp_path):

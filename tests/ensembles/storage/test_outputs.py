@@ -42,12 +42,15 @@ def test_finished_results_are_in_the_way(finished, mode, seed):
     assert results_in(finished) == before
 
 
-def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished):
-    (finished / "r.h5.journal").write_bytes(b"")
-    go_before = results_in(finished)
+def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished, monkeypatch):
+    (finished / "other").mkdir()
+    stop_at_the_end(monkeypatch, finished / "other")
+    (finished / "other" / "r.h5.journal").rename(finished / "r.h5.journal")
+    before = results_in(finished)
+    assert len(before["r.h5.journal"]) > 1000
     with pytest.raises(SharedError, match="exists already"):
         go(finished, RESTART)
-    assert results_in(finished) == go_before
+    assert results_in(finished) == before
 
 
 def test_results_of_another_study_are_kept_under_another_name(finished, capsys):
@@ -91,7 +94,7 @@ def stop_at_the_end(monkeypatch, folder):
         raise FileError("no space left")
 
     with monkeypatch.context() as patch:
-        patch.setattr(runner, "write_results", fail)
+        patch.setattr(runner, "new_row_file", fail)
         with pytest.raises(SharedError):
             go(folder)
 
@@ -102,14 +105,14 @@ def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
 ):
     if mode == RESUME:
         go(tmp_path)
-    original = runner.write_results
+    original = runner.new_row_file
 
     def appear(path, *more):
         (tmp_path / "moving").write_bytes(b"of another program")
         (tmp_path / "moving").replace(path)
-        original(path, *more)
+        return original(path, *more)
 
-    monkeypatch.setattr(runner, "write_results", appear)
+    monkeypatch.setattr(runner, "new_row_file", appear)
     with pytest.raises(SharedError, match=r"r\.h5 .*(exists already|is there by now)"):
         go(tmp_path, mode, replicates=5)
     assert (tmp_path / "r.h5").read_bytes() == b"of another program"
