@@ -54,7 +54,7 @@ OTHERS = (
 
 VERSION = """\
 import os
-if os.environ.get("PMI_RANK") == "1":
+if "1" in map(os.environ.get, ("PMI_RANK", "OMPI_COMM_WORLD_RANK")):
     from flocsim.ensembles.parallel import agreement
 
     found = agreement.versions()

@@ -208,7 +208,7 @@ import time
 import attrs
 from flocsim.forces import CentreForce
 
-if os.environ.get("PMI_RANK") == "1":
+if "1" in map(os.environ.get, ("PMI_RANK", "OMPI_COMM_WORLD_RANK")):
     time.sleep(4.0)
 
 
