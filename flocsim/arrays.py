@@ -61,9 +61,10 @@ MOST_FRAMES = 3
 
 BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 
-VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, CLOSEST = range(7)
+VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR = range(7)
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
-point of the edge; 1 where the pair is closed in this step, 1 where it is its bodies' closest."""
+point of the edge; 1 where the pair is closed in this step, 1 where it may have a share of a surface
+force in it."""
 
 (
     NORMAL_X,
@@ -74,12 +75,14 @@ point of the edge; 1 where the pair is closed in this step, 1 where it is its bo
     EDGE_ARM_N,
     EDGE_ARM_T,
     TURNING,
+    SHARE,
     GEOMETRY_COLUMNS,
-) = range(9)
+) = range(10)
 """Columns of ``Work.geometry``: unit normal from the foot on the edge to the vertex; gap [m]; arms
 [m], which are the moments of unit forces along n and t, applied at the middle of the overlap, about
 the centroid of the vertex's body and about that of the edge's; the angle by which the normal turns
-for every metre of the vertex along t [1/m].  See flocsim.geometry.contact.points."""
+for every metre of the vertex along t [1/m]; the share of a surface force that
+acts through it.  See flocsim.geometry.contact.points."""
 
 KEPT_VERTEX, KEPT_EDGE = range(2)
 """Columns of ``Work.kept``: core point of the vertex, first core point of the edge."""
@@ -187,6 +190,7 @@ class Scene(NamedTuple):
     parameters: np.ndarray
     laws: Any
     surface_reach: float
+    smoothing: float
     events: int
 
 
@@ -201,7 +205,7 @@ class Work(NamedTuple):
     directly or through others.
     ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:
     factorised systems, then the load.  ``pivots`` (2, 3n): which rows have changed places.
-    ``candidates`` (capacity, 7): see VERTEX_BODY.  ``geometry`` (9, capacity, 8): see NORMAL_X.
+    ``candidates`` (capacity, 7): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
     ``kept`` (capacity, 2): the pairs whose displacements are set aside.
     ``budget`` (n (n − 1)/2,): how far two bodies may move until the list must be made anew.
     ``tally``: counts, see CANDIDATES.
@@ -236,7 +240,7 @@ def work_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, capacity: 
         jacobian=np.zeros((2, 3 * n, 3 * n)),
         system=np.zeros((2, 3 * n, 3 * n + 1), dtype=complex),
         pivots=np.zeros((2, 3 * n), dtype=np.int64),
-        candidates=np.zeros((capacity, CLOSEST + 1), dtype=np.int64),
+        candidates=np.zeros((capacity, NEAR + 1), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, 2), dtype=np.int64),
         budget=np.full(n * (n - 1) // 2, -1.0),

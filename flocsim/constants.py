@@ -24,6 +24,13 @@ DEEPEST_OVERLAP = 0.5
 NEGLIGIBLE_FORCE = 1e-9
 """A force weaker than this share of its greatest strength is out of reach and left out."""
 
+CENTRE_SOFTENING = 1e-4
+"""ε as a share of r_i + r_j: forces between centres see √(d_c² + ε²) for d_c, so that they fade out
+where one floc lies nested around another's centre. At d_c = r_i + r_j that adds 5e-9 of it."""
+
+LARGEST_BIAS = 0.03
+"""Share by which the smooth gap of two outlines may change a surface force (rhs/surface_gap.py)."""
+
 SHALLOWEST_TOUCH = 1e-12
 """[m], a hundredth of an atom: bodies that graze each other less deeply do not touch. Scenes that
 graze by construction (δ = δ_max) would otherwise hang on the rounding of their numbers."""

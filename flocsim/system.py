@@ -145,7 +145,8 @@ class System:
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
             laws=law_table(pieces.laws, jit=jit),
-            surface_reach=pieces.surface_reach, events=pieces.events,
+            surface_reach=pieces.surface_reach, decay_length=pieces.decay_length,
+            events=pieces.events,
         )  # fmt: skip
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:

@@ -24,10 +24,14 @@ TOGETHER = {gap: tuple(name for name in FORCES if not name.endswith(other))
             for gap, other in zip(GAPS, GAPS[::-1], strict=True)}  # fmt: skip
 
 
-def expected(case, names):
+def expected(case, names, fast):
     """The reference's loads, and the greatest force of any single law [N]."""
     parts = [
-        loads(case.plain, case.laws(name), case.slips if name == "contact" else None)
+        loads(
+            case.plain,
+            case.laws(name, smoothing=fast.scene.smoothing),
+            case.slips if name == "contact" else None,
+        )
         for name in names
     ]
     scale = max(np.abs(part[:, :2]).max() for part in parts)
@@ -63,7 +67,7 @@ def test_shape_integrals(seed):
 def test_all_forces_together_compiled(seed, gap):
     case, names = random_case(seed), TOGETHER[gap]
     fast = FastScene(silenced(case, *names))
-    assert_loads(fast.loads(slips_of(case, names)), *expected(case, names), case)
+    assert_loads(fast.loads(slips_of(case, names)), *expected(case, names, fast), case)
 
 
 @pytest.mark.parametrize("seed", SCENES)
@@ -88,7 +92,7 @@ def test_every_force_alone(seed, name):
     # Uncompiled, each scene is made of this one force's code, all other forces left out.
     case = random_case(seed)
     fast = FastScene(case.system(name), jit=False)
-    assert_loads(fast.loads(slips_of(case, [name])), *expected(case, [name]), case)
+    assert_loads(fast.loads(slips_of(case, [name])), *expected(case, [name], fast), case)
 
 
 @pytest.mark.parametrize("seed", UNCOMPILED)

@@ -6,6 +6,7 @@ derivatives of what no kernel reads) is not written, and is no law of the scene.
 """
 
 import functools
+import math
 from collections.abc import Callable, Iterable
 
 import attrs
@@ -17,6 +18,7 @@ from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     check_kernel,
+    decay_length,
     event_count,
     fields_read,
     kernel_arguments,
@@ -43,12 +45,14 @@ another kind leave the text of a law as it is."""
 @attrs.define
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
-    numbers, the gap up to which surface forces reach (−1: there are none), how many events its
-    contact forces have, and which forces are used and left out."""
+    numbers, the gap up to which surface forces reach (−1: there are none) and the shortest length
+    in which one of them changes [m], how many events its contact forces have, and which forces are
+    used and left out."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
     surface_reach: float = -1.0
+    decay_length: float = math.inf
     events: int = 0
     used: dict[str, Force] = attrs.Factory(dict)
     left_out: dict[str, str] = attrs.Factory(dict)
@@ -257,6 +261,7 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
+        pieces.decay_length = min(decay_length(force, fluid) for force in kinds["surface"])
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

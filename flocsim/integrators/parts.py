@@ -31,6 +31,7 @@ from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import weigh_velocities
+from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, tangential_rate
 
 __all__ = [
@@ -89,7 +90,8 @@ def all_finite(work, state):
 def locate_and_flag(scene, work, state):
     """Fixed steps do not end at switches: every evaluation flags the pairs as they are."""
     locate_contacts(scene, work, state)
-    set_modes(scene, work, state)
+    set_modes(work, state)
+    flag_near(scene, work, state, 0.0)
 
 
 @attrs.frozen

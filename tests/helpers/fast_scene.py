@@ -14,6 +14,7 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.surface_gap import flag_near
 from tests.reference import forces as plain_forces
 from tests.reference.contacts import contacts
 from tests.reference.samples import scene_of
@@ -25,7 +26,8 @@ def right_hand_side(scene, work):
     if not list_candidates(scene, work):
         return False
     locate_contacts(scene, work, NOW)
-    set_modes(scene, work, NOW)
+    set_modes(work)
+    flag_near(scene, work, NOW, 0.0)
     locate_and_rate(scene, work, NOW)
     sum_forces(scene, work, 0.0, NOW)
     return True
@@ -151,9 +153,13 @@ class Case:
         chosen = [self.pairs[name][0] for name in names or self.pairs]
         return fast_system(self.plain, chosen, self.fluid, **self.material)
 
-    def laws(self, *names):
-        """The reference's laws of the same names."""
-        return [self.pairs[name][1] for name in names or self.pairs]
+    def laws(self, *names, smoothing=1e-12):
+        """The reference's laws of the same names; ℓ of the smooth gap of outlines [m]."""
+        laws = [self.pairs[name][1] for name in names or self.pairs]
+        pairs = plain_forces.PairLaw
+        return [
+            replace(each, smoothing=smoothing) if isinstance(each, pairs) else each for each in laws
+        ]
 
 
 @cache

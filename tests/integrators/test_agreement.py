@@ -55,7 +55,7 @@ def apart(end, other):
     return np.abs((end.position - other.position) * [1.0, 1.0, 1e-5]).max()
 
 
-@by_setting((VelocityVerlet(2e-9), 1e-10), (DormandPrince54(1e-13), 1e-11))
+@by_setting((VelocityVerlet(2e-9), 5e-10), (DormandPrince54(1e-13), 1e-11))
 @pytest.mark.parametrize("scene", ["spheres", "octagons"])
 def test_a_sticky_rolling_doublet_is_the_same_for_all_methods(scene, integrator, allowed):
     exact = run(scene, Implicit(1e-14))

@@ -5,9 +5,12 @@ from itertools import combinations
 
 import numpy as np
 
-from tests.reference.contacts import closest, contacts
+from tests.reference.contacts import contacts, measure, pairs_of
 
 VACUUM_PERMITTIVITY = 8.854e-12
+
+CENTRE_SOFTENING = 1e-4
+"""ε as a share of r_i + r_j."""
 
 
 def loads(scene, laws, displacement=None):
@@ -88,7 +91,8 @@ class Drag:
 class PairLaw:
     """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d.
 
-    At gaps from `reach` on the force is left out.
+    At gaps from `reach` on the force is left out. `smoothing` ℓ [m]: of the soft minimum
+    g̃ = −ℓ ln Σ exp(−g_k/ℓ) over the gaps of all pairs, which is the gap of two outlines.
     """
 
     def loads(self, scene):
@@ -104,20 +108,25 @@ class PairLaw:
         return self.repulsion(d, reduced_radius) if d < self.reach else 0.0
 
     def along_centres(self, total, scene, i, j, radii):
-        """d = d_c − r_i − r_j with equivalent radii; along the line of centres, no torque."""
+        """d = √(d_c² + ε²) − r_i − r_j with equivalent radii; along its gradient, no torque."""
         between = scene.positions[i, :2] - scene.positions[j, :2]
-        centre_distance = np.hypot(*between)
+        centre_distance = np.hypot(np.hypot(*between), CENTRE_SOFTENING * sum(radii))
         force = self.within_reach(centre_distance - sum(radii), reduced(*radii))
         total[i, :2] += force * between / centre_distance
         total[j, :2] -= force * between / centre_distance
 
     def at_surfaces(self, total, scene, i, j, radii):
-        """d = least distance of the outlines; at the closest points, so with torque."""
-        pair = closest(scene, i, j)
-        force = self.within_reach(-pair.overlap[0], reduced(*radii)) * pair.normal[0]
-        vertex_body, _, edge_body, _ = pair.pair[0]
-        add_force(total, scene, vertex_body, force, pair.point[0])
-        add_force(total, scene, edge_body, -force, pair.point[0])
+        """d = soft minimum of the gaps of all pairs k; each takes its share at its own points."""
+        every = measure(scene, pairs_of(scene.bodies, i, j))
+        gaps = -every.overlap
+        weights = np.exp((gaps.min() - gaps) / self.smoothing)
+        gap = gaps.min() - self.smoothing * np.log(weights.sum())
+        repulsion = self.within_reach(gap, reduced(*radii))
+        for k in np.flatnonzero(weights):
+            force = repulsion * weights[k] / weights.sum() * every.normal[k]
+            vertex_body, _, edge_body, _ = every.pair[k]
+            add_force(total, scene, vertex_body, force, every.point[k])
+            add_force(total, scene, edge_body, -force, every.point[k])
 
 
 @dataclass(frozen=True)
@@ -128,6 +137,7 @@ class VanDerWaals(PairLaw):
     d_min: float = 1e-9
     gap: str = "equivalent_spheres"
     reach: float = np.inf
+    smoothing: float = 1e-12
 
     def repulsion(self, d, reduced_radius):
         return -self.hamaker * reduced_radius / (6 * max(d, self.d_min) ** 2)
@@ -146,6 +156,7 @@ class DoubleLayer(PairLaw):
     permittivity: float = 78.5
     gap: str = "equivalent_spheres"
     reach: float = np.inf
+    smoothing: float = 1e-12
 
     def repulsion(self, d, reduced_radius):
         permittivity = VACUUM_PERMITTIVITY * self.permittivity

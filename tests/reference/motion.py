@@ -98,7 +98,7 @@ class Motion:
         touching = np.where(at_contact, every.normal_velocity < 0, every.overlap > 0)
         closed, opened = touching & ~self.active, self.active & ~touching
         for row in np.flatnonzero(opened):
-            hand_over(every, row, np.flatnonzero(touching), self.xi)
+            hand_over(self.bodies, every, row, np.flatnonzero(touching), self.xi)
         self.xi[~touching] = 0.0
         self.active = touching
         return every.select(closed).pair_keys(), every.select(opened).pair_keys()
@@ -156,16 +156,39 @@ def relative_motion(bodies, change):
     return max(motions, default=0.0)
 
 
-def hand_over(every, row, receivers, xi):
-    """Give the ξ of an opening pair to the nearest pair of the same bodies that stays closed.
+def corners(bodies, body, edge):
+    """The vertices at the ends of an edge."""
+    return {edge, (edge + 1) % len(bodies[body].vertices)}
 
-    As a vector ξ t on the vertex's body, projected on the receiver's tangent; with the last
-    pair of the two bodies it vanishes.
+
+def neighbours(bodies, one, other):
+    """Whether two pairs (vertex's body, vertex, edge's body, edge) are of neighbouring features."""
+    (a, vertex, b, edge), (c, vertex_2, _, edge_2) = one, other
+    if a != c:
+        return vertex_2 in corners(bodies, b, edge) and vertex in corners(bodies, a, edge_2)
+    count = len(bodies[a].vertices)
+    beside = {vertex, (vertex + 1) % count, (vertex - 1) % count}
+    return vertex_2 in beside and bool(corners(bodies, b, edge) & corners(bodies, b, edge_2))
+
+
+def hand_over(bodies, every, row, receivers, xi):
+    """Give the ξ of an opening pair to the pair of the same bodies that the contact rolls on to.
+
+    The nearest that stays closed, if it is of neighbouring features or within r_i + r_j. As a
+    vector ξ t on the vertex's body, projected on the receiver's tangent, and no more than leaves
+    Σ ξ² as it was; without a receiver it vanishes.
     """
-    same = [r for r in receivers if set(every.pair[r, ::2]) == set(every.pair[row, ::2])]
+    apart = np.hypot(*(every.point - every.point[row]).T)
+    reach = every.overlap[row] + every.distance[row]
+    same = [
+        r for r in receivers
+        if set(every.pair[r, ::2]) == set(every.pair[row, ::2])
+        and (apart[r] <= reach or neighbours(bodies, every.pair[row], every.pair[r]))
+    ]  # fmt: skip
     if same:
-        apart = [np.hypot(*(every.point[r] - every.point[row])) for r in same]
-        nearest = same[int(np.argmin(apart))]
+        nearest = same[int(np.argmin(apart[same]))]
         side = 1.0 if every.pair[nearest, 0] == every.pair[row, 0] else -1.0
-        xi[nearest] += side * (every.tangent[row] @ every.tangent[nearest]) * xi[row]
+        most = np.hypot(xi[row], xi[nearest])
+        total = xi[nearest] + side * (every.tangent[row] @ every.tangent[nearest]) * xi[row]
+        xi[nearest] = np.clip(total, -most, most)
     xi[row] = 0.0

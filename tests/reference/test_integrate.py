@@ -118,25 +118,44 @@ def test_displacement_is_the_path_slid():
     assert motion.displacement == {(1, 0, 0, 0): pytest.approx(3e-7 - 1e-6, rel=1e-6)}
 
 
-@pytest.mark.parametrize("seed", [2, 7, 9, 16, 22])
-def test_hand_over_keeps_the_tangential_force_along_the_nearest_pair(seed):
-    pairs = contacts(scene_of(seed))
+@pytest.mark.parametrize("seed", range(40))
+def test_hand_over_keeps_the_tangential_force_as_far_as_energy_allows(seed):
+    scene = scene_of(seed)
+    pairs = contacts(scene)
+    if len(pairs.overlap) < 2:
+        return
     same = np.flatnonzero([set(p) == set(pairs.pair[0, ::2]) for p in pairs.pair[:, ::2]])
     before = np.random.default_rng(seed).normal(size=len(pairs.overlap))
     after = before.copy()
-    hand_over(pairs, 0, same[1:], after)
-    nearest = np.flatnonzero(after[1:] != before[1:]) + 1
-    distance = np.hypot(*(pairs.point[same[1:]] - pairs.point[0]).T)
-    assert nearest == same[1:][np.argmin(distance)]
+    hand_over(scene.bodies, pairs, 0, same[1:], after)
+    assert after[0] == 0.0 and np.sum(after**2) <= np.sum(before**2) * (1.0 + 1e-12)
+    changed = np.flatnonzero(after[1:] != before[1:]) + 1
+    if not changed.size:
+        return
+    heir = changed[0]
     side = np.where(pairs.pair[:, 0] == pairs.pair[0, 0], 1.0, -1.0)[same, None]
     forces = [np.sum(side * xi[same, None] * pairs.tangent[same], axis=0) for xi in (before, after)]
-    assert (forces[1] - forces[0]) @ pairs.tangent[nearest[0]] == pytest.approx(0.0, abs=1e-14)
-    assert after[0] == 0.0
+    jump = (forces[1] - forces[0]) @ pairs.tangent[heir]
+    if np.sum(after**2) < np.sum(before**2) * (1.0 - 1e-12):
+        assert jump == pytest.approx(0.0, abs=1e-14)
+    assert abs(after[heir]) <= np.hypot(before[0], before[heir]) * (1.0 + 1e-12)
+
+
+def test_these_scenes_hand_over():
+    handed = 0
+    for seed in range(40):
+        scene = scene_of(seed)
+        pairs, xi = contacts(scene), None
+        if len(pairs.overlap) > 1:
+            xi = np.arange(1.0, 1.0 + len(pairs.overlap))
+            hand_over(scene.bodies, pairs, 0, range(1, len(xi)), xi)
+            handed += bool(np.any(xi[1:] != np.arange(2.0, 1.0 + len(xi))))
+    assert handed > 8
 
 
 def test_displacement_vanishes_with_the_last_pair_of_two_bodies():
-    pairs, xi = contacts(scene_of(1)), np.ones(2)
-    hand_over(pairs, 0, [], xi)
+    scene, xi = scene_of(1), np.ones(2)
+    hand_over(scene.bodies, contacts(scene), 0, [], xi)
     assert xi.tolist() == [0.0, 1.0]
 
 

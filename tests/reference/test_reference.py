@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.reference.contacts import surface_gap
+from tests.reference.contacts import measure, pairs_of
 from tests.reference.forces import Contact, Drag, VanDerWaals, loads, reduced
 from tests.reference.samples import (
     CONTACT,
@@ -84,19 +84,25 @@ def test_elastic_force_is_minus_the_gradient_of_the_energy(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_surface_attraction_is_minus_the_gradient_of_its_potential(seed):
-    scene, law = scene_of(seed), VanDerWaals(1e-18, d_min=2e-6, gap="surface")
+    scene, law = scene_of(seed), VanDerWaals(1e-18, d_min=2e-6, gap="surface", smoothing=1e-8)
 
     def potential(moved):
         """∫ of eq. 5 with its cut-off: F d up to d_min, 1/d beyond."""
         total = 0.0
         for i, j in [(0, 1), (0, 2), (1, 2)][: 1 if len(moved.bodies) == 2 else 3]:
             radii = [moved.bodies[k].equivalent_radius for k in (i, j)]
-            d, strength = surface_gap(moved, i, j), law.hamaker * reduced(*radii) / 6
+            d, strength = smooth_gap(moved, i, j, 1e-8), law.hamaker * reduced(*radii) / 6
             flat = strength * (d - law.d_min) / law.d_min**2 - strength / law.d_min
             total += flat if d < law.d_min else -strength / d
         return total
 
     assert_gradient(loads(scene, [law]), gradient_of(potential, scene))
+
+
+def smooth_gap(scene, i, j, smoothing):
+    """The soft minimum of the gaps of all pairs of two bodies [m]."""
+    gaps = -measure(scene, pairs_of(scene.bodies, i, j)).overlap
+    return gaps.min() - smoothing * np.log(np.exp((gaps.min() - gaps) / smoothing).sum())
 
 
 def gradient_of(energy, scene):

@@ -16,7 +16,8 @@ from flocsim.compiler.reads import where
 from flocsim.forces.codegen import laws_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.rhs.views import body_view, centre_view, contact_view, surface_view
+from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
+from flocsim.integrators.rhs.views import body_view, centre_view, contact_view
 from flocsim.run import Run
 from flocsim.system import System
 
@@ -46,7 +47,9 @@ def views_of(system, scene, work, time):
     if compose(locate, system.fillings(), jit=False)(scene, work):
         rows = range(work.tally[CANDIDATES])
         touching = [row for row in rows if work.geometry[NOW, row, GAP] < 0.0]
-        views["surface"] = [surface_view(scene, work, time, NOW, row) for row in rows]
+        flag_near(scene, work, NOW, 0.0)
+        count = work.tally[CANDIDATES]
+        views["surface"] = [surface_view(scene, work, time, NOW, 0, count)] if count else []
         views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
     return views
 

@@ -10,6 +10,7 @@ import numpy as np
 from flocsim import hooks
 from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
+from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.blame import force_to_blame
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, UNABLE, WHY, collided, outcome_of
@@ -19,7 +20,7 @@ from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
-from flocsim.io.results.schema import NOT_APPLICABLE
+from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 from flocsim.run import Run
 from flocsim.system import System
 
@@ -81,15 +82,15 @@ class Encounter:
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
-        observed = np.zeros(outcomes.OBSERVED_SIZE)
+        observed = np.zeros(numbers.OBSERVED_SIZE)
         escape = options.start_gap if options.escape_gap == "start_gap" else options.escape_gap
         rest = REST_TURNS * self.turn_time if options.rest_time == "auto" else options.rest_time
-        observed[outcomes.ZONE] = self.zone_distance
-        observed[outcomes.ESCAPE] = escape
-        observed[outcomes.REST_TIME] = rest
-        observed[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
-        observed[outcomes.MOBILITY_I] = self.settling[0][1]
-        observed[outcomes.MOBILITY_J] = self.settling[1][1]
+        observed[numbers.ZONE] = self.zone_distance
+        observed[numbers.ESCAPE] = escape
+        observed[numbers.REST_TIME] = rest
+        observed[numbers.DRIFT_X : numbers.DRIFT_Y + 1] = self.drift
+        observed[numbers.MOBILITY_I] = self.settling[0][1]
+        observed[numbers.MOBILITY_J] = self.settling[1][1]
         return observed
 
     def time_limit(self) -> float:
@@ -198,12 +199,13 @@ def replicate_row(status, angles, run):
         "angle_i": angles[0],
         "angle_j": angles[1],
         "outcome": outcome,
-        "inside": int(observed[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(observed[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
-        "d_c_collision": observed[outcomes.D_COLLISION] if touched else np.nan,
-        "d_c_max": observed[outcomes.D_MAX] if touched else np.nan,
-        "d_c_last": observed[outcomes.D_LAST],
-        "t_collision": observed[outcomes.T_COLLISION] if touched else np.nan,
+        "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
+        "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
+        "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
+        "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
+        "d_c_last": observed[numbers.D_LAST],
+        "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,
         "t_end": run.time,
         "steps": run.steps,
         "rejected": run.rejected,

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.collision.outcomes import BOUND, COLLIDED, DEPARTED, INSIDE, MISSED
+from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
+from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, MISSED
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES

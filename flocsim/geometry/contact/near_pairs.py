@@ -9,10 +9,10 @@ from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
     CLOSED,
-    CLOSEST,
     EDGE_BODY,
     EDGE_END,
     EDGE_START,
+    NEAR,
     NOW,
     RADIUS,
     VERTEX,
@@ -58,7 +58,7 @@ def add_pair(work, a, point, b, start, end):
         work.candidates[row, EDGE_START],
         work.candidates[row, EDGE_END],
     ) = b, start, end
-    work.candidates[row, CLOSED], work.candidates[row, CLOSEST] = 0, 0
+    work.candidates[row, CLOSED], work.candidates[row, NEAR] = 0, 0
     work.tally[CANDIDATES] = row + 1
     return True
 

@@ -15,7 +15,6 @@ from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
     CLOSED,
-    CLOSEST,
     COSINE,
     EDGE_ARM_N,
     EDGE_ARM_T,
@@ -23,6 +22,7 @@ from flocsim.arrays import (
     EDGE_END,
     EDGE_START,
     GAP,
+    NEAR,
     NORMAL_X,
     NORMAL_Y,
     NOW,
@@ -136,7 +136,7 @@ def locate_acting(scene, work, state):
     """Geometry, in a state, of the listed pairs through which forces act in this step."""
     turn_bodies(work, state)
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] + work.candidates[row, CLOSEST] > 0:
+        if work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0:
             locate_polygons(scene, work, state, row)
 
 

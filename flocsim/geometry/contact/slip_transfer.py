@@ -7,6 +7,7 @@ from flocsim.arrays import (
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
+    EDGE_END,
     EDGE_START,
     GAP,
     KEPT,
@@ -16,6 +17,7 @@ from flocsim.arrays import (
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    RADIUS,
     VERTEX,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
@@ -52,19 +54,47 @@ def restore_slips(work, count):
     work.tally[KEPT] = 0
 
 
-def nearest_active(work, row):
-    """The closed pair of the same two bodies nearest to an opening one, −1 where none is left."""
+def same_corner(scene, body, point, other):
+    """Whether two core points of a body are the same one or follow each other."""
+    count = scene.first[body + 1] - scene.first[body]
+    apart = abs(point - other)
+    return apart <= 1 or apart == count - 1
+
+
+def same_end(start, end, other_start, other_end):
+    """Whether two edges of a body are the same one or meet."""
+    return start in (other_start, other_end) or end in (other_start, other_end)
+
+
+def rolls_on_to(scene, work, row, other):
+    """Whether a pair of features of the same two bodies neighbours another, either way round."""
+    pairs = work.candidates
+    point, start, end = pairs[row, VERTEX], pairs[row, EDGE_START], pairs[row, EDGE_END]
+    on, first, last = pairs[other, VERTEX], pairs[other, EDGE_START], pairs[other, EDGE_END]
+    if pairs[row, VERTEX_BODY] == pairs[other, VERTEX_BODY]:
+        near = same_corner(scene, pairs[row, VERTEX_BODY], point, on)
+        return near and same_end(start, end, first, last)
+    return on in (start, end) and point in (first, last)
+
+
+def heir_of(scene, work, row):
+    """The closed pair that a contact rolls on to when this one opens, −1 where it does not.
+
+    The nearest contact point of the same two bodies, if it is of a neighbouring pair of features
+    or within r_i + r_j of the spheroradii.
+    """
     found = -1
     least = math.inf
     low = min(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
     high = max(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
+    near = scene.bodies[low, RADIUS] + scene.bodies[high, RADIUS]
     x, y = contact_point(work, row, low)
     for other in range(work.tally[CANDIDATES]):
         a, b = work.candidates[other, VERTEX_BODY], work.candidates[other, EDGE_BODY]
         if work.geometry[NOW, other, GAP] < 0.0 and min(a, b) == low and max(a, b) == high:
             ox, oy = contact_point(work, other, low)
-            distance = (ox - x) ** 2 + (oy - y) ** 2
-            if distance < least:
+            distance = math.hypot(ox - x, oy - y)
+            if distance < least and (distance <= near or rolls_on_to(scene, work, row, other)):
                 least = distance
                 found = other
     return found
@@ -81,17 +111,21 @@ def contact_point(work, row, body):
     return along * nx + across * ny, along * ny - across * nx
 
 
-def hand_over(work):
-    """Pass the displacement of every pair that has opened on to the nearest that carries on.
+def hand_over(scene, work):
+    """Pass the displacement of every pair that has opened on to the pair that it rolls on to.
 
-    The tangential force of a contact that rolls from pair to pair then does not jump; with the
-    last pair it vanishes. Expects the geometry of the current position.
+    The tangential force of a contact that rolls on then does not jump, as far as energy allows:
+    Σ ½ k_t ξ² of the two bodies never grows, since what it grew by would drive them without end.
+    Without an heir ξ vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[CANDIDATES]):
         if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0:
-            heir = nearest_active(work, row)
+            heir = heir_of(scene, work, row)
             if heir >= 0:
-                work.slip[NOW, heir] += work.slip[NOW, row] * tangent_agreement(work, row, heir)
+                own, given = work.slip[NOW, heir], work.slip[NOW, row]
+                most = math.hypot(own, given)
+                total = own + given * tangent_agreement(work, row, heir)
+                work.slip[NOW, heir] = min(max(total, -most), most)
             work.slip[NOW, row] = 0.0
 
 

@@ -10,7 +10,6 @@ import math
 
 from flocsim.arrays import CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
-from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import first_switch
 from flocsim.integrators.events.resolution import furthest_place
@@ -77,8 +76,10 @@ def law_event_share(scene, work, share):
 
 
 def switch_share(scene, work, observed, clock, step):
-    """The share of the step at which the first pair switches; above 1 where none does."""
-    locate_contacts(scene, work, NEW)
+    """The share of the step at which the first pair switches; above 1 where none does.
+
+    Expects the geometry of all pairs in NEW.
+    """
     if clock[TOLERANCE] < math.inf or awaits_touch(observed):
         resolution = resolution_of(work, clock)
         shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])

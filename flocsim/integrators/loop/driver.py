@@ -34,8 +34,9 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, observe
 from flocsim.integrators.events.first_event import switch_share
-from flocsim.integrators.events.modes import SAME, set_modes
+from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
+from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
@@ -71,15 +72,15 @@ def take_new_state(work):
 
 
 def accept(scene, work, clock, counts, step, lists):
-    """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
+    """Go on from the new state, its pairs flagged anew; whether any pair closed or opened."""
     take_new_state(work)
     clock[TIME] += step
     counts[STEPS] += 1
     clock[ERROR] += clock[STEP_ERROR]
     if not lists:
-        return SAME
-    switched = set_modes(scene, work, NOW)
-    hand_over(work)
+        return False
+    switched = set_modes(work)
+    hand_over(scene, work)
     return switched
 
 
@@ -110,8 +111,16 @@ def keep_lists(scene, work):
         if not list_candidates(scene, work):
             return False
         locate_contacts(scene, work, NOW)
-        set_modes(scene, work, NOW)
+        set_modes(work)
     return True
+
+
+def went_too_far(scene, work, clock):
+    """Locate all pairs at the end of the step; whether what was listed or flagged is not enough."""
+    if spent(scene, work, NEW) > 1.0:
+        return True
+    locate_contacts(scene, work, NEW)
+    return scene.surface_reach > 0.0 and clock[TOLERANCE] < math.inf and overlooked(scene, work)
 
 
 def look(scene, work, observed, clock, counts, record, lists):
@@ -138,10 +147,12 @@ def advance(scene, work, observed, clock, counts, record):
         if lists and trials == 0 and not keep_lists(scene, work):
             return NO_ROOM
         step = min(choose_step(scene, work, clock, lists), limit)
+        if scene.surface_reach > 0.0:
+            flag_near(scene, work, NOW, step)
         ratio = attempt(scene, work, clock, step)
         if ratio < 0.0 and clock[TOLERANCE] == math.inf:
             return NOT_FINITE
-        too_far = lists and ratio >= 0.0 and spent(scene, work, NEW) > 1.0
+        too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock)
         if ratio < 0.0 or ratio > 1.0 or too_far:
             limit, trials = math.inf, 0
             if not reject(clock, counts, step, ratio, too_far):

@@ -24,7 +24,6 @@ from flocsim.arrays import (
 from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolution_of
-from flocsim.integrators.events.modes import OTHER_CLOSEST, OTHER_CONTACTS
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
 
@@ -127,7 +126,7 @@ def reject(clock, counts, step, ratio, too_far):
 def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
     clock[REJECTED_STEP] = 0.0
-    if switched == OTHER_CONTACTS or (was_cut and switched == OTHER_CLOSEST):
+    if switched:
         # The forces are new, and settle about as fast as behind the last switch.
         clock[PREVIOUS_STEP] = math.inf
         clock[STAGED_STEP] = 0.0

@@ -19,7 +19,6 @@ from flocsim.arrays import (
     CANDIDATES,
     CHANGE,
     CLOSED,
-    CLOSEST,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
@@ -30,9 +29,11 @@ from flocsim.arrays import (
     MASS,
     MASS_SUM,
     MOST_FRAMES,
+    NEAR,
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    SHARE,
     SHIFT_SUM,
     SHIFT_X,
     SHIFT_Y,
@@ -46,9 +47,19 @@ from flocsim.arrays import (
 )
 from flocsim.laws import CENTRE_FORCE, has
 
+LEADING_SHARE = 0.2
+"""Share of a surface force from which on a pair's normal counts among those that bodies follow."""
+
 
 def acts(work, row):
-    return work.candidates[row, CLOSED] + work.candidates[row, CLOSEST] > 0
+    return work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0
+
+
+def leads(work, row):
+    """Whether a pair acts on its bodies strongly enough to tell how they turn."""
+    return work.candidates[row, CLOSED] == 1 or (
+        work.candidates[row, NEAR] == 1 and work.geometry[NOW, row, SHARE] > LEADING_SHARE
+    )
 
 
 def join(scene, work, a, b):
@@ -131,7 +142,7 @@ def follow_contacts(work):
         for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
             work.bodies[body, column] = 0.0
     for row in range(work.tally[CANDIDATES]):
-        if acts(work, row):
+        if leads(work, row):
             for stage in range(3):
                 add_frame(work, row, stage)
     average_shifts(work)

@@ -1,30 +1,30 @@
 """The right-hand side as it stands: all forces and torques in a state.
 
-Forces act through the listed pairs that are flagged as closed, or as the closest of two bodies.
+Forces act through the listed pairs that are flagged as closed, or as near (surface_gap.py).
 An integrator that freezes these flags for a step has a smooth right-hand side in it.
 """
 
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
-    CLOSEST,
     EVALUATIONS,
     FORCE,
     GEOMETRY_COLUMNS,
     MOTION_COLUMNS,
     NEW,
+    SHARE,
     SLIP_RATES,
     VELOCITY,
 )
 from flocsim.geometry.contact.points import locate_acting
+from flocsim.integrators.rhs.surface_gap import run_end, surface_view
 from flocsim.integrators.rhs.views import (
     add_force,
     body_view,
-    centre_line,
     centre_view,
     contact_view,
     push_pair,
-    surface_view,
+    soft_centre_line,
     tangential_rate,
 )
 from flocsim.laws import (
@@ -74,17 +74,22 @@ def add_centre_forces(scene, work, time, state):
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             view = centre_view(scene, work, time, state, a, b)
-            nx, ny, _ = centre_line(work, state, a, b)
+            nx, ny, _ = soft_centre_line(scene, work, state, a, b)
             repulsion = centre_force(scene, view)
             add_force(work, state, a, repulsion * nx, repulsion * ny, 0.0)
             add_force(work, state, b, -repulsion * nx, -repulsion * ny, 0.0)
 
 
 def add_surface_forces(scene, work, time, state):
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSEST] == 1:
-            view = surface_view(scene, work, time, state, row)
-            push_pair(work, state, row, surface_force(scene, view), 0.0)
+    row = 0
+    while row < work.tally[CANDIDATES]:
+        end = run_end(work, row)
+        repulsion = surface_force(scene, surface_view(scene, work, time, state, row, end))
+        for each in range(row, end):
+            share = work.geometry[state, each, SHARE]
+            if share > 0.0:
+                push_pair(work, state, each, share * repulsion, 0.0)
+        row = end
 
 
 def add_contact_forces(scene, work, state):

@@ -15,7 +15,6 @@ from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
     CLOSED,
-    CLOSEST,
     DAMPING,
     EDGE_ARM_N,
     EDGE_ARM_T,
@@ -25,6 +24,7 @@ from flocsim.arrays import (
     NORMAL_Y,
     NOW,
     RADIUS,
+    SHARE,
     STIFFNESS,
     TURNING,
     VERTEX_ARM_N,
@@ -32,12 +32,12 @@ from flocsim.arrays import (
     VERTEX_BODY,
 )
 from flocsim.integrators.rhs.error import remember_velocities
+from flocsim.integrators.rhs.surface_gap import mean_direction, run_end, surface_view
 from flocsim.integrators.rhs.views import (
     body_view,
-    centre_line,
     centre_view,
     contact_view,
-    surface_view,
+    soft_centre_line,
 )
 from flocsim.laws import (
     CENTRE_FORCE,
@@ -82,6 +82,12 @@ def add_product(work, which, a, b, out, by, weight):
             matrix[which, 3 * b + i, 3 * a + j] += weight * out_b[i] * by_a[j]
             matrix[which, 3 * b + i, 3 * b + j] += weight * out_b[i] * by_b[j]
 
+
+SHIFT_OF_X, SHIFT_OF_Y = (
+    ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+    ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0)),
+)
+"""Directions of two bodies: apart along an axis."""
 
 NOTHING = (0.0, 0.0, 0.0)
 """A body on which a direction has no entries."""
@@ -171,28 +177,38 @@ def add_centres(scene, work, time):
     for a in range(scene.bodies.shape[0]):
         for b in range(a):
             view = centre_view(scene, work, time, NOW, a, b)
-            nx, ny, distance = centre_line(work, NOW, a, b)
+            nx, ny, distance = soft_centre_line(scene, work, NOW, a, b)
             along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
-            across = ((-ny, nx, 0.0), (ny, -nx, 0.0))
             slope, damping = centre_derivatives(scene, view)
-            add_product(work, STIFFNESS, a, b, along, along, -slope)
+            # The gradient (x, y)/d turns and, near d_c = 0, grows by (1 − n nᵀ)/d.
+            turning = -centre_force(scene, view) / distance
+            add_product(work, STIFFNESS, a, b, along, along, -slope - turning)
+            add_product(work, STIFFNESS, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
+            add_product(work, STIFFNESS, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
             add_product(work, DAMPING, a, b, along, along, damping)
-            if distance > 0.0:
-                turning = -centre_force(scene, view) / distance
-                add_product(work, STIFFNESS, a, b, across, across, turning)
 
 
 def add_surfaces(scene, work, time):
-    """Derivatives of the surface forces, at the closest pair of every two bodies."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSEST] == 1:
-            view = surface_view(scene, work, time, NOW, row)
-            along = normal_rows(work, row)
-            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-            slope, damping = surface_derivatives(scene, view)
-            add_product(work, STIFFNESS, a, b, along, along, -slope)
-            add_product(work, DAMPING, a, b, along, along, damping)
-            add_turning(scene, work, row, surface_force(scene, view), 0.0)
+    """Derivatives of the surface forces: of the gap g̃, of the shares in it and of the normals."""
+    row = 0
+    while row < work.tally[CANDIDATES]:
+        end = run_end(work, row)
+        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        view = surface_view(scene, work, time, NOW, row, end)
+        repulsion = surface_force(scene, view)
+        slope, damping = surface_derivatives(scene, view)
+        mean = mean_direction(work, row, end)
+        spread = repulsion / scene.smoothing
+        add_product(work, STIFFNESS, a, b, mean, mean, -slope - spread)
+        add_product(work, DAMPING, a, b, mean, mean, damping)
+        for each in range(row, end):
+            share = work.geometry[NOW, each, SHARE]
+            if share > 0.0:
+                c, d = work.candidates[each, VERTEX_BODY], work.candidates[each, EDGE_BODY]
+                along = normal_rows(work, each)
+                add_product(work, STIFFNESS, c, d, along, along, share * spread)
+                add_turning(scene, work, each, share * repulsion, 0.0)
+        row = end
 
 
 def weigh_velocities(scene, work, time, remaining):

@@ -6,7 +6,6 @@ from flocsim.arrays import (
     ANGLE,
     BOUNDING_RADIUS,
     BUOYANT_MASS,
-    CANDIDATES,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
@@ -33,6 +32,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.constants import CENTRE_SOFTENING
 from flocsim.hooks import hook
 
 
@@ -137,21 +137,6 @@ def push_pair(work, state, row, normal, tangential):
     add_force(work, state, b, -fx, -fy, -torque_b)
 
 
-def closest_rows(work, state, row):
-    """(end of the run of rows that belong to the same two bodies, row with the smallest gap)."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    closest = row
-    end = row
-    while end < work.tally[CANDIDATES]:
-        c, d = work.candidates[end, VERTEX_BODY], work.candidates[end, EDGE_BODY]
-        if not ((c == a and d == b) or (c == b and d == a)):
-            break
-        if work.geometry[state, end, GAP] < work.geometry[state, closest, GAP]:
-            closest = end
-        end += 1
-    return end, closest
-
-
 def centre_line(work, state, a, b):
     """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
     dx = work.motion[state, a, X] - work.motion[state, b, X]
@@ -162,19 +147,21 @@ def centre_line(work, state, a, b):
     return dx / distance, dy / distance, distance
 
 
+def soft_centre_line(scene, work, state, a, b):
+    """The same of d = √(d_c² + ε²), whose gradient (n_x, n_y) fades out towards d_c = 0."""
+    dx = work.motion[state, a, X] - work.motion[state, b, X]
+    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    reach = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    softening = CENTRE_SOFTENING * reach
+    distance = math.sqrt(dx * dx + dy * dy + softening * softening)
+    return dx / distance, dy / distance, distance
+
+
 def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
-    nx, ny, distance = centre_line(work, state, a, b)
+    nx, ny, distance = soft_centre_line(scene, work, state, a, b)
     motion = work.motion
     rate = nx * (motion[state, a, VX] - motion[state, b, VX])
     rate += ny * (motion[state, a, VY] - motion[state, b, VY])
     gap = distance - scene.bodies[a, EQUIVALENT_RADIUS] - scene.bodies[b, EQUIVALENT_RADIUS]
     return pair_view(scene, time, a, b, gap, rate, distance)
-
-
-def surface_view(scene, work, time, state, row):
-    """The PairView of the two bodies of a listed pair, their gap being the pair's."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    _, _, distance = centre_line(work, state, a, b)
-    rate = normal_rate(work, state, row)
-    return pair_view(scene, time, a, b, work.geometry[state, row, GAP], rate, distance)

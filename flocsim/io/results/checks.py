@@ -8,7 +8,9 @@ import numpy as np
 from flocsim.io.hdf5.expected import Column, hold_against
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.results.schema import (
+    AGGREGATED,
     AXES,
+    BONDS,
     CLASSES,
     DIFFERENCES,
     EVENTS,
@@ -137,6 +139,10 @@ def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
+    bound = np.isin(outcome, [OUTCOMES.index(name) for name in AGGREGATED])
+    bond = column("bond")
+    held = (bond >= 1) & (bond <= len(BONDS))
+    refuse_row(np.where(bound, ~held, bond != NOT_APPLICABLE), "bond")
     for name in ("floc_i", "floc_j"):
         places = column(name)
         refuse_row((places < -1) | (places >= (flocs or 2**31)), name)

@@ -13,8 +13,9 @@ from flocsim.errors import UsageError
 OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed")
 """Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone."""
 CLASSES = OUTCOMES[:4]
+AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
-"""In ``inside`` and ``crossed_zone``: the outlines never touched."""
+"""In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound."""
 
 AXES = ("type", "vertices", "delta")
 
@@ -24,6 +25,7 @@ REPLICATES = {  # name: (dtype, units, long name)
     "outcome": ("u1", "1", "outcome of the approach"),
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
+    "bond": ("u1", "1", "what holds an aggregated pair"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
     "d_c_last": ("f8", "m", "last centre distance"),
@@ -77,12 +79,16 @@ DIFFERENCES = {
     "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
     "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
 }
+BONDS = ("certificate", "hook", "rest")
+"""Kinds of bond, from code 1 on: no later load can open it; shapes hook into each other, attraction
+being weaker than the load; the pair rests, held by more attraction than load."""
 EVENTS = ("inside", "aggregated")
 """Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
 FLAGS = {
     "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
     "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
+    "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
 COORDINATES = {
     "type": ("1", "collision type or pair of equivalent radii (i/j)"),

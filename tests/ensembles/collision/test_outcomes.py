@@ -9,7 +9,8 @@ from shapely.geometry import Polygon
 
 from flocsim import SpheroPolygon
 from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
-from flocsim.ensembles.collision import outcomes
+from flocsim.ensembles.collision import bonds, outcomes
+from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
@@ -255,11 +256,11 @@ def test_a_pair_apart_and_parting_has_departed(study):
 
     def seen(gap, collided):
         work.motion[NOW, 1, :2] = 0.0, -(contact + gap)
-        observed[outcomes.COLLIDED] = collided
+        observed[numbers.COLLIDED] = collided
         return watch_pair(scene, work, observed, 0.0)
 
     scene = encounter.system.scene(jit=False)
-    escape = observed[outcomes.ESCAPE]
+    escape = observed[numbers.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
     work.motion[NOW, 1, 4] = 0.0
@@ -276,9 +277,9 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     work.motion[NOW, :, 5] = spin
     work.motion[NOW, 1, 1] = -reach
     work.motion[NOW, 1, 3] = spin * reach
-    later = 2.0 * observed[outcomes.REST_TIME]
-    outcomes.start_rest(work, observed, 0.0)
-    assert not outcomes.has_rested(encounter.scene, work, observed, later, 0.0, -1.0)
+    later = 2.0 * observed[numbers.REST_TIME]
+    bonds.start_rest(work, observed, 0.0)
+    assert not bonds.has_rested(encounter.scene, work, observed, later, 0.0, -1.0, 1.0)
     # Without the swing it does.
     work.motion[NOW, :, 3:] = 0.0
-    assert outcomes.has_rested(encounter.scene, work, observed, later, 0.0, -1.0)
+    assert bonds.has_rested(encounter.scene, work, observed, later, 0.0, -1.0, 1.0)

@@ -48,13 +48,13 @@ def slide(scene, work, length, passing_on=hand_over, steps=400):
     step = length / steps / work.motion[NOW, 1, 3]
     pulls = []
     for _ in range(steps):
-        set_modes(scene, work)
+        set_modes(work)
         rate_slips(work, NOW)
         closed = work.candidates[:, CLOSED] == 1
         work.slip[NOW, closed] += step * work.slip[SLIP_RATES + NOW, closed]
         work.motion[NOW, 1, 0] += length / steps
         locate_contacts(scene, work, NOW)
-        passing_on(work)
+        passing_on(scene, work)
         if spent(scene, work, NOW) > 0.5:
             assert list_candidates(scene, work)
             locate_contacts(scene, work, NOW)
@@ -73,14 +73,16 @@ def ball_on(corners):
 def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
     length, steps = 16e-6, 400
     pulls = slide(*ball_on(CORNERS), length, steps=steps)
-    # At a corner several pairs act at once, each with its own spring.
-    assert np.abs(np.diff(pulls)).max() <= 4.0 * length / steps
-    assert np.all(np.diff(pulls) < 0.0)
+    # At a corner several pairs act at once, each with its own spring: behind it, one holds what
+    # their energy allows, and so nearly what one spring on an undivided edge would hold.
+    lens = 2.0 * np.sqrt(2.0 * (RADIUS + BALL) * OVERLAP)
+    assert np.abs(np.diff(pulls)).max() <= lens
+    assert pulls[-1] == pytest.approx(-length, rel=0.05)
     dropped = slide(*ball_on(CORNERS), length, passing_on=forget, steps=steps)
-    assert np.abs(np.diff(dropped)).max() > 20.0 * length / steps
+    assert np.abs(np.diff(dropped)).max() > 4.0 * lens
 
 
-def forget(work):
+def forget(scene, work):
     """What no hand-over would do: an opening pair loses its displacement."""
     opened = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
     work.slip[NOW, : work.tally[CANDIDATES]][opened] = 0.0
@@ -97,7 +99,7 @@ def test_the_displacement_vanishes_with_the_last_pair():
     assert pull(work) != 0.0
     work.motion[NOW, 1, 1] += 2.0 * OVERLAP
     locate_contacts(scene, work, NOW)
-    hand_over(work)
+    hand_over(scene, work)
     assert not work.slip[NOW].any()
     work.motion[NOW, 1, 1] -= 2.0 * OVERLAP
     locate_contacts(scene, work, NOW)
@@ -121,8 +123,49 @@ def test_what_one_corner_loses_another_carries_on_and_only_along_its_own_tangent
     work.motion[NOW, 1, 2] = 0.03
     locate_contacts(scene, work, NOW)
     assert 0 < np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0) < closed
-    hand_over(work)
-    assert pull(work) == pytest.approx(before, rel=1e-9)
+    energy = np.sum(work.slip[NOW] ** 2)
+    hand_over(scene, work)
+    # One spring that holds as much as several have the energy of would hold more than they do.
+    assert np.sum(work.slip[NOW] ** 2) == pytest.approx(energy, rel=1e-9)
+    assert 0.5 * abs(before) < abs(pull(work)) < abs(before)
+
+
+def test_a_displacement_is_not_handed_on_across_the_bodies():
+    """The left foot of a table opens, its right foot stands 24 µm away: nothing rolls on."""
+    table = SpheroPolygon(
+        1e-6 * np.array([
+            [-12, -4], [-10, -4], [-10, 0], [10, 0], [10, -4], [12, -4], [12, 4], [-12, 4],
+        ]),
+        RADIUS,
+    )  # fmt: skip
+    body = Body(table, surface_density=2.0)
+    lowest = table.placed_vertices()[:, 1].min()
+    scene, work = resting_on(slab([-30e-6, 30e-6]), body, 0.0, 2 * RADIUS - OVERLAP - lowest, 1e-3)
+    slide(scene, work, 1e-7, steps=10)
+    held = work.slip[NOW].copy()
+    work.motion[NOW, 1, 2] = 0.03
+    locate_contacts(scene, work, NOW)
+    open_now = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
+    assert np.any(held[: len(open_now)][open_now] != 0.0)
+    hand_over(scene, work)
+    closed = np.flatnonzero(~open_now)
+    assert closed.size > 0
+    assert work.slip[NOW, closed] == pytest.approx(held[closed], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
+    rng = np.random.default_rng(seed)
+    scene, work = square_on_slab(0.02 * rng.normal())
+    rows = work.tally[CANDIDATES]
+    work.slip[NOW, :rows] = 1e-9 * rng.normal(size=rows)
+    work.motion[NOW, 1, :3] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
+    locate_contacts(scene, work, NOW)
+    energy = np.sum(work.slip[NOW] ** 2)
+    hand_over(scene, work)
+    assert np.sum(work.slip[NOW] ** 2) <= energy * (1.0 + 1e-12)
+    opened = work.geometry[NOW, :rows, 2] >= 0.0
+    assert not work.slip[NOW, :rows][opened].any()
 
 
 def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
@@ -139,7 +182,7 @@ def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
     gap = work.geometry[NOW, : work.tally[CANDIDATES], 2]
     opened = int(np.flatnonzero(gap >= 0.0)[0])
     work.slip[NOW, opened] = 1e-9
-    hand_over(work)
+    hand_over(scene, work)
     assert not work.slip[NOW].any()
 
 
