@@ -61,10 +61,10 @@ MOST_FRAMES = 3
 
 BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 
-VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR = range(7)
+VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING = range(8)
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
 point of the edge; 1 where the pair is closed in this step, 1 where it may have a share of a surface
-force in it."""
+force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks."""
 
 (
     NORMAL_X,
@@ -180,7 +180,8 @@ class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
     ``bodies`` (n, 7): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
-    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws.
+    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws;
+    ``smoothing``: see flocsim.forces.smoothing.
     """
 
     bodies: np.ndarray
@@ -190,7 +191,7 @@ class Scene(NamedTuple):
     parameters: np.ndarray
     laws: Any
     surface_reach: float
-    smoothing: float
+    smoothing: tuple[float, float, float]
     events: int
 
 
@@ -205,7 +206,7 @@ class Work(NamedTuple):
     directly or through others.
     ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:
     factorised systems, then the load.  ``pivots`` (2, 3n): which rows have changed places.
-    ``candidates`` (capacity, 7): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
+    ``candidates`` (capacity, 8): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
     ``kept`` (capacity, 2): the pairs whose displacements are set aside.
     ``budget`` (n (n − 1)/2,): how far two bodies may move until the list must be made anew.
     ``tally``: counts, see CANDIDATES.
@@ -240,7 +241,7 @@ def work_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, capacity: 
         jacobian=np.zeros((2, 3 * n, 3 * n)),
         system=np.zeros((2, 3 * n, 3 * n + 1), dtype=complex),
         pivots=np.zeros((2, 3 * n), dtype=np.int64),
-        candidates=np.zeros((capacity, NEAR + 1), dtype=np.int64),
+        candidates=np.zeros((capacity, SLIDING + 1), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, 2), dtype=np.int64),
         budget=np.full(n * (n - 1) // 2, -1.0),

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import Scene
-from flocsim.constants import LARGEST_BIAS, WATER_DENSITY, WATER_VISCOSITY
+from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import UsageError
 from flocsim.fields import flag, is_number, quantity
 from flocsim.geometry.contact.circle_tree import outlines_of
@@ -18,8 +18,8 @@ from flocsim.laws import LAWS
 NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""
 
-LONGEST_DECAY = 1e-6
-"""[m] The length over which a surface force changes that is the same at every gap."""
+NO_SMOOTHING = (1.0, 0.0, 0.0)
+"""``Scene.smoothing`` of a scene without surface forces."""
 
 
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
@@ -157,21 +157,13 @@ class Body:
         return self.mass * (1.0 - fluid.density / self.density)
 
 
-def smoothing_of(shapes: Sequence[Shape], decay_length: float) -> float:
-    """ℓ of the smooth gap of outlines [m], by which the sum over all of two bodies' features brings
-    it no lower than LARGEST_BIAS of the length over which surface forces change."""
-    points = sorted(len(shape.vertices) for shape in shapes)[-2:]
-    features = 2 * points[0] * points[-1]
-    return LARGEST_BIAS * min(decay_length, LONGEST_DECAY) / math.log(max(features, 2))
-
-
 def scene_of(
     bodies: Sequence[Body],
     fluid: Fluid,
     parameters: Sequence[float] = (),
     laws: Any = NO_LAWS,
     surface_reach: float = -1.0,
-    decay_length: float = math.inf,
+    smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
@@ -192,6 +184,6 @@ def scene_of(
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),
-        smoothing=smoothing_of(shapes, decay_length),
+        smoothing=smoothing,
         events=int(events),
     )

@@ -16,6 +16,7 @@ from flocsim.explain import explain
 from flocsim.fields import is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
+from flocsim.forces.smoothing import smoothing_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
@@ -145,7 +146,8 @@ class System:
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
             laws=law_table(pieces.laws, jit=jit),
-            surface_reach=pieces.surface_reach, decay_length=pieces.decay_length,
+            surface_reach=pieces.surface_reach, 
+            smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
         )  # fmt: skip
 

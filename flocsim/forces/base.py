@@ -96,6 +96,11 @@ class ContactForce(Force):
     events: ClassVar[Any] = None
 
     @property
+    def slides(self) -> bool:
+        """Whether its displacements have a limit with these parameters."""
+        return self.slip_limit is not None
+
+    @property
     def has_events(self) -> bool:
         """Whether the law has kinks with these parameters."""
         return self.events is not None

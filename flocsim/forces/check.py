@@ -31,9 +31,6 @@ SAMPLE_CONTACTS = tuple(
 SAMPLE_GAPS = (-1e-9, 1e-10, 1e-7)
 """Gaps [m] of the sample pairs: in contact, nearly so, apart."""
 
-NEAREST_GAP, FURTHEST_GAP = 1e-11, 1e-3
-"""Gaps [m] between which it is looked up over what length a surface force changes."""
-
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:
     """PairViews with gaps of either sign, within the reach of the force [m]."""
@@ -218,25 +215,6 @@ def reach_of(force: PairForce) -> float:
     return float(reach)
 
 
-def decay_length(force: PairForce, fluid: Fluid) -> float:
-    """The shortest length [m] in which a force changes by as much as it still has to lose: the
-    least of max |F(≥ d)|/|dF/dd| over its reach; inf for one that is the same everywhere."""
-    gaps = np.geomspace(
-        NEAREST_GAP, max(min(reach_of(force), FURTHEST_GAP), 2.0 * NEAREST_GAP), 160
-    )
-    arguments, shortest = kernel_arguments(force, fluid, force.kernel), math.inf
-    for rate in (-1e-4, 1e-4):
-        pair = sample_pairs(math.inf)[0]._replace(gap_rate=rate)
-        views = [pair._replace(gap=gap, centre_distance=gap + 3e-6) for gap in gaps.tolist()]
-        values = [next(results(force, force.kernel, [each], arguments), 0.0) for each in views]
-        found = np.nan_to_num(np.abs(values), posinf=0.0)
-        left = np.maximum.accumulate(found[::-1])[::-1]
-        slope = np.abs(np.diff(found)) / np.diff(gaps)
-        falls = slope > 0.0
-        shortest = min(shortest, np.min(left[:-1][falls] / slope[falls], initial=math.inf))
-    return float(shortest)
-
-
 def check_pair_force(force, fluid):
     if type(force).acts_on is PairForce.acts_on:
         raise KernelError(f"{type(force).__name__} must subclass CentreForce or SurfaceForce")
@@ -248,7 +226,7 @@ def check_pair_force(force, fluid):
 
 def check_contact_force(force, fluid):
     check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
-    if force.slip_limit is not None:
+    if force.slides:
         check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
     if inspect.isfunction(getattr(force, "kink", None)):
         raise refusal(

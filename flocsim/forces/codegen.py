@@ -6,7 +6,6 @@ derivatives of what no kernel reads) is not written, and is no law of the scene.
 """
 
 import functools
-import math
 from collections.abc import Callable, Iterable
 
 import attrs
@@ -18,7 +17,6 @@ from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     check_kernel,
-    decay_length,
     event_count,
     fields_read,
     kernel_arguments,
@@ -31,6 +29,7 @@ from flocsim.forces.differences import (
     changed_contact,
     contact_change,
 )
+from flocsim.forces.smoothing import smoothness
 from flocsim.laws import LAWS
 
 VELOCITIES = {"vx", "vy", "spin"}
@@ -45,14 +44,14 @@ another kind leave the text of a law as it is."""
 @attrs.define
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
-    numbers, the gap up to which surface forces reach (−1: there are none) and the shortest length
-    in which one of them changes [m], how many events its contact forces have, and which forces are
+    numbers, the gap up to which surface forces reach (−1: there are none) and how their
+    gap is smoothed (smoothing.py), how many events its contact forces have, and which forces are
     used and left out."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
     surface_reach: float = -1.0
-    decay_length: float = math.inf
+    smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
     events: int = 0
     used: dict[str, Force] = attrs.Factory(dict)
     left_out: dict[str, str] = attrs.Factory(dict)
@@ -195,7 +194,7 @@ def write_contact_laws(source, forces):
     terms, limits, events = [], [], []
     for force in forces:
         terms.append(("", source.call(force, force.kernel, "contact")))
-        if force.slip_limit is not None:
+        if force.slides:
             limits.append(source.call(force, force.slip_limit, "contact"))
         if force.has_events:
             call = source.call(force, force.events, "contact")
@@ -261,7 +260,7 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
-        pieces.decay_length = min(decay_length(force, fluid) for force in kinds["surface"])
+        pieces.smoothness = smoothness(kinds["surface"], fluid)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

@@ -66,6 +66,11 @@ class Contact(ContactForce):
         return math.inf if self.friction == "none" else float(self.friction)
 
     @property
+    def slides(self) -> bool:
+        """Whether friction limits ξ."""
+        return self.friction_limit < math.inf and self.k_t > 0.0
+
+    @property
     def has_events(self) -> bool:
         """Whether anything is clipped."""
         return not self.tension or self.friction_limit < math.inf

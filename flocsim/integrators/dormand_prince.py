@@ -19,7 +19,8 @@ from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces, take_stage
+from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces, take_stage
+from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
 
@@ -68,14 +69,14 @@ def combine(scene, work, weights, stages, base, end):
             work.motion[end, body, axis] = base * work.motion[NOW, body, axis] + total
 
 
-def combine_slips(work, weights, stages, step, end):
+def combine_slips(scene, work, weights, stages, step, end):
     """Tangential displacements of the closed pairs in state ``end``."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             total = 0.0
             for stage in range(stages):
                 total += weights[stage] * work.slip[SLIP_RATES + state_of(stage), row]
-            work.slip[end, row] = work.slip[NOW, row] + step * total
+            work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
 
 
 def times(weights, step):
@@ -91,7 +92,7 @@ def evaluate_stages(scene, work, time, step):
             combine(scene, work, times(MATRIX[stage], step), stage, 1.0, state)
         locate_and_rate(scene, work, state)
         if stage > 0:
-            combine_slips(work, MATRIX[stage], stage, step, state)
+            combine_slips(scene, work, MATRIX[stage], stage, step, state)
         sum_forces(scene, work, time + NODES[stage] * step, state)
     take_stage(work, state)
 
@@ -117,7 +118,6 @@ class DormandPrince54(Integrator):
         evaluate_stages(scene, work, time, step)
         weigh_velocities(scene, work, time, max(clock[UNTIL] - time, step))
         combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
-        limit_slips(scene, work)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod

@@ -28,7 +28,6 @@ from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import limit_slips
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import inertia
 
@@ -110,7 +109,6 @@ class Implicit(Integrator):
         if not solve_stages(scene, work, clock, step):
             return -1.0
         estimate_error(scene, work, step)
-        limit_slips(scene, work)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod

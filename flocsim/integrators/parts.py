@@ -26,10 +26,11 @@ from flocsim.arrays import (
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.modes import set_closed
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import limit_slips, locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.friction import limit_slips
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, tangential_rate
@@ -90,7 +91,7 @@ def all_finite(work, state):
 def locate_and_flag(scene, work, state):
     """Fixed steps do not end at switches: every evaluation flags the pairs as they are."""
     locate_contacts(scene, work, state)
-    set_modes(work, state)
+    set_closed(work, state)
     flag_near(scene, work, state, 0.0)
 
 

@@ -26,7 +26,7 @@ def right_hand_side(scene, work):
     if not list_candidates(scene, work):
         return False
     locate_contacts(scene, work, NOW)
-    set_modes(work)
+    set_modes(scene, work)
     flag_near(scene, work, NOW, 0.0)
     locate_and_rate(scene, work, NOW)
     sum_forces(scene, work, 0.0, NOW)

@@ -10,8 +10,8 @@ that they have.
 
 Rest: the bodies touch and have rested as one rigid doublet, which does not swing any more, for a
 stated time, with the load at its worst: the faster settling one straight below (a fixed receiver
-cannot turn, so it need not; nor need a floc that lies nested around the other's centre, if it rests
-for far longer). That shows that the doublet holds, not that no kick could open it. Where attraction
+cannot turn, so it need not; nor need a floc that lies nested around the other's centre, or hovers
+over it behind a barrier, if it rests for far longer). That shows that the doublet holds, not that no kick could open it. Where attraction
 alone could not even carry the load, the shapes do: such a rest is a hook.
 """
 
@@ -202,8 +202,8 @@ def start_rest(work, observed, time):
     observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = doublet_pose(work)
 
 
-def has_rested(scene, work, observed, time, nx, ny, distance):
-    """Whether the doublet has kept its pose for long enough, its load at the worst."""
+def rest_of(scene, work, observed, time):
+    """How long the doublet has kept its pose without swinging, in rest times."""
     x, y, angle = doublet_pose(work)
     size = min(scene.bodies[BODY_I, BOUNDING_RADIUS], scene.bodies[BODY_J, BOUNDING_RADIUS])
     moved = (
@@ -213,30 +213,39 @@ def has_rested(scene, work, observed, time, nx, ny, distance):
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     if moved > STILL * drift * observed[REST_TIME]:
         start_rest(work, observed, time)
-        return False
+        return 0.0
     # A doublet that still swings passes the worst direction, but may yet be thrown open.
     outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
     swing = abs(work.motion[NOW, BODY_I, SPIN]) * outer
     if swing > CALM * drift:
-        return False
-    rested = time - observed[REST_SINCE]
+        return 0.0
+    return (time - observed[REST_SINCE]) / observed[REST_TIME]
+
+
+def rests_for_long(scene, work, observed, time):
+    """Whether two bodies have kept still against each other far longer than the rest time."""
+    return rest_of(scene, work, observed, time) >= FAR_LONGER
+
+
+def has_rested(scene, work, observed, time, gap, nx, ny, distance):
+    """Whether the doublet has kept its pose for long enough, its load at the worst."""
+    rested = rest_of(scene, work, observed, time)
     sizes = scene.bodies[BODY_I, EQUIVALENT_RADIUS] + scene.bodies[BODY_J, EQUIVALENT_RADIUS]
-    if distance < NEST * sizes and rested >= FAR_LONGER * observed[REST_TIME]:
+    if (gap >= 0.0 or distance < NEST * sizes) and rested >= FAR_LONGER:
         return True
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     hanging = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y] >= HANGING * drift
     hanging = hanging or scene.bodies[BODY_I, FREE] == 0.0
-    return hanging and rested >= observed[REST_TIME]
+    return gap < 0.0 and hanging and rested >= 1.0
 
 
 def bond_of(scene, work, observed, time, gap, nx, ny, distance):
     """The kind of bond of two bodies that have touched, NO_BOND where none is proved."""
     if is_trapped(scene, work, observed, time, distance):
         return CERTIFICATE
-    if gap >= 0.0:
-        return NO_BOND
-    if is_held(scene, work, observed, time, nx, ny, distance):
+    if gap < 0.0 and is_held(scene, work, observed, time, nx, ny, distance):
         return CERTIFICATE
-    if not has_rested(scene, work, observed, time, nx, ny, distance):
+    if not has_rested(scene, work, observed, time, gap, nx, ny, distance):
         return NO_BOND
     attraction = centre_attraction(scene, work, time) + surface_attraction(scene, work, time)
     return REST if attraction > largest_load(observed) else HOOK

@@ -1,12 +1,13 @@
 """What becomes of two bodies: missed, or a collision that ends bound or departed.
 
 `watch_pair`, the observer, looks at the pair after every accepted step. Departed is a pair that
-touched and has parted for good (departure.py), missed one that parted so before it touched; bound
-is one that touches and is proved to stay together (bonds.py).
+touched and has parted for good (departure.py), missed one that parted so before it touched, or
+that hovers at rest over the other; bound is one that has touched and is proved to stay together
+(bonds.py).
 """
 
 from flocsim.arrays import NOW
-from flocsim.ensembles.collision.bonds import NO_BOND, bond_of, start_rest
+from flocsim.ensembles.collision.bonds import NO_BOND, bond_of, rests_for_long
 from flocsim.ensembles.collision.departure import has_departed
 from flocsim.ensembles.collision.observed import (
     BODY_I,
@@ -65,9 +66,8 @@ def watch_pair(scene, work, observed, time):
     follow(observed, distance)
     if has_departed(scene, work, observed, time, nx, ny, distance, gap):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
-    if observed[COLLIDED] == 0.0 or gap >= 0.0:
-        start_rest(work, observed, time)
     if observed[COLLIDED] == 0.0:
-        return 0
+        rests = rests_for_long(scene, work, observed, time)
+        return MISSED if rests else 0
     observed[BOND] = bond_of(scene, work, observed, time, gap, nx, ny, distance)
     return 0 if observed[BOND] == NO_BOND else BOUND

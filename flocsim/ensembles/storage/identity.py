@@ -93,7 +93,12 @@ def type_facts(config):
     facts = {f"types.{name}": list(radii) for name, *radii in config.scene.conditions}
     for name, pair in sphere_pairs(config):
         pieces = pair.system.pieces
-        numbers = [*pieces.parameters, pieces.surface_reach, pieces.decay_length, pieces.events]
+        numbers = [
+            *pieces.parameters,
+            pieces.surface_reach,
+            *pieces.smoothness,
+            pieces.events,
+        ]
         facts[f"numbers.{name}"] = digest(np.array(numbers, float))
         # A force of the user's own may compute what the zone follows from.
         facts[f"types.{name}"].append(plain(pair.zone_distance))

@@ -15,6 +15,7 @@ from flocsim.arrays import (
     NEAR,
     NOW,
     RADIUS,
+    SLIDING,
     VERTEX,
     VERTEX_BODY,
     X,
@@ -59,6 +60,7 @@ def add_pair(work, a, point, b, start, end):
         work.candidates[row, EDGE_END],
     ) = b, start, end
     work.candidates[row, CLOSED], work.candidates[row, NEAR] = 0, 0
+    work.candidates[row, SLIDING] = 0
     work.tally[CANDIDATES] = row + 1
     return True
 

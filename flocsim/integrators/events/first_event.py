@@ -14,8 +14,9 @@ from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import first_switch
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
+from flocsim.integrators.rhs.friction import beyond
 from flocsim.integrators.rhs.views import contact_view, pressed_view
-from flocsim.laws import contact_event
+from flocsim.laws import SLIP_LIMIT, contact_event, has
 
 RESOLUTION = 1e-3
 """A switch is located to this share of the tolerance, …"""
@@ -75,6 +76,18 @@ def law_event_share(scene, work, share):
     return share
 
 
+def friction_share(scene, work, share, step, resolution):
+    """The share of the step at which the first contact begins or ends to slide, or the given one
+    before; what is beyond that by less than the resolution [m] at the end of the step is left."""
+    if has(scene, SLIP_LIMIT):
+        for row in range(work.tally[CANDIDATES]):
+            if work.candidates[row, CLOSED] == 1:
+                distance, at = beyond(scene, work, row, step)
+                if distance > resolution:
+                    share = min(share, at)
+    return share
+
+
 def switch_share(scene, work, observed, clock, step):
     """The share of the step at which the first pair switches; above 1 where none does.
 
@@ -85,5 +98,8 @@ def switch_share(scene, work, observed, clock, step):
         shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
         depth = resolution if deepest_overlap(work) > 0.0 else max(resolution, shallowest)
         share = first_switch(scene, work, step, resolution, depth)
-        return law_event_share(scene, work, share) if share > 1.0 else share
+        if share > 1.0:
+            share = law_event_share(scene, work, share)
+            share = friction_share(scene, work, share, step, resolution)
+        return share
     return math.inf

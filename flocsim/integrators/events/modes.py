@@ -1,13 +1,18 @@
-"""Which listed pairs are closed: the flags that an adaptive step keeps frozen.
+"""Which listed pairs are closed and which slide: the flags that an adaptive step keeps frozen.
 
 Inside a step the flags stay as they are, so that the forces are smooth functions of the state; the
 driver ends the step where a flag would change (see crossings.py).
 """
 
 from flocsim.arrays import CANDIDATES, CLOSED, GAP, NOW
+from flocsim.integrators.rhs.friction import set_sliding
+
+SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
+"""What changed when pairs were flagged: nothing; what sticks and slides, by which no force jumps;
+which pairs touch."""
 
 
-def set_modes(work, state=NOW):
+def set_closed(work, state=NOW):
     """Flag every listed pair by its gap in a state; whether any has changed."""
     changed = False
     for row in range(work.tally[CANDIDATES]):
@@ -15,3 +20,11 @@ def set_modes(work, state=NOW):
         changed = changed or work.candidates[row, CLOSED] != closed
         work.candidates[row, CLOSED] = closed
     return changed
+
+
+def set_modes(scene, work):
+    """Flag every listed pair as it is now; what changed (see SAME)."""
+    contacts, friction = set_closed(work), set_sliding(scene, work)
+    if contacts:
+        return OTHER_CONTACTS
+    return OTHER_FRICTION if friction else SAME

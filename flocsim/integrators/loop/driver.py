@@ -34,7 +34,7 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, observe
 from flocsim.integrators.events.first_event import switch_share
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
@@ -72,16 +72,15 @@ def take_new_state(work):
 
 
 def accept(scene, work, clock, counts, step, lists):
-    """Go on from the new state, its pairs flagged anew; whether any pair closed or opened."""
+    """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
     clock[TIME] += step
     counts[STEPS] += 1
     clock[ERROR] += clock[STEP_ERROR]
     if not lists:
-        return False
-    switched = set_modes(work)
+        return SAME
     hand_over(scene, work)
-    return switched
+    return set_modes(scene, work)
 
 
 def record_row(work, clock, counts, record):
@@ -111,7 +110,7 @@ def keep_lists(scene, work):
         if not list_candidates(scene, work):
             return False
         locate_contacts(scene, work, NOW)
-        set_modes(work)
+        set_modes(scene, work)
     return True
 
 

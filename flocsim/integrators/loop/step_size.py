@@ -24,6 +24,7 @@ from flocsim.arrays import (
 from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolution_of
+from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
 
@@ -126,12 +127,15 @@ def reject(clock, counts, step, ratio, too_far):
 def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
     clock[REJECTED_STEP] = 0.0
-    if switched:
+    if switched == OTHER_CONTACTS:
         # The forces are new, and settle about as fast as behind the last switch.
         clock[PREVIOUS_STEP] = math.inf
         clock[STAGED_STEP] = 0.0
         clock[SETTLING] = 1.0
         clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
+    elif switched == OTHER_FRICTION:
+        clock[PREVIOUS_STEP] = math.inf
+        clock[STAGED_STEP] = 0.0
     elif was_cut:
         # The switch did not come: the step was too long to tell.
         clock[PREVIOUS_STEP] = math.inf

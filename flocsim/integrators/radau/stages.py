@@ -26,6 +26,7 @@ from flocsim.integrators.radau.systems import solve, write_changes, write_loads
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
 from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces, take_stage
+from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.views import lever
 
 MOST_ITERATIONS = 10
@@ -50,7 +51,7 @@ def place_stages(work, step):
                 motion[FIRST_STAGE + stage, body, axis] = motion[NOW, body, axis] + step * mean
 
 
-def slip_stages(work, step):
+def slip_stages(scene, work, step):
     slip = work.slip
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
@@ -59,7 +60,10 @@ def slip_stages(work, step):
                 mean = first * slip[SLIP_RATES + FIRST_STAGE, row]
                 mean += second * slip[SLIP_RATES + SECOND_STAGE, row]
                 mean += third * slip[SLIP_RATES + THIRD_STAGE, row]
-                slip[FIRST_STAGE + stage, row] = slip[NOW, row] + step * mean
+                stuck = slip[NOW, row] + step * mean
+                slip[FIRST_STAGE + stage, row] = slip_in(
+                    scene, work, FIRST_STAGE + stage, row, stuck
+                )
 
 
 def evaluate_states(scene, work, time, step, first, last):
@@ -67,7 +71,7 @@ def evaluate_states(scene, work, time, step, first, last):
     for state in range(first, last):
         locate_and_rate(scene, work, state)
     if first == FIRST_STAGE:
-        slip_stages(work, step)
+        slip_stages(scene, work, step)
     for state in range(first, last):
         node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
@@ -101,12 +105,12 @@ def newton_step(scene, work, time, step):
     return correct_stages(scene, work, step)
 
 
-def finish_stages(work, step):
+def finish_stages(scene, work, step):
     """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
     for state in range(FIRST_STAGE, FIRST_STAGE + 3):
         rate_slips(work, state)
-    slip_stages(work, step)
+    slip_stages(scene, work, step)
     take_stage(work, THIRD_STAGE)
 
 
@@ -123,7 +127,7 @@ def solve_stages(scene, work, clock, step):
         if before == math.inf:
             pace = FIRST_PACE
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
-            finish_stages(work, step)
+            finish_stages(scene, work, step)
             clock[PACE] = pace if before < math.inf else 0.0
             return True
         if not change < math.inf or (earlier < math.inf and pace > 1.0):

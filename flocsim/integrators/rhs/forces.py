@@ -31,28 +31,16 @@ from flocsim.laws import (
     BODY_FORCE,
     CENTRE_FORCE,
     CONTACT_FORCE,
-    SLIP_LIMIT,
     body_force,
     centre_force,
     contact_force,
     has,
-    slip_limit,
     surface_force,
 )
 
 
-def limit_slips(scene, work):
-    """Cut the displacements of the closed pairs in NEW to what they can hold there."""
-    if not has(scene, SLIP_LIMIT):
-        return
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
-            limit = slip_limit(scene, contact_view(scene, work, NEW, row))
-            work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
-
-
 def take_stage(work, stage):
-    """Make a stage the new state: its motion, and what closed pairs need (see limit_slips)."""
+    """Make a stage the new state: its motion, and what closed pairs need."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
             work.motion[NEW, body, axis] = work.motion[stage, body, axis]

@@ -25,6 +25,7 @@ from flocsim.arrays import (
     NOW,
     RADIUS,
     SHARE,
+    SLIDING,
     STIFFNESS,
     TURNING,
     VERTEX_ARM_N,
@@ -32,7 +33,13 @@ from flocsim.arrays import (
     VERTEX_BODY,
 )
 from flocsim.integrators.rhs.error import remember_velocities
-from flocsim.integrators.rhs.surface_gap import mean_direction, run_end, surface_view
+from flocsim.integrators.rhs.friction import limit_slope
+from flocsim.integrators.rhs.surface_gap import (
+    mean_direction,
+    run_end,
+    sharpness,
+    surface_view,
+)
 from flocsim.integrators.rhs.views import (
     body_view,
     centre_view,
@@ -141,9 +148,13 @@ def add_contact(scene, work, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
+    side = work.candidates[row, SLIDING]
     for axis in range(4):
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
+        if axis == 2 and side != 0:
+            # Sliding, ξ goes with the overlap.
+            sign, by = side * limit_slope(scene, work, NOW, row), along
         which = STIFFNESS if axis % 2 == 0 else DAMPING
         add_product(work, which, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(work, which, a, b, across, by, sign * found[3 + 2 * axis])
@@ -198,7 +209,7 @@ def add_surfaces(scene, work, time):
         repulsion = surface_force(scene, view)
         slope, damping = surface_derivatives(scene, view)
         mean = mean_direction(work, row, end)
-        spread = repulsion / scene.smoothing
+        spread = repulsion * sharpness(scene, view.gap)
         add_product(work, STIFFNESS, a, b, mean, mean, -slope - spread)
         add_product(work, DAMPING, a, b, mean, mean, damping)
         for each in range(row, end):
@@ -206,7 +217,8 @@ def add_surfaces(scene, work, time):
             if share > 0.0:
                 c, d = work.candidates[each, VERTEX_BODY], work.candidates[each, EDGE_BODY]
                 along = normal_rows(work, each)
-                add_product(work, STIFFNESS, c, d, along, along, share * spread)
+                spread = share * repulsion * sharpness(scene, work.geometry[NOW, each, GAP])
+                add_product(work, STIFFNESS, c, d, along, along, spread)
                 add_turning(scene, work, each, share * repulsion, 0.0)
         row = end
 

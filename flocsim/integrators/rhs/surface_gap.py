@@ -2,12 +2,14 @@
 
 The closest pair of features changes as bodies move, and a force that follows it jumps there, from
 one end of an edge to the other; repulsion makes an endless chatter of that. Surface forces act at
-the soft minimum over all near pairs k instead,
+the soft minimum over all near pairs k instead, ℓ being a length far shorter than that over which
+the forces change:
 
-    g̃ = −ℓ ln Σ exp(−g_k/ℓ),  force F(g̃), of which the share exp(−g_k/ℓ)/Σ acts through pair k:
+    u(g̃) = −ln Σ exp(−u(g_k)),  du/dg = 1/ℓ(g),  force F(g̃), of which the share
+    s_k = ∂g̃/∂g_k = ℓ(g̃)/ℓ(g_k) exp(u(g̃) − u(g_k)) acts through pair k:
 
-force and torque of the one potential W(g̃), W' = −F. It lies below the least gap by no more than
-ℓ ln K with K pairs; ℓ is chosen so that the force is off by no more than LARGEST_BIAS (scene_of).
+force and torque of the one potential W(g̃), W' = −F. With one ℓ for all gaps that is
+g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIAS (forces/smoothing.py).
 """
 
 import math
@@ -30,10 +32,36 @@ from flocsim.geometry.contact.candidates import relative_speed
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 
 RANGE = 40.0
-"""Pairs so many ℓ above the least gap have no share: exp(−40) is below rounding."""
+"""Pairs whose u is so much above the least have no share: exp(−40) is below rounding."""
 
 LOOK_AHEAD = 2.0
 """Pairs that could come near in a step so many times as long are near in it."""
+
+
+def length_at(scene, gap):
+    """ℓ at a gap [m]."""
+    shortest, growth, end = scene.smoothing
+    return shortest + growth * min(max(gap, 0.0), end)
+
+
+def measure_of(scene, gap):
+    """u at a gap."""
+    shortest, growth, end = scene.smoothing
+    if gap <= 0.0 or growth == 0.0:
+        return gap / shortest
+    near = min(gap, end)
+    found = math.log1p(growth * near / shortest) / growth
+    return found + (gap - near) / (shortest + growth * end)
+
+
+def gap_of(scene, measure):
+    """The gap with that u [m]."""
+    shortest, growth, end = scene.smoothing
+    if measure <= 0.0 or growth == 0.0:
+        return measure * shortest
+    near = min(measure, math.log1p(growth * end / shortest) / growth)
+    gap = shortest * math.expm1(growth * near) / growth
+    return gap + (measure - near) * (shortest + growth * end)
 
 
 def run_end(work, row):
@@ -63,7 +91,8 @@ def flag_near(scene, work, state, step):
         end = run_end(work, row)
         a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
         way = LOOK_AHEAD * step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
-        reach = least_gap(work, state, row, end) + RANGE * scene.smoothing + 2.0 * way
+        least = measure_of(scene, least_gap(work, state, row, end))
+        reach = gap_of(scene, least + RANGE) + 2.0 * way
         for each in range(row, end):
             near = work.geometry[state, each, GAP] <= reach
             work.candidates[each, NEAR] = 1 if near else 0
@@ -75,7 +104,7 @@ def overlooked(scene, work):
     row = 0
     while row < work.tally[CANDIDATES]:
         end = run_end(work, row)
-        reach = least_gap(work, NEW, row, end) + RANGE * scene.smoothing
+        reach = gap_of(scene, measure_of(scene, least_gap(work, NEW, row, end)) + RANGE)
         for each in range(row, end):
             if work.candidates[each, NEAR] == 0 and work.geometry[NEW, each, GAP] < reach:
                 return True
@@ -90,17 +119,28 @@ def soften(scene, work, state, row, end):
     for each in range(row, end):
         if work.candidates[each, NEAR] == 1:
             least = min(least, geometry[state, each, GAP])
+    least = measure_of(scene, least)
     for each in range(row, end):
         share = 0.0
         if work.candidates[each, NEAR] == 1:
-            share = math.exp((least - geometry[state, each, GAP]) / scene.smoothing)
+            share = math.exp(least - measure_of(scene, geometry[state, each, GAP]))
         geometry[state, each, SHARE] = share
         total += share
+    gap = gap_of(scene, least - math.log(total))
+    length = length_at(scene, gap)
     for each in range(row, end):
         if geometry[state, each, SHARE] > 0.0:
-            geometry[state, each, SHARE] /= total
+            own = length_at(scene, geometry[state, each, GAP])
+            geometry[state, each, SHARE] *= length / (own * total)
             rate += geometry[state, each, SHARE] * normal_rate(work, state, each)
-    return least - scene.smoothing * math.log(total), rate
+    return gap, rate
+
+
+def sharpness(scene, gap):
+    """(1 + dℓ/dg)/ℓ at a gap [1/m]: how fast shares change with it."""
+    _, growth, end = scene.smoothing
+    slope = growth if 0.0 < gap < end else 0.0
+    return (1.0 + slope) / length_at(scene, gap)
 
 
 def surface_view(scene, work, time, state, row, end):

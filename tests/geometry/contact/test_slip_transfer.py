@@ -48,7 +48,7 @@ def slide(scene, work, length, passing_on=hand_over, steps=400):
     step = length / steps / work.motion[NOW, 1, 3]
     pulls = []
     for _ in range(steps):
-        set_modes(work)
+        set_modes(scene, work)
         rate_slips(work, NOW)
         closed = work.candidates[:, CLOSED] == 1
         work.slip[NOW, closed] += step * work.slip[SLIP_RATES + NOW, closed]

@@ -31,7 +31,7 @@ def stepped(bodies, change, velocities):
     work = work_of(scene, start, velocities[0], capacity=4096)
     assert list_candidates(scene, work)
     locate_contacts(scene, work, NOW)
-    set_modes(work)
+    set_modes(scene, work)
     work.motion[NEW] = np.hstack([start + change, velocities[1]])
     locate_contacts(scene, work, NEW)
     return scene, work

@@ -33,7 +33,7 @@ def leaving(contact, rate_before, rate_after, slip=0.0, slip_after=0.0):
         work.motion[state, 1, VY] = rate
         locate_contacts(scene, work, state)
         work.slip[state, 0] = slipped
-    set_modes(work)
+    set_modes(scene, work)
     assert work.tally[CANDIDATES] == 1 and work.candidates[0, CLOSED] == 1
     return scene, work
 

@@ -1,0 +1,123 @@
+"""Stick and slide: how far tangential displacements go where a contact can hold only so much.
+
+While a contact sticks, ξ is the time integral of v_t. It slides in a direction s = ±1 where |ξ| has
+reached what the contact can hold, L (µ k_n Δ/k_t for Coulomb friction), and would outgrow it:
+
+    ξ = s L,  as long as  s v_t > dL/dt.
+
+Both are smooth inside a step, whose flags are frozen (SLIDING); the driver ends it where one has to
+change. ξ itself never jumps: it is the solution of dξ/dt = v_t under |ξ| ≤ L, which cutting ξ at
+the ends of steps comes near to only as fast as steps get short.
+"""
+
+from flocsim.arrays import CANDIDATES, CLOSED, NEW, NOW, SLIDING
+from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.laws import SLIP_LIMIT, has, slip_limit
+
+FULL = 1.0 - 1e-9
+"""A displacement is at its limit from this share of it on."""
+
+
+def limit_in(scene, work, state, row):
+    """How far a contact's displacement can go in a state [m]."""
+    return slip_limit(scene, contact_view(scene, work, state, row))
+
+
+def limit_slope(scene, work, state, row):
+    """By how much that grows with the overlap [m/m]."""
+    view = contact_view(scene, work, state, row)
+    by = 1e-6 * abs(view.overlap) + 1e-15
+    more = slip_limit(scene, pressed_view(view, view.overlap + by, view.overlap_rate))
+    now = slip_limit(scene, pressed_view(view, view.overlap, view.overlap_rate))
+    return (more - now) / by if more > now else 0.0
+
+
+def outgrowth(scene, work, state, row, side):
+    """How fast a displacement at its limit, in a direction, would outgrow it [m/s]."""
+    growth = -normal_rate(work, state, row) * limit_slope(scene, work, state, row)
+    return side * tangential_rate(work, state, row) - growth
+
+
+def slip_in(scene, work, state, row, stuck):
+    """The displacement of a closed pair in a state; ``stuck``: what it is if it sticks [m]."""
+    side = work.candidates[row, SLIDING]
+    if side == 0:
+        return stuck
+    return side * limit_in(scene, work, state, row)
+
+
+def side_of(scene, work, row):
+    """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
+    brought to its limit."""
+    limit, side = limit_in(scene, work, NOW, row), work.candidates[row, SLIDING]
+    if side == 0:
+        slip = work.slip[NOW, row]
+        if abs(slip) < FULL * limit:
+            return 0
+        rate = tangential_rate(work, NOW, row)
+        side = 1 if slip > 0.0 or (slip == 0.0 and rate > 0.0) else -1
+    work.slip[NOW, row] = side * limit
+    return side if outgrowth(scene, work, NOW, row, side) > 0.0 else 0
+
+
+def set_sliding(scene, work):
+    """Flag all closed pairs that slide, now; whether any flag has changed."""
+    changed = False
+    if has(scene, SLIP_LIMIT):
+        for row in range(work.tally[CANDIDATES]):
+            side = side_of(scene, work, row) if work.candidates[row, CLOSED] == 1 else 0
+            changed = changed or work.candidates[row, SLIDING] != side
+            work.candidates[row, SLIDING] = side
+    return changed
+
+
+def limit_slips(scene, work):
+    """Cut the displacements of the closed pairs in NEW to what they can hold there, for methods
+    whose steps do not end where a contact begins to slide."""
+    if not has(scene, SLIP_LIMIT):
+        return
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            limit = limit_in(scene, work, NEW, row)
+            work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
+
+
+def beyond(scene, work, row, step):
+    """(how far a pair is beyond where it ought to have begun or ceased to slide [m], the share of
+    the step at which it should have); 0 at the first place where nothing is wrong."""
+    side = work.candidates[row, SLIDING]
+    if side == 0:
+        before = limit_in(scene, work, NOW, row) - abs(work.slip[NOW, row])
+        after = limit_in(scene, work, NEW, row) - abs(work.slip[NEW, row])
+        if after >= 0.0:
+            return 0.0, 1.0
+        return -after, root(scene, work, row, step, before, after)
+    before = outgrowth(scene, work, NOW, row, side)
+    after = outgrowth(scene, work, NEW, row, side)
+    if after >= 0.0:
+        return 0.0, 1.0
+    share = max(before, 0.0) / (max(before, 0.0) - after)
+    return -0.5 * after * step * (1.0 - share), share
+
+
+def root(scene, work, row, step, before, after):
+    """Where in the step the room that a sticking pair has left, ``before`` and ``after``, is used
+    up, by the cubic through its values and rates at both ends."""
+    side = 1.0 if work.slip[NEW, row] > 0.0 else -1.0
+    fall = step * outgrowth(scene, work, NOW, row, side)
+    end = step * outgrowth(scene, work, NEW, row, side)
+    before = max(before, 0.0)
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        share = 0.5 * (low + high)
+        rest = 1.0 - share
+        # Hermite: values before and after, slopes −fall and −end.
+        value = (
+            rest * rest * (1.0 + 2.0 * share) * before + share * share * (3.0 - 2.0 * share) * after
+        )
+        value += share * rest * (share * end - rest * fall)
+        if value > 0.0:
+            low = share
+        else:
+            high = share
+    return high
