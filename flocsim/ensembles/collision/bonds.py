@@ -11,8 +11,9 @@ that they have.
 Rest: the bodies touch and have rested as one rigid doublet, which does not swing any more, for a
 stated time, with the load at its worst: the faster settling one straight below (a fixed receiver
 cannot turn, so it need not; nor need a floc that lies nested around the other's centre, or hovers
-over it behind a barrier, if it rests for far longer). That shows that the doublet holds, not that no kick could open it. Where attraction
-alone could not even carry the load, the shapes do: such a rest is a hook.
+over it behind a barrier, if it rests for far longer). That shows that the doublet holds, not that
+no kick could open it. Where attraction alone could not even carry the load, the shapes do: such a
+rest is a hook.
 """
 
 import math
