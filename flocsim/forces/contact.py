@@ -67,8 +67,9 @@ class Contact(ContactForce):
 
     @property
     def slides(self) -> bool:
-        """Whether friction limits ξ."""
-        return self.friction_limit < math.inf and self.k_t > 0.0
+        """Whether friction limits ξ, or a subclass with a limit of its own."""
+        own = type(self).slip_limit is not Contact.slip_limit
+        return own or (self.friction_limit < math.inf and self.k_t > 0.0)
 
     @property
     def has_events(self) -> bool:

@@ -12,7 +12,7 @@ from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.modes import set_closed
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from tests.reference import forces as plain_forces
@@ -26,7 +26,7 @@ def right_hand_side(scene, work):
     if not list_candidates(scene, work):
         return False
     locate_contacts(scene, work, NOW)
-    set_modes(scene, work)
+    set_closed(work)
     flag_near(scene, work, NOW, 0.0)
     locate_and_rate(scene, work, NOW)
     sum_forces(scene, work, 0.0, NOW)
