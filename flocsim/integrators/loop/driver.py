@@ -7,7 +7,6 @@ from flocsim.arrays import (
     CLOSED,
     CODE,
     EDGE_BODY,
-    ERROR,
     GAP,
     GEOMETRY_COLUMNS,
     LOCATED,
@@ -21,7 +20,6 @@ from flocsim.arrays import (
     RECORD_TIME,
     RECORDED,
     REJECTED,
-    STEP_ERROR,
     STEPS,
     TIME,
     TOLERANCE,
@@ -36,6 +34,7 @@ from flocsim.hooks import attempt, observe
 from flocsim.integrators.events.first_event import switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
+from flocsim.integrators.rhs.stated_error import add_late_switches, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
 
@@ -76,9 +75,12 @@ def accept(scene, work, clock, counts, step, lists):
     take_new_state(work)
     clock[TIME] += step
     counts[STEPS] += 1
-    clock[ERROR] += clock[STEP_ERROR]
+    if clock[TOLERANCE] < math.inf:
+        carry_errors(work, clock, step)
     if not lists:
         return SAME
+    if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
+        add_late_switches(scene, work, step)
     hand_over(scene, work)
     return set_modes(scene, work)
 

@@ -14,8 +14,11 @@ from flocsim.arrays import (
     MEMORY,
     NEW,
     NOW,
+    RELAXATION,
     SPIN,
     STEP_ERROR,
+    STEP_PLACE,
+    STEP_SPEED,
     TOLERANCE,
     VELOCITY,
     VX,
@@ -56,13 +59,15 @@ def turnover_rate(scene, work, body):
 def remember_velocities(scene, work, remaining):
     """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
     for body in range(scene.bodies.shape[0]):
-        slowest = math.inf
+        slowest, relaxation = math.inf, 0.0
         for axis in range(3):
             mass = inertia(scene, body, axis)
             damping = max(work.jacobian[DAMPING, 3 * body + axis, 3 * body + axis], 0.0)
+            relaxation = max(relaxation, mass / max(damping, TINY))
             rate = mass * (turnover_rate(scene, work, body) + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
         work.bodies[body, MEMORY] = 1.0 / slowest
+        work.bodies[body, RELAXATION] = relaxation
 
 
 def step_tolerance(work, clock):
@@ -82,7 +87,8 @@ def error_ratio(scene, work, clock, step):
 
 
 def body_error(scene, work, body):
-    """The error of one body, from DEVIATION: displacement of its outline, now and later [m]."""
+    """The error of one body, from DEVIATION: displacement of its outline, now and later [m]; both
+    parts of it are written down."""
     e = work.motion
     size = scene.bodies[body, BOUNDING_RADIUS]
     place = math.hypot(e[DEVIATION, body, X], e[DEVIATION, body, Y]) + size * abs(
@@ -91,6 +97,7 @@ def body_error(scene, work, body):
     speed = math.hypot(e[DEVIATION, body, VX], e[DEVIATION, body, VY]) + size * abs(
         e[DEVIATION, body, SPIN]
     )
+    work.bodies[body, STEP_PLACE], work.bodies[body, STEP_SPEED] = place, speed
     return place + speed * work.bodies[body, MEMORY]
 
 

@@ -1,0 +1,194 @@
+"""Whether the stated error covers the true one, on random runs of every family.
+
+    python -m benchmarks.accuracy.stated_error [--runs 2000] [--families departing free_flight …]
+
+A run at the default tolerance is held against the same at 1e-13 m, and a companion of that, nudged
+by 1e-11 m, says by how much the motion amplifies a difference; runs that amplify it more than ten
+times, for which no sum of errors can speak, are counted and left out.
+"""
+
+import math
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import attrs
+import numpy as np
+
+from benchmarks.reporting import Table, parser_of, print_heading
+from flocsim import Body, System
+from flocsim.ensembles.collision.encounter import end_distance, replicate_system
+from flocsim.ensembles.collision.start import draws, orientations
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.study import Study
+from flocsim.forces import Contact, Gravity, StokesDrag
+from flocsim.integrators import Implicit, Status
+
+EXACT, NUDGE = 1e-13, 1e-11
+"""Tolerance [m] of what counts as exact, and how far its companion starts from it [m]."""
+
+MOST_AMPLIFIED = 10.0
+VERTICES = (8, 16, 32, 64)
+MOST_STEPS = 100_000
+COLLOID = {"double_layer": {"debye_length": 30e-9, "potential": 0.03}}
+CONFIG = (
+    'preset = "{}"\nseed = 7\nreplicates = 1\n[shapes]\nvertices = [8, 16, 32, 64]\npool = 40\n'
+)
+
+
+@cache
+def study(preset, friction=None):
+    """The study that replicates are taken from."""
+    changes = {"forces": COLLOID} if preset == "si" else {}
+    if friction is not None:
+        changes = {"forces": {"contact": {"friction": friction}}}
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_text(CONFIG.format(preset))
+        return Study(load_config(path, changes))
+
+
+def replicate(rng, number, preset, outcomes, friction=None, longer=1.0):
+    """(System, until) of a random replicate that ends in one of these outcomes; None of another."""
+    found = study(preset, friction)
+    place = int(rng.integers(3)), int(rng.choice(VERTICES)), float(rng.random())
+    row = found.run(*place, number)
+    if row["outcome"] not in outcomes:
+        return None
+    numbers = draws(found.config.seed, number)
+    encounter = found.encounter(*place[:2], numbers)
+    system = replicate_system(encounter, orientations(numbers), place[2])
+    return system, longer * row["t_end"]
+
+
+def departing(rng, number):
+    """A collision that ends apart."""
+    return replicate(rng, number, "tang2014", (1, 3))
+
+
+def rolling(rng, number):
+    """A collision that ends bound, and the doublet's first rolling."""
+    return replicate(rng, number, "tang2014", (0, 2), longer=2.0)
+
+
+def friction(rng, number):
+    """Any collision with Coulomb friction."""
+    return replicate(rng, number, "tang2014", (0, 1, 2, 3), friction=float(rng.choice([0.1, 0.3])))
+
+
+def surface_forces(rng, number):
+    """Stable colloids, which pass each other on their double layers."""
+    return replicate(rng, number, "si", (0, 1, 2, 3, 4))
+
+
+def random_shape(rng):
+    """A fitted floc of the pool, of a random number of vertices and size."""
+    flocs = study("tang2014").flocs
+    floc = flocs[int(rng.integers(len(flocs)))]
+    shape = floc.shapes[int(rng.choice(VERTICES))]
+    return shape.scaled(float(rng.uniform(5e-6, 2e-5)) / shape.equivalent_radius)
+
+
+def several_bodies(rng, number):
+    """Three to six flocs that are thrown into each other in water."""
+    bodies, angles = [], rng.uniform(0.0, 2.0 * math.pi)
+    count = int(rng.integers(3, 7))
+    for k in range(count):
+        direction = angles + 2.0 * math.pi * k / count
+        shape = random_shape(rng)
+        place = 6e-5 * (1.0 + count / 6.0) * np.array([math.cos(direction), math.sin(direction)])
+        velocity = -place / 6e-4 * rng.uniform(0.7, 1.3) + rng.normal(size=2) * 0.01
+        bodies.append(Body(
+            shape, tuple(place), float(rng.uniform(0.0, 6.0)), tuple(velocity),
+            float(rng.normal() * 1e3), surface_density=2.0,
+        ))  # fmt: skip
+    return System(bodies, [Gravity(), StokesDrag(), Contact()], Implicit()), 2e-3
+
+
+def free_flight(rng, number):
+    """Two flocs that bounce once or more in nothing, and fly on."""
+    height, speed = 4e-5, float(rng.uniform(0.01, 0.2))
+    bodies = [
+        Body(random_shape(rng), (side * height, float(rng.normal() * 5e-6)),
+             float(rng.uniform(0.0, 6.0)), (-side * speed, 0.0), float(rng.normal() * 1e3),
+             surface_density=2.0)
+        for side in (-1.0, 1.0)
+    ]  # fmt: skip
+    damping = float(rng.choice([0.0, 1e5]))
+    return System(bodies, [Contact(damping_n=damping)], Implicit()), 20.0 * height / speed
+
+
+FAMILIES = {each.__name__: each for each in (
+    departing, rolling, friction, surface_forces, several_bodies, free_flight,
+)}  # fmt: skip
+
+
+def nudged(system, rng):
+    """The system with every body moved by a random NUDGE."""
+    bodies = []
+    for body in system.bodies:
+        x, y = np.array(body.position) + NUDGE * rng.normal(size=2)
+        bodies.append(attrs.evolve(body, position=(float(x), float(y))))
+    return attrs.evolve(system, bodies=bodies)
+
+
+def ended(system, until):
+    """The run of a system; None where it does not come to its end."""
+    found = system.run(until, max_steps=MOST_STEPS, record=False)
+    return found if found.status == Status.FINISHED else None
+
+
+def judge(family, number, tolerance):
+    """(true error, stated error [m], amplification) of one run, or why there is none."""
+    rng = np.random.default_rng([number, 11])
+    drawn = FAMILIES[family](rng, number)
+    if drawn is None:
+        return "another outcome"
+    system, until = drawn
+    exact = attrs.evolve(system, integrator=Implicit(EXACT))
+    runs = [attrs.evolve(system, integrator=Implicit(tolerance)), exact, nudged(exact, rng)]
+    ends = [ended(each, until) for each in runs]
+    if None in ends:
+        return "did not end"
+    found, best, other = (end.position[-1] for end in ends)
+    sizes = system.bodies
+    growth = end_distance(sizes, other, best) / NUDGE
+    return end_distance(sizes, found, best), ends[0].error, growth
+
+
+def main():
+    """Print the table."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--runs", type=int, default=2000)
+    parser.add_argument("--tolerance", type=float, default=1e-9)
+    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
+    parser.add_argument("--worst", type=int, default=0, help="list so many of the worst runs")
+    arguments = parser.parse_args()
+    runs = 20 if arguments.quick else arguments.runs
+    print_heading()
+    columns = ("family", "runs", "amplified", "not ended", "covered [%]", "median true/stated",
+               "99th percentile", "largest")  # fmt: skip
+    table = Table(f"True error over stated error at {arguments.tolerance:g} m", columns)
+    for family in arguments.families:
+        shares, left, failed, number = [], 0, 0, 0
+        while len(shares) < runs and number < 20 * runs:
+            found = judge(family, number, arguments.tolerance)
+            number += 1
+            if isinstance(found, str):
+                failed += found == "did not end"
+            elif not found[2] < MOST_AMPLIFIED:
+                left += 1
+            else:
+                shares.append((found[0] / found[1], number - 1, *found))
+        values = np.array([each[0] for each in shares])
+        table.add(
+            family, len(shares), left, failed, 100.0 * np.mean(values <= 1.0),
+            float(np.median(values)), float(np.quantile(values, 0.99)), float(values.max()),
+        )  # fmt: skip
+        for each in sorted(shares, reverse=True)[: arguments.worst]:
+            print(family, *(f"{value:.3g}" for value in each))
+    table.print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()
