@@ -138,8 +138,6 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
     high, limit = min(earliest, 1.0), unnoticed(scene, work, step, row, resolution, depth)
     resolution = min(resolution, limit)
     if margin(work, NEW, row) >= -limit:
-        if work.geometry[NOW, row, GAP] < 0.0:
-            return earliest
         lowest = lowest_share(scene, work, step, row)
         if lowest > high:
             return earliest
