@@ -8,7 +8,7 @@ from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.report import format_table
+from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, FileError, visible
@@ -69,7 +69,9 @@ def library_text(path):
 
 def results_text(path, results, totals):
     try:
-        facts = conditions(results) + outcomes(results, totals) + origin(results.run)
+        facts = conditions(results) + outcomes(results, totals)
+        facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+        facts += origin(results.run)
         notes = stored(results.run, "failed")
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error

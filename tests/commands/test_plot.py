@@ -117,6 +117,14 @@ def test_info_ends_with_the_table_of_probabilities(study, capsys):
     assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
 
 
+def test_info_tells_how_many_were_run_again_and_flipped(study, tmp_path, capsys):
+    table = make_results(count=8).probabilities
+    checked, flipped = table["n_checked"].sum(), table["n_flipped"].sum()
+    call(info, study)
+    fact = facts_printed(capsys.readouterr().out)["numerical error"]
+    assert fact.startswith(f"{checked} replicates were run again more exactly, {flipped} of them")
+
+
 def test_info_gives_the_config_back_exactly(study, capsys):
     assert call(info, study, "--config") == 0
     assert capsys.readouterr().out == CONFIG

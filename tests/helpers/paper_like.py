@@ -46,7 +46,10 @@ def blank_replicates(shape):
     """The table of replicates without what happened."""
     from flocsim.io.results.schema import REPLICATES
 
-    return {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
+    blank = {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
+    return blank | {
+        name: np.full(shape, 255, "u1") for name in ("checked_outcome", "checked_inside")
+    }
 
 
 def paper_fits(radii=(1.0, 2.0, 4.0), scale=1.0, sphere=38.0):

@@ -22,6 +22,19 @@ def draw_outcomes(rng, shape):
     return outcome, np.where(missed, NOT_APPLICABLE, inside)
 
 
+def draw_second_runs(outcome, inside, seed=11):
+    """Codes of second runs of a fifth of these replicates, a tenth of which end as another did."""
+    rng = np.random.default_rng(seed)
+    checked = rng.random(outcome.shape) < 0.2
+    other = rng.permuted(np.arange(outcome.size)).reshape(outcome.shape)
+    place = np.where(rng.random(outcome.shape) < 0.1, other, np.arange(outcome.size).reshape(
+        outcome.shape))  # fmt: skip
+    return {
+        f"checked_{name}": np.where(checked, codes.ravel()[place], NOT_APPLICABLE)
+        for name, codes in (("outcome", outcome), ("inside", inside))
+    }
+
+
 def make_results(
     types=("I", "II", "III"),
     vertices=(1, 4, 16, 64),
@@ -38,6 +51,7 @@ def make_results(
     drawn = rng.uniform(30e-6, 50e-6, (3, *shape))
     lengths = np.where(collided, drawn, np.nan)
     times = np.where(collided, rng.uniform(0.0, 0.1, shape), np.nan)
+    again = draw_second_runs(outcome, inside)
     failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
     replicates = {
         "angle_i": rng.uniform(0.0, 2.0 * np.pi, shape),
@@ -45,6 +59,8 @@ def make_results(
         "outcome": outcome,
         "inside": inside,
         "crossed_zone": np.where(collided, rng.integers(0, 2, shape), NOT_APPLICABLE),
+        "bond": np.where(np.isin(outcome, (0, 2)), 1 + outcome // 2, NOT_APPLICABLE),
+        **again,
         "d_c_collision": lengths[0],
         "d_c_max": lengths[1],
         "d_c_last": drawn[2],
@@ -58,5 +74,5 @@ def make_results(
         "floc_j": rng.integers(0, 4, shape),
     }
     run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
-    table = tabulate(outcome, inside)
+    table = tabulate(outcome, inside, **again)
     return Results(types, vertices, delta, replicates, table, run, FAILURES)

@@ -11,31 +11,43 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flocsim.ensembles.estimates.events import (
+    AGGREGATED,
+    DECIDED,
+    FAILED,
+    INSIDE_CLASSES,
+    MISSED,
+    OUTSIDE_CLASSES,
+    UNDECIDED,
+)
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.errors import UsageError
 from flocsim.io.confidence import clustered_proportion, proportion, wilson
-from flocsim.io.results.file import CLASSES, NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
 
 __all__ = ["probabilities", "tabulate", "wilson"]
 
-MISSED = OUTCOMES.index("missed")
-UNDECIDED = OUTCOMES.index("undecided")
-FAILED = OUTCOMES.index("failed")
-DECIDED = len(CLASSES)
-"""Outcomes below this code are classes A to D."""
-AGGREGATED = (0, 2)
-INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
 
-
-def tabulate(outcome: ArrayLike, inside: ArrayLike) -> dict[str, np.ndarray]:
+def tabulate(
+    outcome: ArrayLike, inside: ArrayLike,
+    checked_outcome: ArrayLike = NOT_APPLICABLE, checked_inside: ArrayLike = NOT_APPLICABLE,
+) -> dict[str, np.ndarray]:  # fmt: skip
     """Counts and probabilities of every condition, over the last axis of the arrays.
 
     ``outcome``, ``inside``: codes as in the results file, (…, replicate), in practice
     (type, vertices, delta, replicate). Returns a dict of arrays (…), and (…, 4) for the classes
-    A–D: the counts ``n_*`` (see `count`) and the probabilities of `probabilities`.
-    Raises UsageError for unknown codes, and where outcome and inside contradict each other.
+    A–D: the counts ``n_*`` (see `count`, `count_changes`), the probabilities of `probabilities` and
+    their `numerical_errors`. ``checked_outcome``, ``checked_inside``: of second runs, none by
+    default. Raises UsageError for unknown codes, and where outcome and inside contradict each
+    other.
     """
-    counts = count(*checked_codes(outcome, inside))
-    return counts | probabilities(counts)
+    outcome, inside = checked_codes(outcome, inside)
+    again = (
+        np.broadcast_to(np.asarray(codes), outcome.shape)
+        for codes in (checked_outcome, checked_inside)
+    )
+    counts = count(outcome, inside) | count_changes(outcome, inside, *again)
+    return counts | probabilities(counts) | numerical_errors(counts)
 
 
 def count(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import clustered_proportion, proportion
+from flocsim.io.confidence import clustered_proportion, numerical_error, proportion
 from flocsim.io.plots.style import (
     CLASS_COLOURS,
     CROWDED,
@@ -31,7 +31,8 @@ PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
-BARS = "\n(bars: 95 %)"
+BARS = "\n(bars: 95 %;\nthin: and numerics)"
+ENDS = ("", "_low", "_high", "_numerical")
 CLASS_WORDS = {
     "A": "A  inside, aggregated",
     "B": "B  inside, departed",
@@ -70,7 +71,7 @@ def figure_6(results: Results) -> Figure:
 
 
 def probability_figure(results, name):
-    """One panel per type, one line per delta, bars for the 95 % intervals, against N."""
+    """One panel per type, one line per delta, against N, with bars for both errors."""
     with house_style():
         figure, panels = panel_grid(len(results.types))
         for number, axes in enumerate(panels):
@@ -133,7 +134,7 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
 
 
 def draw_probability(axes, results, number, name):
-    bands = [results.probabilities[name + end][number] for end in ("", "_low", "_high")]
+    bands = [results.probabilities[name + end][number] for end in ENDS]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     count = results.delta.size
@@ -155,6 +156,23 @@ def draw_classes(axes, results, number):
 
 
 def class_bands(results, number):
+    """(share, low, high, numerical error) (vertices, class) of one type."""
+    return (*class_shares(results, number), class_errors(results.probabilities)[number])
+
+
+def class_errors(table):
+    """Numerical errors (type, vertices, class) of the classes' shares, pooled over delta."""
+    names = ("gained", "lost", "checked")
+    gained, lost, checked = (table[f"n_{name}_pr_class"].sum(axis=2) for name in names)
+    trials = table["n_class"].sum(axis=(2, 3))
+    parts = [
+        numerical_error(gained[..., place] + lost[..., place], checked[..., place], trials)
+        for place in range(len(CLASSES))
+    ]
+    return np.stack(parts, axis=-1)
+
+
+def class_shares(results, number):
     """(share, low, high) (vertices, class) of one type; Wilson's without the replicates."""
     if results.replicates is None:
         counts = results.probabilities["n_class"][number].sum(axis=1)
@@ -167,15 +185,24 @@ def class_bands(results, number):
 
 
 def draw_line(axes, vertices, bands, index, count, colour):
-    """Line ``index`` of ``count``: points with interval bars, joined in the order of N."""
+    """Line ``index`` of ``count``: points with bars, joined in the order of N.
+
+    Inner bars are intervals, outer ones, thin, these and the numerical error on either side.
+    """
     order = np.argsort(vertices)
     places = vertex_positions(vertices)[order] + dodge(index, count)
-    value, low, high = (np.asarray(band)[order] for band in bands)
+    value, low, high, numerical = (np.asarray(band)[order] for band in bands)
     reach = np.clip([value - low, high - value], 0.0, None)
     size, width = (2.2, 0.8) if len(order) > CROWDED else (4.0, 1.2)
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
                   marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
                   elinewidth=0.6 * width)  # fmt: skip
+    if np.any(numerical > 0.0):
+        beyond = np.nan_to_num(numerical)
+        outer = [value - np.maximum(low - beyond, 0.0), np.minimum(high + beyond, 1.0) - value]
+        thin = 0.2 * width
+        axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
+                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin)  # fmt: skip
 
 
 def note_if_empty(axes, values, text):

@@ -103,7 +103,9 @@ def check_tables(results: Results) -> None:
         np.any(table["n_total"] != results.count)
         or np.any(ends + table["n_class"].sum(axis=-1) != results.count)
         or np.any(table["n_collided"] > results.count)
-        or np.any(table["n_inside"] > table["n_collided"]),
+        or np.any(table["n_inside"] > table["n_collided"])
+        or np.any(table["n_checked"] > results.count)
+        or np.any(table["n_flipped"] > table["n_checked"]),
         "counts that contradict each other",
     )
     for name, values in results.pooled.items():
@@ -133,9 +135,11 @@ def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
-    for name in ("inside", "crossed_zone"):
+    for name in ("inside", "crossed_zone", "checked_inside"):
         codes = column(name)
         refuse_row((codes > 1) & (codes != NOT_APPLICABLE), name)
+    again = column("checked_outcome")
+    refuse_row((again >= len(OUTCOMES)) & (again != NOT_APPLICABLE), "checked_outcome")
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")

@@ -25,7 +25,7 @@ from flocsim.io.results.schema import (
 )
 
 FORMAT = "flocsim results"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 class SparseImage(io.RawIOBase):

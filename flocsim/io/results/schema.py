@@ -15,7 +15,8 @@ OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed")
 CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
-"""In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound."""
+"""In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound; in
+``checked_outcome``: the replicate was not run again."""
 
 AXES = ("type", "vertices", "delta")
 
@@ -26,6 +27,8 @@ REPLICATES = {  # name: (dtype, units, long name)
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
+    "checked_outcome": ("u1", "1", "outcome at the tighter tolerance"),
+    "checked_inside": ("u1", "1", "centre distance below D_0 at the collision, when run again"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
     "d_c_last": ("f8", "m", "last centre distance"),
@@ -51,6 +54,9 @@ COUNTS = {
     "n_collided": "replicates whose outlines touched",
     "n_inside": "collisions inside the attraction zone",
     "n_class": "collisions of each class",
+    "n_checked": "replicates that were run again at a tighter tolerance",
+    "n_flipped": "replicates run again that ended with another outcome, or on the other side of "
+    "the zone",
 }
 PROBABILITIES = {
     "pr_inside": "Pr[inside | collision]",
@@ -59,11 +65,27 @@ PROBABILITIES = {
     "pr_a": "Pr[aggregation | decided collision]",
     "pr_class": "Pr[class | decided collision]",
 }
-BOUNDS = {"": "", "_low": ", lower 95 % bound", "_high": ", upper 95 % bound"}
+CHANGES = {
+    "n_checked": "replicates run again that count in {} in either run",
+    "n_gained": "of these, raised {} when run again",
+    "n_lost": "of these, lowered {} when run again",
+}
+"""What is counted for every probability, beside `COUNTS`."""
+BOUNDS = {
+    "": "",
+    "_low": ", lower 95 % bound",
+    "_high": ", upper 95 % bound",
+    "_numerical": ", numerical error: 95 % bound of the share that flips",
+}
 TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
     name + suffix: ("f8", "1", text + bound)
     for name, text in PROBABILITIES.items()
     for suffix, bound in BOUNDS.items()
+}
+TABLE |= {
+    f"{count}_{name}": ("i8", "1", words.format(text))
+    for name, text in PROBABILITIES.items()
+    for count, words in CHANGES.items()
 }
 POOLED = {
     name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
@@ -88,6 +110,8 @@ FLAGS = {
     "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
     "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
+    "checked_outcome": ((*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")),
+    "checked_inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
     "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
 COORDINATES = {

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from flocsim.ensembles.estimates.numerical import numerical_errors
 from flocsim.ensembles.estimates.statistics import probabilities, tabulate, wilson
 from flocsim.ensembles.report import format_table
 from flocsim.errors import UsageError
@@ -132,8 +133,9 @@ def test_counts_of_two_halves_pool_to_the_whole():
     outcome, inside = draw_outcomes(np.random.default_rng(2), (2, 3, 2, 50))
     whole = tabulate(outcome, inside)
     parts = [tabulate(outcome[..., k], inside[..., k]) for k in (slice(17), slice(17, None))]
-    pooled = {name: parts[0][name] + parts[1][name] for name in COUNTS}
-    pooled |= probabilities(pooled)
+    counts = [name for name in whole if name.startswith("n_")]
+    pooled = {name: parts[0][name] + parts[1][name] for name in counts}
+    pooled |= probabilities(pooled) | numerical_errors(pooled)
     for name in whole:
         np.testing.assert_array_equal(whole[name], pooled[name])
 
@@ -189,9 +191,7 @@ def test_table_tells_the_numbers():
     inside = np.select([outcome == 0, outcome == 3], [1, 0], NOT_APPLICABLE)
     text = format_table(["II"], [16], [0.25], tabulate(outcome, inside))
     row = text.splitlines()[-1]
-    assert " ".join(row.split()) == (
-        "16 0.25 10 9 6 .667 [.354, .879] .667 [.354, .879] 6 0 0 3 1 0 0"
-    )
+    assert " ".join(row.split()) == ("16 0.25 10 9 6 .667 +-.312 - .667 +-.312 - 6 0 0 3 1 0 0")
     assert "type II" in text
 
 
@@ -204,4 +204,12 @@ def test_table_shows_a_dash_without_events():
 def test_table_tells_certainty_from_rounding():
     outcome = np.zeros((1, 1, 1, 40), dtype=int)
     text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1))
-    assert text.count("1.00 [.912, 1.00]") == 2
+    assert text.count("1.00 +-.088      -") == 2
+
+
+def test_table_tells_the_numerical_error():
+    outcome = np.zeros((1, 1, 1, 40), dtype=int)
+    again = np.where(np.arange(40) < 4, 1, outcome)
+    text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1, again, outcome + 1))
+    assert text.count("1.00 +-.088 +-.000") == 1
+    assert text.count("1.00 +-.088 +-.100") == 1

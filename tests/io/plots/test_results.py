@@ -15,10 +15,22 @@ def texts(axes):
     return " ".join(text.get_text() for text in axes.texts)
 
 
+def inner(axes):
+    """The lines of a panel with their interval bars."""
+    return [container for container in axes.containers if container.lines[0] is not None]
+
+
+def outer(axes):
+    """(low, high) of the outer bars of every line in a panel."""
+    found = [container for container in axes.containers if container.lines[0] is None]
+    ends = (np.array(container.lines[2][0].get_segments())[:, :, 1] for container in found)
+    return [(each[:, 0], each[:, 1]) for each in ends]
+
+
 def bars(axes):
     """(value, low, high) of every line with interval bars in a panel, as lists."""
     found = []
-    for container in axes.containers:
+    for container in inner(axes):
         segments = np.array(container.lines[2][0].get_segments())
         found.append((container.lines[0].get_ydata(), segments[:, 0, 1], segments[:, 1, 1]))
     return found
@@ -47,6 +59,28 @@ def test_figure_4_shows_every_probability_and_interval():
             for end, drawn in zip(("", "_low", "_high"), line, strict=True):
                 expected = results.probabilities["pr_inside" + end][number, :, index]
                 np.testing.assert_allclose(drawn, expected, atol=1e-12)
+
+
+def test_outer_bars_have_the_numerical_error_on_either_side():
+    results = make_results()
+    table = results.probabilities
+    for number, axes in enumerate(figure_4(results).axes):
+        lines = outer(axes)
+        assert len(lines) == 5
+        for index, (low, high) in enumerate(lines):
+            ends = (table[f"pr_inside_{end}"][number, :, index] for end in ("low", "high"))
+            error = table["pr_inside_numerical"][number, :, index]
+            least, most = ends
+            np.testing.assert_allclose(low, np.maximum(least - error, 0.0), atol=1e-12)
+            np.testing.assert_allclose(high, np.minimum(most + error, 1.0), atol=1e-12)
+
+
+def test_without_second_runs_there_are_no_outer_bars():
+    results = make_results()
+    codes = (results.replicates[name] for name in ("outcome", "inside"))
+    plain = attrs.evolve(results, probabilities=tabulate(*codes))
+    assert not any(outer(axes) for draw in (figure_4, figure_8) for axes in draw(plain).axes)
+    assert any(outer(axes) for axes in figure_8(results).axes)
 
 
 def test_figure_8_pools_the_counts_of_all_displacements():
@@ -82,7 +116,7 @@ def test_order_of_vertex_counts_does_not_matter():
         results, vertices=results.vertices[::-1], probabilities=turned, replicates=rows
     )
     for one, other in zip(figure_8(results).axes, figure_8(backwards).axes, strict=True):
-        for a, b in zip(one.containers, other.containers, strict=True):
+        for a, b in zip(inner(one), inner(other), strict=True):
             np.testing.assert_array_equal(a.lines[0].get_xydata(), b.lines[0].get_xydata())
 
 
