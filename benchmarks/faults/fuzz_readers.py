@@ -124,6 +124,7 @@ class JournalReader:
 
         rows = np.zeros(2, ROW)
         rows["inside"], rows["floc_i"], rows["floc_j"] = 1, -1, -1
+        rows["checked_outcome"], rows["checked_inside"] = (1, 255), (1, 255)
         return rows
 
     def make(self, rng, folder):
