@@ -50,6 +50,7 @@ def made_up_rows(seed, count):
     rows["outcome"] %= 6
     inside = np.array([1, 1, 0, 0, NOT_APPLICABLE, NOT_APPLICABLE], "u1")
     rows["inside"] = inside[rows["outcome"]]
+    rows["bond"] = np.where(np.isin(rows["outcome"], [0, 2]), 1 + rows["bond"] % 3, NOT_APPLICABLE)
     rows["failure"], rows["crossed_zone"] = 0, rows["inside"]
     rows["floc_i"] = rows["floc_j"] = -1
     return rows

@@ -123,7 +123,7 @@ class JournalReader:
         from flocsim.ensembles.chunks import ROW
 
         rows = np.zeros(2, ROW)
-        rows["inside"], rows["floc_i"], rows["floc_j"] = 1, -1, -1
+        rows["inside"], rows["bond"], rows["floc_i"], rows["floc_j"] = 1, 1, -1, -1
         return rows
 
     def make(self, rng, folder):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.estimates.statistics import HOOK
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.schema import Results
 
@@ -17,10 +18,11 @@ HEADER = (
     ("in-", "side"),
     ("", "Pr[inside] 95 %"),
     ("", "Pr[A] 95 %"),
+    ("of it", "hangs"),
     *(("", name) for name in CLASSES),
-    ("", "missed"),
-    ("un-", "decided"),
-    ("", "failed"),
+    ("mis-", "sed"),
+    ("unde-", "cided"),
+    ("fail-", "ed"),
 )
 
 
@@ -36,8 +38,9 @@ def format_table(
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. Returns text without a final line
-    end.
+    "-" where there was no event to estimate a probability from. Of the aggregations some hang by
+    their shapes, attraction being weaker than the load, and the others stick. Returns text without
+    a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
     rows = [condition_row(vertices, delta, table, place) for place in conditions]
@@ -80,6 +83,7 @@ def condition_row(vertices, delta, table, place):
         *(str(table[name][place]) for name in counts),
         interval(table, "pr_inside", place),
         interval(table, "pr_a", place),
+        hanging(table, place),
         *(str(number) for number in table["n_class"][place]),
         *(str(table[name][place]) for name in ends),
     )
@@ -91,6 +95,12 @@ def interval(table, name, place):
     if np.isnan(value):
         return "-"
     return f"{share(value)} [{share(low)}, {share(high)}]"
+
+
+def hanging(table, place):
+    """The share of aggregations that hang by a hook."""
+    value = table["pr_bond"][place][HOOK - 1]
+    return "-" if np.isnan(value) else share(value)
 
 
 def share(value):

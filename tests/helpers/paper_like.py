@@ -6,6 +6,7 @@ import numpy as np
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import Results
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
+from tests.helpers.synthetic_results import bonds_of
 
 TYPES, VERTICES, DELTA = ("I", "II", "III"), (1, 4, 16, 64), (0.0, 0.25, 0.5, 0.75, 1.0)
 COUNT = 600
@@ -39,7 +40,9 @@ def paper_results(change=None):
     if change:
         change(outcome, inside)
     replicates = blank_replicates(outcome.shape) | {"outcome": outcome, "inside": inside}
-    return Results(TYPES, VERTICES, DELTA, replicates, tabulate(outcome, inside))
+    replicates["bond"] = bonds_of(outcome)
+    table = tabulate(outcome, inside, replicates["bond"])
+    return Results(TYPES, VERTICES, DELTA, replicates, table)
 
 
 def blank_replicates(shape):

@@ -7,6 +7,7 @@ import numpy as np
 
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
+    CODES,
     checked_codes,
     count,
     pooled_probabilities,
@@ -41,9 +42,9 @@ class Reader:
         ]
         return np.stack(parts).reshape(*self.shape[:3], stop - first)
 
-    def codes(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
-        """Outcome and inside of replicates [first, stop) of all conditions: Codes."""
-        return self.block("outcome", first, stop), self.block("inside", first, stop)
+    def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
+        """CODES of replicates [first, stop) of all conditions: Codes."""
+        return tuple(self.block(name, first, stop) for name in CODES)
 
     def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
         """{name: array (type, vertices, delta, replicate)}, in memory."""
@@ -51,7 +52,7 @@ class Reader:
 
 
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]
-"""Gives outcome and inside of replicates [first, stop), each (type, vertices, delta, replicate)."""
+"""Gives CODES of replicates [first, stop), each (type, vertices, delta, replicate)."""
 
 Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
@@ -62,11 +63,11 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        outcome, inside = codes(start, min(start + step, stop))
-        checked_codes(outcome, inside)
+        outcome, inside, bond = codes(start, min(start + step, stop))
+        checked_codes(outcome, inside, bond)
         found = {
-            **count(outcome, inside),
-            **pooled_sums(outcome, inside),
+            **count(outcome, inside, bond),
+            **pooled_sums(outcome, inside, bond),
             "joint": joint_counts(outcome, inside),
         }
         sums = added(sums, found)

@@ -18,6 +18,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
+from flocsim.ensembles.estimates.statistics import CODES
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
@@ -29,9 +30,6 @@ from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file
 
 COUNTED_ROWS = 524_288
 """Rows that a rank counts, at least: an answer has as many numbers as many ranks'."""
-
-CODES = ("outcome", "inside")
-"""The columns that are counted."""
 
 Digests = dict[int, list[bytes]]
 """Of blocks by their numbers, those of all pieces in the order of Plan.pieces_of."""
