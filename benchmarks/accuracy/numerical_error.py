@@ -16,6 +16,7 @@ import numpy as np
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.numerical import count_changes, trials_of
+from flocsim.ensembles.estimates.statistics import CODES
 from flocsim.ensembles.runner import run
 
 QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
@@ -36,7 +37,7 @@ def study(arguments, seed, **integrator):
 
 def compare(found, exact):
     """{probability: (stated, true)}: errors of all conditions with trials, as flat arrays."""
-    codes = [each.replicates[name] for each in (found, exact) for name in ("outcome", "inside")]
+    codes = [[each.replicates[name] for name in CODES] for each in (found, exact)]
     changes, trials = count_changes(*codes), trials_of(found.probabilities)
     pairs = {}
     for name, number in trials.items():

@@ -6,22 +6,24 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.estimates.statistics import HOOK
 from flocsim.io.confidence import wilson
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.schema import Results
 
 HEADER = (
     ("", "N"),
-    ("", "delta"),
+    ("del-", "ta"),
     ("", "n"),
     ("col-", "lided"),
     ("in-", "side"),
     ("Pr[inside]", "95 %  num."),
     ("Pr[A]", "95 %  num."),
+    ("of A", "hang"),
     *(("", name) for name in CLASSES),
-    ("", "missed"),
-    ("un-", "decided"),
-    ("", "failed"),
+    ("mis-", "sed"),
+    ("unde-", "cided"),
+    ("fail-", "ed"),
 )
 
 
@@ -39,8 +41,9 @@ def format_table(
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. Returns text without a final line
-    end.
+    "-" where there was no event to estimate a probability from. Of the aggregations some hang by
+    their shapes, attraction being weaker than the load, and the others stick. Returns text without
+    a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
     rows = [condition_row(vertices, delta, table, place) for place in conditions]
@@ -96,6 +99,7 @@ def condition_row(vertices, delta, table, place):
         *(str(table[name][place]) for name in counts),
         with_errors(table, "pr_inside", place),
         with_errors(table, "pr_a", place),
+        hanging(table, place),
         *(str(number) for number in table["n_class"][place]),
         *(str(table[name][place]) for name in ends),
     )
@@ -113,6 +117,12 @@ def with_errors(table, name, place):
         return "-"
     added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
     return f"{share(value)} +-{share(max(value - low, high - value))} {added:>6}"
+
+
+def hanging(table, place):
+    """The share of aggregations that hang by a hook."""
+    value = table["pr_bond"][place][HOOK - 1]
+    return "-" if np.isnan(value) else share(value)
 
 
 def share(value):

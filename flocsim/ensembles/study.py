@@ -23,6 +23,9 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import NOT_APPLICABLE
 
+CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
+"""Column of a second run → the same of the first."""
+
 
 def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's study needs: none for spheres alone."""
@@ -128,7 +131,7 @@ class Study:
             return None
         floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
         row |= {"floc_i": floc_i, "floc_j": floc_j}
-        row |= {"checked_outcome": NOT_APPLICABLE, "checked_inside": NOT_APPLICABLE}
+        row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
         if record is not None or not self.is_checked(replicate):
             return row
         found = self.run_again(encounter, angles, share, halted)
@@ -156,10 +159,8 @@ class Study:
         except MemoryError:
             raise
         except Exception:
-            return {"checked_outcome": FAILED, "checked_inside": NOT_APPLICABLE}
-        if row is None:
-            return None
-        return {"checked_outcome": row["outcome"], "checked_inside": row["inside"]}
+            return dict.fromkeys(CHECKED, NOT_APPLICABLE) | {"checked_outcome": FAILED}
+        return None if row is None else {name: row[column] for name, column in CHECKED.items()}
 
     @property
     def kinds(self) -> list[int]:

@@ -8,6 +8,8 @@ import numpy as np
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
+    CODES,
+    COUNTED,
     checked_codes,
     count,
     pooled_probabilities,
@@ -16,9 +18,6 @@ from flocsim.ensembles.estimates.statistics import (
 )
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.results.schema import POOLED
-
-CODES = ("outcome", "inside", "checked_outcome", "checked_inside")
-"""The columns that are counted."""
 
 BLOCK_ROWS = 262_144
 """Rows, of all conditions together, that are looked at together."""
@@ -47,8 +46,8 @@ class Reader:
         return np.stack(parts).reshape(*self.shape[:3], stop - first)
 
     def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
-        """CODES of replicates [first, stop) of all conditions: Codes."""
-        return tuple(self.block(name, first, stop) for name in CODES)
+        """COUNTED of replicates [first, stop) of all conditions: Codes."""
+        return tuple(self.block(name, first, stop) for name in COUNTED)
 
     def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
         """{name: array (type, vertices, delta, replicate)}, in memory."""
@@ -56,7 +55,7 @@ class Reader:
 
 
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]
-"""Gives CODES of replicates [first, stop), each (type, vertices, delta, replicate)."""
+"""Gives COUNTED of replicates [first, stop), each (type, vertices, delta, replicate)."""
 
 Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
@@ -67,12 +66,13 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        outcome, inside, *again = codes(start, min(start + step, stop))
-        checked_codes(outcome, inside)
+        columns = codes(start, min(start + step, stop))
+        first_codes, again = columns[: len(CODES)], columns[len(CODES) :]
+        outcome, inside, bond = checked_codes(*first_codes)
         found = {
-            **count(outcome, inside),
-            **count_changes(outcome, inside, *again),
-            **pooled_sums(outcome, inside),
+            **count(outcome, inside, bond),
+            **count_changes((outcome, inside, bond), again),
+            **pooled_sums(outcome, inside, bond),
             "joint": joint_counts(outcome, inside),
         }
         sums = added(sums, found)

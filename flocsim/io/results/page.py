@@ -39,7 +39,9 @@ interruptions, on processors of one kind ([cluster.md](cluster.md) says what dif
 """
 
 GROUPS = (
-    ("probabilities", "(type, vertices, delta), `class` A to D last where the name has it. "
+    ("probabilities", "(type, vertices, delta), `class` A to D or the kind of `bond` last where "
+     "the name has it. Some aggregates stick, others hang by their shapes: pr_a = pr_sticks + "
+     "pr_hangs. "
      "`_low` and `_high` bound Wilson's 95 % interval; NaN where there was no event. `_numerical` "
      "is what numerics add on either side (below).", TABLE),
     ("pooled", "(type, vertices): all displacements together. A replicate has the same "

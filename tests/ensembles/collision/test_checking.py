@@ -24,7 +24,7 @@ from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.small_study import small_config, small_study
 
 POLYGONS = {"shapes": {"vertices": (4,), "pool": 2}, "scene": {"types": ("I",), "delta": (0.0,)}}
-CHECKS = ("checked_outcome", "checked_inside")
+CHECKS = ("checked_outcome", "checked_inside", "checked_bond")
 
 
 @pytest.mark.parametrize("share", ["auto", 0.0, 0.03, 0.5, 1.0])
@@ -103,8 +103,10 @@ def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(
     place = all_of_them.places[0]
     for k in range(6):
         row, plain, tighter = (each.run(*place, k) for each in (all_of_them, none, exact))
-        assert [plain[name] for name in CHECKS] == [NOT_APPLICABLE] * 2
-        assert [row[name] for name in CHECKS] == [tighter["outcome"], tighter["inside"]]
+        assert [plain[name] for name in CHECKS] == [NOT_APPLICABLE] * 3
+        assert [row[name] for name in CHECKS] == [
+            tighter[name] for name in ("outcome", "inside", "bond")
+        ]
         assert {**row, **dict.fromkeys(CHECKS, NOT_APPLICABLE)} == pytest.approx(plain, nan_ok=True)
         assert tighter["steps"] > plain["steps"]
 
@@ -121,7 +123,7 @@ def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
     monkeypatch.setattr(study_module, "run_encounter", broken)
     row, note = run_safely(study, study.places[0], 0)
     assert note is None
-    assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE]
+    assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
     assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])
 
 

@@ -6,13 +6,31 @@ from scipy.stats import nbinom
 
 from flocsim.ensembles.estimates.events import events
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors, trials_of
-from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.ensembles.estimates.statistics import COUNTED, tabulate
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
 from flocsim.io.confidence import numerical_error
 from flocsim.io.results.schema import PROBABILITIES
-from tests.helpers.synthetic_results import draw_outcomes, draw_second_runs, make_results
+from tests.helpers.synthetic_results import (
+    bonds_of,
+    draw_codes,
+    draw_second_runs,
+    make_results,
+)
 
 NOT = 255
+OF_BONDS = ("pr_sticks", "pr_hangs", "pr_bond")
+
+
+def test_a_hook_that_becomes_a_certificate_flips_between_hanging_and_sticking():
+    first, again = ([[0, 2, 1]], [[1, 0, 1]], [[2, 1, NOT]]), ([[0, 2, 1]], [[1, 0, 1]],
+                                                               [[1, 1, NOT]])  # fmt: skip
+    table = tabulate(*first, *again)
+    assert table["n_flipped"].tolist() == [0]
+    assert [table[f"n_{kind}_pr_sticks"][0] for kind in ("checked", "gained", "lost")] == [3, 1, 0]
+    assert [table[f"n_{kind}_pr_hangs"][0] for kind in ("checked", "gained", "lost")] == [3, 0, 1]
+    assert table["n_gained_pr_bond"].tolist() == [[1, 0, 0]]
+    assert table["n_lost_pr_bond"].tolist() == [[0, 1, 0]]
+    assert table["n_checked_pr_bond"].tolist() == [[2, 2, 2]]
 
 
 def test_every_kind_of_change_counts_as_it_should():
@@ -21,11 +39,11 @@ def test_every_kind_of_change_counts_as_it_should():
     inside = [[1, 1, 0, 0, NOT, 1, 1]]
     again = [[0, 1, 0, 4, 0, 5, NOT]]
     inside_again = [[1, 1, 1, NOT, 1, 1, NOT]]
-    table = tabulate(outcome, inside, again, inside_again)
+    table = tabulate(outcome, inside, bonds_of(outcome), again, inside_again, bonds_of(again))
     found = {name: table[name][0].tolist() for name in table if name.startswith("n_")}
     assert (found["n_checked"], found["n_flipped"]) == (6, 5)
     counts = {name: [found[f"n_{kind}_{name}"] for kind in ("checked", "gained", "lost")]
-              for name in PROBABILITIES}  # fmt: skip
+              for name in PROBABILITIES if name not in OF_BONDS}  # fmt: skip
     assert counts == {
         # C → A comes in, D → missed was outside, missed → A is a new one inside.
         "pr_inside": [6, 3, 0],
@@ -40,7 +58,8 @@ def test_every_kind_of_change_counts_as_it_should():
 
 
 def test_classes_gain_and_lose_by_their_own_share():
-    table = tabulate([[0, 0, 3]], [[1, 1, 0]], [[0, 1, 4]], [[1, 1, NOT]])
+    first, again = [[0, 0, 3]], [[0, 1, 4]]
+    table = tabulate(first, [[1, 1, 0]], bonds_of(first), again, [[1, 1, NOT]], bonds_of(again))
     # A → B: A loses, B gains. D → missed: D loses, for the others a failure goes.
     assert table["n_gained_pr_class"].tolist() == [[1, 2, 1, 0]]
     assert table["n_lost_pr_class"].tolist() == [[1, 0, 0, 1]]
@@ -49,13 +68,12 @@ def test_classes_gain_and_lose_by_their_own_share():
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_probability_moves_further_than_its_flips(seed):
-    outcome, inside = draw_outcomes(np.random.default_rng(seed), (2, 3, 2, 200))
-    drawn = draw_second_runs(outcome, inside, seed)
+    codes = draw_codes(np.random.default_rng(seed), (2, 3, 2, 200))
+    drawn = draw_second_runs(codes, seed)
     checked = drawn["checked_outcome"] != NOT
-    again = [np.where(checked, each, codes)
-             for each, codes in zip(drawn.values(), (outcome, inside), strict=True)]  # fmt: skip
-    first, second = tabulate(outcome, inside), tabulate(*again)
-    changes = count_changes(outcome, inside, *again)
+    again = [np.where(checked, *pair) for pair in zip(drawn.values(), codes, strict=True)]
+    first, second = tabulate(*codes), tabulate(*again)
+    changes = count_changes(codes, again)
     trials = trials_of(first)
     moved = 0
     for name in PROBABILITIES:
@@ -72,10 +90,11 @@ def test_no_probability_moves_further_than_its_flips(seed):
 
 
 def test_events_are_what_the_probabilities_are_of():
-    outcome, inside = draw_outcomes(np.random.default_rng(3), (2, 2, 2, 50))
-    table = tabulate(outcome, inside)
-    for name, (trial, success) in events(outcome, inside).items():
-        if name != "pr_class":
+    codes = draw_codes(np.random.default_rng(3), (2, 2, 2, 50))
+    table = tabulate(*codes)
+    assert set(events(*codes)) == set(PROBABILITIES)
+    for name, (trial, success) in events(*codes).items():
+        if name not in ("pr_class", "pr_bond"):
             counts = success.sum(-1), np.where(trial.any(-1), trial.sum(-1), np.nan)
             np.testing.assert_array_equal(table[name], counts[0] / counts[1])
             assert not np.any(success & ~trial)
@@ -133,8 +152,7 @@ def test_the_bound_holds_in_nine_of_ten_conditions(mean, spread):
 
 def test_tables_from_sums_are_those_of_all_replicates_together():
     results = make_results(count=40)
-    names = ("outcome", "inside", "checked_outcome", "checked_inside")
-    columns = [results.replicates[name] for name in names]
+    columns = [results.replicates[name] for name in COUNTED]
 
     def codes(first, stop):
         return tuple(column[..., first:stop] for column in columns)
@@ -149,5 +167,5 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
         np.testing.assert_array_equal(table[name], whole[name])
     over_delta = {name: values.sum(axis=2) for name, values in whole.items() if name[:2] == "n_"}
     for name, values in numerical_errors(over_delta).items():
-        if name != "pr_class_numerical":
+        if name not in ("pr_class_numerical", "pr_bond_numerical"):
             np.testing.assert_array_equal(pooled[name], values)

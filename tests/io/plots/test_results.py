@@ -7,7 +7,7 @@ import pytest
 from flocsim.ensembles.estimates.statistics import tabulate, wilson
 from flocsim.io.plots.results import FIGURES, figure_4, figure_6, figure_8
 from flocsim.io.plots.style import save
-from tests.helpers.synthetic_results import make_results
+from tests.helpers.synthetic_results import bonds_of, make_results
 
 
 def texts(axes):
@@ -40,6 +40,7 @@ def with_outcomes(results, outcome, inside):
     """The same conditions with one outcome everywhere."""
     shape = results.replicates["outcome"].shape
     codes = {"outcome": np.full(shape, outcome, "u1"), "inside": np.full(shape, inside, "u1")}
+    codes["bond"] = bonds_of(codes["outcome"]).astype("u1")
     table = tabulate(**codes)
     return attrs.evolve(results, probabilities=table, replicates=results.replicates | codes)
 
@@ -77,7 +78,7 @@ def test_outer_bars_have_the_numerical_error_on_either_side():
 
 def test_without_second_runs_there_are_no_outer_bars():
     results = make_results()
-    codes = (results.replicates[name] for name in ("outcome", "inside"))
+    codes = (results.replicates[name] for name in ("outcome", "inside", "bond"))
     plain = attrs.evolve(results, probabilities=tabulate(*codes))
     assert not any(outer(axes) for draw in (figure_4, figure_8) for axes in draw(plain).axes)
     assert any(outer(axes) for axes in figure_8(results).axes)
@@ -93,14 +94,43 @@ def test_figure_8_pools_the_counts_of_all_displacements():
             assert (low <= value).all() and (value <= high).all()
 
 
+def test_bonds_are_shares_of_the_aggregations():
+    results = make_results()
+    counts = results.probabilities["n_bond"].sum(axis=2)
+    drawn = {
+        "bonds": FIGURES["bonds"](results).axes,
+        "overview": FIGURES["overview"](results).axes[-3:],
+    }
+    for name, panels in drawn.items():
+        for number, axes in enumerate(panels):
+            lines = bars(axes)
+            assert len(lines) == 3, name
+            for index, (value, low, high) in enumerate(lines):
+                trials = counts[number].sum(axis=-1)
+                np.testing.assert_allclose(value, counts[number, :, index] / trials)
+                assert (low <= value).all() and (value <= high).all()
+
+
+def test_without_its_rows_a_file_gives_the_same_bonds():
+    results = make_results()
+    for one, other in zip(
+        FIGURES["bonds"](results).axes,
+        FIGURES["bonds"](attrs.evolve(results, replicates=None, count=results.count)).axes,
+        strict=True,
+    ):
+        for mine, theirs in zip(bars(one), bars(other), strict=True):
+            np.testing.assert_allclose(mine[0], theirs[0])
+
+
 def test_replicates_that_agree_at_all_displacements_count_once():
     results = make_results()
     outcome = results.replicates["outcome"].copy()
     outcome[:] = np.arange(outcome.shape[-1]) % 4
     inside = np.where(outcome < 2, 1, 0)
     same = attrs.evolve(
-        results, probabilities=tabulate(outcome, inside),
-        replicates=results.replicates | {"outcome": outcome, "inside": inside.astype("u1")},
+        results, probabilities=tabulate(outcome, inside, bonds_of(outcome)),
+        replicates=results.replicates
+        | {"outcome": outcome, "inside": inside.astype("u1"), "bond": bonds_of(outcome)},
     )  # fmt: skip
     count = outcome.shape[-1]
     for index, (_, low, high) in enumerate(bars(figure_8(same).axes[0])):
@@ -162,5 +192,5 @@ def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
     save(figure, tmp_path / "figure.svg")
     assert len([axes for axes in figure.axes if axes.get_visible()]) in (
         len(results.types),
-        3 * len(results.types),
+        4 * len(results.types),
     )
