@@ -15,7 +15,7 @@ def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
     assert told.split("  ")[-1].strip() == "{} certificate, {} hook, {} rest".format(*held)
     # And of each condition what share of Pr[A] hangs.
     share = results.probabilities["pr_bond"][0, 0, 0, 1]
-    (heads,) = [line.split() for line in lines if line.split()[:2] == ["N", "delta"]]
+    (heads,) = [line.split() for line in lines if line.split()[:2] == ["N", "ta"]]
     row = lines[-4].replace("[", "").replace("]", "").split()
-    assert "hangs" in heads
+    assert "hang" in heads
     assert f"{share:.3f}"[1:] in row
