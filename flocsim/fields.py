@@ -100,6 +100,7 @@ def word_or_quantity(
     at_most: float | None = None,
     default: Any = attrs.NOTHING,
     help: str = "",
+    **metadata: Any,
 ) -> Any:
     """A field that takes one special word or a quantity, e.g. ``"critical"`` or a number."""
     check, allowed = number_range(above, at_least, at_most)
@@ -110,6 +111,7 @@ def word_or_quantity(
         unit=unit,
         choices=(word,),
         help=help,
+        **metadata,
     )
 
 

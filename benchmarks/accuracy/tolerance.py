@@ -15,7 +15,7 @@ from flocsim.ensembles.runner import run
 
 def study(arguments, tolerance):
     """Results of the config at a tolerance [m]."""
-    changes = {"integrator": {"tolerance": tolerance}}
+    changes = {"integrator": {"tolerance": tolerance, "check_share": 0.0}}
     if arguments.replicates:
         changes["replicates"] = arguments.replicates
     return run(load_config(arguments.config, changes))

@@ -50,7 +50,13 @@ def made_up_rows(seed, count):
     rows["outcome"] %= 6
     inside = np.array([1, 1, 0, 0, NOT_APPLICABLE, NOT_APPLICABLE], "u1")
     rows["inside"] = inside[rows["outcome"]]
+    rows["bond"] = np.where(np.isin(rows["outcome"], [0, 2]), 1 + rows["bond"] % 3, NOT_APPLICABLE)
     rows["failure"], rows["crossed_zone"] = 0, rows["inside"]
+    # A few are run again, and some of them end as the one before did.
+    again, found = rows["checked_outcome"] % 5 == 0, np.arange(count)
+    found = np.maximum(found - (rows["checked_inside"] % 10 == 0), 0)
+    for name in ("outcome", "inside", "bond"):
+        rows[f"checked_{name}"] = np.where(again, rows[name][found], NOT_APPLICABLE)
     rows["floc_i"] = rows["floc_j"] = -1
     return rows
 

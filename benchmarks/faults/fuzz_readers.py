@@ -123,7 +123,9 @@ class JournalReader:
         from flocsim.ensembles.chunks import ROW
 
         rows = np.zeros(2, ROW)
-        rows["inside"], rows["floc_i"], rows["floc_j"] = 1, -1, -1
+        rows["inside"], rows["bond"], rows["floc_i"], rows["floc_j"] = 1, 1, -1, -1
+        for name in ("outcome", "inside", "bond"):
+            rows[f"checked_{name}"] = rows[name][0], 255
         return rows
 
     def make(self, rng, folder):

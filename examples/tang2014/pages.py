@@ -7,7 +7,7 @@ from output import save_all, write_page, write_table
 from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.estimates.outcome_changes import outcome_changes
+from flocsim.ensembles.estimates.outcome_changes import second_run_changes
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import CLASSES, read_results
@@ -15,6 +15,7 @@ from flocsim.io.shapes.library import read_library
 
 MOST_VERTICES = 64
 ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+ENDS = ("", "_low", "_high", "_numerical")
 FLIPPED = {"4": ("zone", (0, 1, 2, 3)), "5": ("aggregation", (0, 1)), "6": ("aggregation", (2, 3)),
            "8": ("outcome", (0, 1, 2, 3))}  # fmt: skip
 """Figure → which flips are its numerical error, and among which classes."""
@@ -26,10 +27,10 @@ def write(folder, config, library, readings):
     ``config``: the study's; ``library``: with the errors of fits, or None; ``readings``: {name:
     file}.
     """
-    study, check = (read_results(folder / name) for name in ("study.h5", "check.h5"))
-    changes = outcome_changes(study, check)
+    study = read_results(folder / "study.h5")
+    changes = second_run_changes(study)
     entries = read_library(library) if library else None
-    draw_results(folder, study, check, changes)
+    draw_results(folder, study, changes)
     if entries:
         for name, figure in POPULATION_FIGURES.items():
             write_figure(folder, name, figure(entries))
@@ -54,11 +55,11 @@ def write_figure(folder, name, figure):
         print(path)
 
 
-def draw_results(folder, study, check, changes):
+def draw_results(folder, study, changes):
     """Figs 4, 5, 6 and 8, the numerical error written into each panel."""
     for name, (kind, classes) in FLIPPED.items():
         figure = FIGURES[name](study)
-        among = np.isin(check.replicates["outcome"], classes)[..., : changes.both.shape[-1]]
+        among = np.isin(study.replicates["checked_outcome"], classes)
         changed = getattr(changes, kind)
         for place, axes in enumerate(figure.axes[: len(study.types)]):
             text = flip_text(changed[place] & among[place], among[place])
@@ -74,19 +75,18 @@ def flip_text(changed, among):
 
 
 def write_probabilities(path, study, changes):
-    """One row per condition: every probability, its interval, and the flips beside it."""
+    """One row per condition: every probability, both errors, and the flips beside it."""
     table = study.probabilities
     heads = ["type", "vertices", "delta", "n_total", "n_missed", "n_undecided", "n_failed"]
-    heads += [f"{name}{end}" for name in ESTIMATES for end in ("", "_low", "_high")]
+    heads += [f"{name}{end}" for name in ESTIMATES for end in ENDS]
     rows = [[*heads, "run_again", "zone_flips", "aggregation_flips", "outcome_flips"]]
     for place in np.ndindex(*study.shape):
         t, v, d = place
         values = [table[name][place] for name in heads[3:]]
         counts = [int(np.sum(getattr(changes, kind)[place]))
-                  for kind in ("zone", "aggregation", "outcome")]  # fmt: skip
+                  for kind in ("checked", "zone", "aggregation", "outcome")]  # fmt: skip
         shown = [f"{value:.6g}" for value in values]
-        rows.append([study.types[t], study.vertices[v], f"{study.delta[d]:g}", *shown,
-                     changes.outcome.shape[-1], *counts])  # fmt: skip
+        rows.append([study.types[t], study.vertices[v], f"{study.delta[d]:g}", *shown, *counts])
     write_table(path, rows)
     print(path)
 

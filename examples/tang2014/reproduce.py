@@ -20,10 +20,6 @@ from output import paths_of
 
 HERE = Path(__file__).resolve().parent
 STUDY, READINGS = HERE / "study.toml", HERE / "readings.toml"
-CHECKED_SHARE = 0.05
-"""Share of the replicates that is run again for the numerical error."""
-TIGHTER = 0.01
-"""Factor on the tolerance there."""
 READING_VERTICES = (1, 4, 16, 64)
 ERROR_RADII = "1,2,4"
 ERROR_VERTICES = "4,8,16,28,40,52,64"
@@ -173,7 +169,7 @@ def main():
     if arguments.images:
         fit_all(arguments, vertices)
     changes = changes_of(arguments, vertices)
-    run_study(arguments, changes)
+    ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
     readings = run_readings(arguments) if arguments.readings else {}
     write_pages(arguments, changes, readings)
 
@@ -183,17 +179,6 @@ def chosen_vertices(arguments):
     if arguments.vertices:
         return [int(word) for word in arguments.vertices.split(",")]
     return tomllib.loads(STUDY.read_text("utf-8"))["shapes"]["vertices"]
-
-
-def run_study(arguments, changes):
-    """The study, and a share of it again at a tighter tolerance."""
-    from flocsim.ensembles import load_config
-
-    ensemble(arguments, arguments.output / "study.h5", arguments.replicates, changes)
-    tolerance = float(f"{TIGHTER * load_config(STUDY).integrator.tolerance:.6g}")
-    tighter = changes | {"integrator": {"tolerance": tolerance}}
-    checked = max(1, round(CHECKED_SHARE * arguments.replicates))
-    ensemble(arguments, arguments.output / "check.h5", checked, tighter)
 
 
 def write_pages(arguments, changes, readings):

@@ -86,7 +86,7 @@ def flips_table(changes):
     """How many of the replicates that were run again changed."""
     rows = []
     for kind in FLIP_KINDS:
-        among = np.ones_like(changes.outcome) if kind == "outcome" else changes.both
+        among = changes.checked if kind == "outcome" else changes.both
         changed, count = np.count_nonzero(getattr(changes, kind)), np.count_nonzero(among)
         value, low, high = (100.0 * float(each) for each in proportion(changed, count))
         rows.append((kind, changed, count, f"{value:.2f}", f"[{low:.2f}, {high:.2f}]"))

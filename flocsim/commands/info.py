@@ -8,11 +8,12 @@ from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.report import format_table
+from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io.results.file import OUTCOMES, read_overview, read_results
+from flocsim.io.results.schema import BONDS
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
@@ -69,7 +70,9 @@ def library_text(path):
 
 def results_text(path, results, totals):
     try:
-        facts = conditions(results) + outcomes(results, totals) + origin(results.run)
+        facts = conditions(results) + outcomes(results, totals)
+        facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+        facts += origin(results.run)
         notes = stored(results.run, "failed")
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error
@@ -112,6 +115,10 @@ def outcomes(results, totals):
     """(name, value) of what came out, all conditions together."""
     found = zip(OUTCOMES, totals.outcomes, strict=True)
     rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
+    bonds = zip(
+        BONDS, results.probabilities["n_bond"].reshape(-1, len(BONDS)).sum(axis=0), strict=True
+    )
+    rows.append(("bonds", ", ".join(f"{n} {word}" for word, n in bonds)))
     named = list(zip(results.failures, totals.failures, strict=True))[1:]
     if any(number for _, number in named):
         rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))

@@ -13,7 +13,7 @@ from flocsim.io.plots.style import FORMATS, save
 DESCRIPTION = """\
 Draw the figures of a results file, each into a file of its own:
 {results}
-Bars are Wilson 95 % intervals.
+Bars are Wilson 95 % intervals, thin outer ones with the numerical error on either side.
 Of a shape library that flocsim fit wrote:
 {shapes}
 Figures are numbered as in Tang et al. (2014)."""

@@ -186,10 +186,12 @@ def verdict(results, output):
 
 
 def report(ended, output):
-    from flocsim.ensembles.report import format_table
+    from flocsim.ensembles.report import checked_line, format_table
 
     results = ended.results
     tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
+    if line := checked_line(results):
+        tell(line)
     total = int(results.probabilities["n_total"].sum())
     seconds = ended.wall_time
     tell(f"{output}: {total} replicates, {ended.computed} of them run in {seconds:.1f} s, "

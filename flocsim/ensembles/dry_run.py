@@ -2,6 +2,7 @@
 
 from math import inf
 
+from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.explain import force_lines, machinery_lines, scale_lines
@@ -30,6 +31,26 @@ def code_lines(config):
     return [f"  {line}" for line in lines]
 
 
+def checked_words(config):
+    """How many replicates are run again, and by what."""
+    method, share = config.integrator.method, config.integrator.check_share
+    exact = exact_method(method)
+    count = count_checks(config.seed, config.replicates, share)
+    if exact is None:
+        return f"none, {config.integrator.label} has no tolerance or step to be made smaller"
+    if not count:
+        return "none, the numerical error stays unknown (integrator.check_share)"
+    how = (
+        f"a tolerance of {exact.tolerance:g} m"
+        if exact.tolerance < inf
+        else f"a step of {exact.first_step:g} s"
+    )
+    return (
+        f"{count} of the {config.replicates} replicates of each condition "
+        f"({100.0 * count / config.replicates:.2g} %), at {how}"
+    )
+
+
 def dry_run(config: Config, ranks: int) -> str:
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
@@ -43,6 +64,7 @@ def dry_run(config: Config, ranks: int) -> str:
         f"delta_max, receiver {scene.receiver}",
         f"  flocs: {flocs}",
         f"  integrator: {config.integrator.label}, {accuracy}",
+        f"  run again: {checked_words(config)}",
         "collisions:",
         *condition_lines(config),
         "forces and code:",

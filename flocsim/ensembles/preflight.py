@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.collision.zone import zone_distance
@@ -44,6 +45,14 @@ def check_study(config: Config) -> None:
     for name, pair in sphere_pairs(config):
         check_approach(config, name, pair)
         check_compilable(pair.system)
+    if not isinstance(config.integrator.check_share, str) and (
+        config.integrator.check_share > 0.0 and exact_method(config.integrator.method) is None
+    ):
+        raise ConfigError(
+            f"integrator.check_share = {config.integrator.check_share:g} cannot be: "
+            f"{config.integrator.label} has no parameter `tolerance` or `step` that could be made "
+            "smaller for a second run: give it one, or leave check_share out"
+        )
     if config.shapes.source == "library":
         read_flocs(config.shapes)
 

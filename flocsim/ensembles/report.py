@@ -6,21 +6,24 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.estimates.statistics import HOOK
+from flocsim.io.confidence import wilson
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.schema import Results
 
 HEADER = (
     ("", "N"),
-    ("", "delta"),
+    ("del-", "ta"),
     ("", "n"),
     ("col-", "lided"),
     ("in-", "side"),
-    ("", "Pr[inside] 95 %"),
-    ("", "Pr[A] 95 %"),
+    ("Pr[inside]", "95 %  num."),
+    ("Pr[A]", "95 %  num."),
+    ("of A", "hang"),
     *(("", name) for name in CLASSES),
-    ("", "missed"),
-    ("un-", "decided"),
-    ("", "failed"),
+    ("mis-", "sed"),
+    ("unde-", "cided"),
+    ("fail-", "ed"),
 )
 
 
@@ -32,12 +35,15 @@ def format_table(
     types: Sequence[str], vertices: Sequence[int] | np.ndarray,
     delta: Sequence[float] | np.ndarray, table: Mapping[str, np.ndarray],
 ) -> str:  # fmt: skip
-    """Counts and probabilities with their intervals, one row per condition, a block per type.
+    """Counts and probabilities with both errors, one row per condition, a block per type.
+
+    Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound).
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. Returns text without a final line
-    end.
+    "-" where there was no event to estimate a probability from. Of the aggregations some hang by
+    their shapes, attraction being weaker than the load, and the others stick. Returns text without
+    a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
     rows = [condition_row(vertices, delta, table, place) for place in conditions]
@@ -70,6 +76,19 @@ def undecided_line(results: Results) -> str:
     )
 
 
+def checked_line(results: Results) -> str:
+    """How many replicates were run again, and how many of them flipped; "" for none."""
+    table = results.probabilities
+    checked, flipped = (int(table[name].sum()) for name in ("n_checked", "n_flipped"))
+    if not checked:
+        return ""
+    low, high = (100.0 * float(end) for end in wilson(flipped, checked))
+    return (
+        f"{checked} replicates were run again more exactly, {flipped} of them flipped: "
+        f"{100.0 * flipped / checked:.2g} % [{low:.2g}, {high:.2g}]"
+    )
+
+
 def condition_row(vertices, delta, table, place):
     _, v, d = place
     counts = ("n_total", "n_collided", "n_inside")
@@ -78,19 +97,32 @@ def condition_row(vertices, delta, table, place):
         str(vertices[v]),
         f"{delta[d]:g}",
         *(str(table[name][place]) for name in counts),
-        interval(table, "pr_inside", place),
-        interval(table, "pr_a", place),
+        with_errors(table, "pr_inside", place),
+        with_errors(table, "pr_a", place),
+        hanging(table, place),
         *(str(number) for number in table["n_class"][place]),
         *(str(table[name][place]) for name in ends),
     )
 
 
-def interval(table, name, place):
-    """A probability with its interval, e.g. ".600 [.569, .630]"."""
-    value, low, high = (table[name + end][place] for end in ("", "_low", "_high"))
+def with_errors(table, name, place):
+    """A probability +- sampling error +- numerical error, e.g. ".600 +-.031 +-.004".
+
+    The longer side of the 95 % interval; "-" for a numerical error of which nothing is known.
+    """
+    value, low, high, numerical = (
+        table[name + end][place] for end in ("", "_low", "_high", "_numerical")
+    )
     if np.isnan(value):
         return "-"
-    return f"{share(value)} [{share(low)}, {share(high)}]"
+    added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
+    return f"{share(value)} +-{share(max(value - low, high - value))} {added:>6}"
+
+
+def hanging(table, place):
+    """The share of aggregations that hang by a hook."""
+    value = table["pr_bond"][place][HOOK - 1]
+    return "-" if np.isnan(value) else share(value)
 
 
 def share(value):

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import Condition
+from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
 from flocsim.ensembles.collision.encounter import (
     OBSERVER,
     Encounter,
@@ -14,11 +15,16 @@ from flocsim.ensembles.collision.encounter import (
     make_encounter,
     run_encounter,
 )
-from flocsim.ensembles.collision.failures import NO_FLOC
+from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
+from flocsim.integrators.base import Integrator
+from flocsim.io.results.schema import NOT_APPLICABLE
+
+CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
+"""Column of a second run → the same of the first."""
 
 
 def flocs_of(config: Config) -> list[Floc]:
@@ -42,9 +48,11 @@ class Study:
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[bool, Callable] = attrs.field(init=False, factory=dict)
+    exact: Integrator | None = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         config = self.config
+        self.exact = exact_method(config.integrator.method)
         self.zones = {
             name: zone_distance(config.zone, config.forces, radius_i, radius_j)
             for name, radius_i, radius_j in config.scene.conditions
@@ -122,7 +130,37 @@ class Study:
         if row is None:
             return None
         floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
-        return row | {"floc_i": floc_i, "floc_j": floc_j}
+        row |= {"floc_i": floc_i, "floc_j": floc_j}
+        row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
+        if record is not None or not self.is_checked(replicate):
+            return row
+        found = self.run_again(encounter, angles, share, halted)
+        return None if found is None else row | found
+
+    def is_checked(self, replicate: int) -> bool:
+        """Whether a replicate is run again, more exactly."""
+        share = self.config.integrator.check_share
+        return self.exact is not None and is_checked(self.config.seed, replicate, share)
+
+    def run_again(
+        self, encounter: Encounter, angles: Sequence[float], share: float,
+        halted: Callable[[], bool] | None,
+    ) -> dict | None:  # fmt: skip
+        """What a replicate's row holds of its second run; None where it was given up.
+
+        An exception costs no more than this: the second run has failed, the first is as it was.
+        """
+        steps = MORE_STEPS * self.config.integrator.max_steps
+        driver = self.driver(encounter)
+        try:
+            row = run_encounter(
+                encounter, driver, angles, share, steps, halted=halted, integrator=self.exact
+            )
+        except MemoryError:
+            raise
+        except Exception:
+            return dict.fromkeys(CHECKED, NOT_APPLICABLE) | {"checked_outcome": FAILED}
+        return None if row is None else {name: row[column] for name, column in CHECKED.items()}
 
     @property
     def kinds(self) -> list[int]:

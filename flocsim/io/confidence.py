@@ -96,3 +96,43 @@ def clustered_proportion(
         low, high = score_interval(p, number)
     # At the ends the formula gives 0 and 1, but only up to rounding.
     return p, np.where(p == 0.0, 0.0, low), np.where(p == 1.0, 1.0, high), number
+
+
+def numerical_error(
+    flipped: ArrayLike, checked: ArrayLike, trials: ArrayLike, confidence: float = 0.95
+) -> np.ndarray:
+    """95 % bound of the share of a condition's trials that flip where run more exactly.
+
+    Arrays (type, …) of whole numbers, a place for each condition: ``flipped`` among ``checked``,
+    the trials that were run again, of ``trials`` in all. NaN without trials, and where nothing was
+    checked in any condition of the type.
+
+    f of c have flipped here, and F of C in the type's other conditions. Rates of flips scatter
+    over conditions like an exponential distribution with the mean (F + 1)/(C + 2) that the others
+    show (Laplace's rule), so that here, given f of c, the rate has a gamma distribution of shape
+    1 + f and rate b = (C + 2)/(F + 1) + c. How many more flip of the u = trials − c that were not
+    run again is then negative binomial: at most k with probability I_p(1 + f, k + 1), I the
+    incomplete beta function, p = b/(b + u). With q, the smallest k of probability
+    ``confidence``: (f + q)/(c + u), at most 1.
+    """
+    from scipy.special import betainc
+
+    f, c, n = (np.asarray(each, dtype=float) for each in (flipped, checked, trials))
+    rest = tuple(range(1, f.ndim))
+    others_flipped = f.sum(axis=rest, keepdims=True) - f
+    others = c.sum(axis=rest, keepdims=True) - c
+    # A trial may count in the second run alone: then there are more checked ones than trials.
+    unknown = np.maximum(n - c, 0.0)
+    rate = (others + 2.0) / (others_flipped + 1.0) + c
+    p = rate / (rate + unknown)
+    low, high = np.full(f.shape, -1.0), unknown.copy()
+    # The smallest k lies above low, and is no more than high: halve until they are neighbours.
+    while np.any(high - low > 1.0):
+        middle = np.floor(0.5 * (low + high))
+        enough = betainc(1.0 + f, middle + 1.0, p) >= confidence
+        split = high - low > 1.0
+        low = np.where(split & ~enough, middle, low)
+        high = np.where(split & enough, middle, high)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.minimum((f + high) / n, 1.0)
+    return np.where((n > 0) & (c + others > 0), share, np.nan)

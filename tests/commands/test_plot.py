@@ -40,9 +40,9 @@ def test_all_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):
     assert call(plot, study, "--output-dir", tmp_path / "a" / "b", "--format", "pdf") == 0
     printed = capsys.readouterr().out.split("\n")[:-1]
     names = [f"study-{label}.pdf" for label in
-             ("figure-4", "figure-5", "figure-6", "figure-8", "overview")]  # fmt: skip
+             ("figure-4", "figure-5", "figure-6", "figure-8", "bonds", "overview")]  # fmt: skip
     assert printed == [str(tmp_path / "a" / "b" / name) for name in names]
-    assert sorted(os.listdir(tmp_path / "a" / "b")) == names
+    assert sorted(os.listdir(tmp_path / "a" / "b")) == sorted(names)
 
 
 def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkeypatch):
@@ -54,7 +54,7 @@ def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkey
 
 @pytest.mark.parametrize("figures", ["7", "4,figure", "", ","])
 def test_unknown_figures_are_refused_before_anything_is_read(figures):
-    with pytest.raises(UsageError, match="choose from 2, 3, 4, 5, 6, 8, overview"):
+    with pytest.raises(UsageError, match="choose from 2, 3, 4, 5, 6, 8, bonds, overview"):
         call(plot, "absent.h5", "--figures", figures)
 
 
@@ -115,6 +115,14 @@ def test_info_ends_with_the_table_of_probabilities(study, capsys):
     call(info, study)
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
     assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
+
+
+def test_info_tells_how_many_were_run_again_and_flipped(study, tmp_path, capsys):
+    table = make_results(count=8).probabilities
+    checked, flipped = table["n_checked"].sum(), table["n_flipped"].sum()
+    call(info, study)
+    fact = facts_printed(capsys.readouterr().out)["numerical error"]
+    assert fact.startswith(f"{checked} replicates were run again more exactly, {flipped} of them")
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

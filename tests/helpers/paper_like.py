@@ -6,6 +6,7 @@ import numpy as np
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import Results
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
+from tests.helpers.synthetic_results import bonds_of
 
 TYPES, VERTICES, DELTA = ("I", "II", "III"), (1, 4, 16, 64), (0.0, 0.25, 0.5, 0.75, 1.0)
 COUNT = 600
@@ -39,14 +40,18 @@ def paper_results(change=None):
     if change:
         change(outcome, inside)
     replicates = blank_replicates(outcome.shape) | {"outcome": outcome, "inside": inside}
-    return Results(TYPES, VERTICES, DELTA, replicates, tabulate(outcome, inside))
+    replicates["bond"] = bonds_of(outcome)
+    table = tabulate(outcome, inside, replicates["bond"])
+    return Results(TYPES, VERTICES, DELTA, replicates, table)
 
 
 def blank_replicates(shape):
     """The table of replicates without what happened."""
     from flocsim.io.results.schema import REPLICATES
 
-    return {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
+    blank = {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
+    again = [name for name in REPLICATES if name.startswith("checked_")]
+    return blank | {name: np.full(shape, 255, "u1") for name in again}
 
 
 def paper_fits(radii=(1.0, 2.0, 4.0), scale=1.0, sphere=38.0):

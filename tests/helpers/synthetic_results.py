@@ -8,8 +8,13 @@ from flocsim.io.results.file import NOT_APPLICABLE, Results
 FAILURES = ("none", "overlap_too_deep", "step_budget")
 
 
-def draw_outcomes(rng, shape):
-    """Outcome and inside of random approaches: type 0 worst, the last type always inside."""
+def bonds_of(outcome, bond=1):
+    """The codes of bonds that go with outcomes, all of one kind or as given."""
+    return np.where(np.isin(outcome, [0, 2]), bond, NOT_APPLICABLE)
+
+
+def draw_codes(rng, shape):
+    """Outcome, inside and bond of random approaches: type 0 worst, the last type always inside."""
     t, v, d, _ = np.indices(shape)
     size = np.maximum(np.array(shape), 2)
     badness = v / (size[1] - 1) * (0.5 + 0.5 * d / (size[2] - 1))
@@ -19,7 +24,21 @@ def draw_outcomes(rng, shape):
     ending = rng.random(shape)
     missed = ending < 0.05
     outcome = np.select([missed, ending < 0.07, ending < 0.08], [4, 5, 6], outcome)
-    return outcome, np.where(missed, NOT_APPLICABLE, inside)
+    bond = bonds_of(outcome, rng.choice(3, shape, p=[0.6, 0.3, 0.1]) + 1)
+    return outcome, np.where(missed, NOT_APPLICABLE, inside), bond
+
+
+def draw_second_runs(first, seed=11):
+    """Codes of second runs of a fifth of these replicates, a tenth of which end as another did."""
+    rng, outcome = np.random.default_rng(seed), first[0]
+    checked = rng.random(outcome.shape) < 0.2
+    other = rng.permuted(np.arange(outcome.size)).reshape(outcome.shape)
+    place = np.where(rng.random(outcome.shape) < 0.1, other, np.arange(outcome.size).reshape(
+        outcome.shape))  # fmt: skip
+    return {
+        f"checked_{name}": np.where(checked, codes.ravel()[place], NOT_APPLICABLE)
+        for name, codes in zip(("outcome", "inside", "bond"), first, strict=True)
+    }
 
 
 def make_results(
@@ -33,11 +52,12 @@ def make_results(
     """A complete Results of random numbers; the same arguments give the same one."""
     rng = np.random.default_rng(seed)
     shape = (len(types), len(vertices), len(delta), count)
-    outcome, inside = draw_outcomes(rng, shape)
+    outcome, inside, bond = draw_codes(rng, shape)
     collided = inside != NOT_APPLICABLE
     drawn = rng.uniform(30e-6, 50e-6, (3, *shape))
     lengths = np.where(collided, drawn, np.nan)
     times = np.where(collided, rng.uniform(0.0, 0.1, shape), np.nan)
+    again = draw_second_runs((outcome, inside, bond))
     failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
     replicates = {
         "angle_i": rng.uniform(0.0, 2.0 * np.pi, shape),
@@ -45,6 +65,8 @@ def make_results(
         "outcome": outcome,
         "inside": inside,
         "crossed_zone": np.where(collided, rng.integers(0, 2, shape), NOT_APPLICABLE),
+        "bond": bond,
+        **again,
         "d_c_collision": lengths[0],
         "d_c_max": lengths[1],
         "d_c_last": drawn[2],
@@ -58,5 +80,5 @@ def make_results(
         "floc_j": rng.integers(0, 4, shape),
     }
     run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
-    table = tabulate(outcome, inside)
+    table = tabulate(outcome, inside, bond, **again)
     return Results(types, vertices, delta, replicates, table, run, FAILURES)

@@ -113,11 +113,14 @@ class Encounter:
 
     def begin(
         self, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
-        until: float = math.inf, record: bool = False,
+        until: float = math.inf, record: bool = False, integrator: Integrator | None = None,
     ) -> Run:  # fmt: skip
-        """A Run of a replicate that has yet to take its first step, to a time [s] at most."""
+        """A Run of a replicate that has yet to take its first step, to a time [s] at most.
+
+        ``integrator``: the same method with another tolerance or step, where there is one.
+        """
         return Run(
-            driver, self.scene, self.start(angles, share), self.system.integrator,
+            driver, self.scene, self.start(angles, share), integrator or self.system.integrator,
             min(self.time_limit(), until), max_steps=max_steps, observed=self.observed(),
             record=record,
         )  # fmt: skip
@@ -171,14 +174,17 @@ class Record:
 def run_encounter(
     encounter: Encounter, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
     record: Record | None = None, halted: Callable[[], bool] | None = None,
+    integrator: Integrator | None = None,
 ) -> dict | None:  # fmt: skip
     """Run one replicate; the row of the table of replicates as a dict.
 
     ``driver`` is the compiled driver of the encounter's scene; ``record``, optional, is a Record to
     receive the motion. ``halted()``, optional, is asked every some thousand steps whether to give
-    up; the row is None then.
+    up; the row is None then. ``integrator``, optional: see Encounter.begin.
     """
-    run = encounter.begin(driver, angles, share, max_steps, record=record is not None)
+    run = encounter.begin(
+        driver, angles, share, max_steps, record=record is not None, integrator=integrator
+    )
     status = run.to_end(halted)
     if status == Status.PAUSED:
         return None

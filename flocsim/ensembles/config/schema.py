@@ -360,6 +360,18 @@ class IntegratorConfig:
     step: float | None = quantity(
         "s", above=0.0, default=None, help="for methods with a fixed step"
     )
+    check_share: float | str = word_or_quantity(
+        "auto",
+        "",
+        at_least=0.0,
+        at_most=1.0,
+        default="auto",
+        beside_class=True,
+        help="share of the replicates that are run again at a 100 times tighter tolerance (a fixed "
+        "step: at a quarter of it); the outcomes that change are the numerical error of the "
+        'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
+        "of a flip rate of 0 as narrow as a sampling interval, and at least 1 %; 0: none",
+    )
 
     def __attrs_post_init__(self):
         if self.own is not None:

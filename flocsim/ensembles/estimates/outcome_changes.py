@@ -1,36 +1,48 @@
-"""The numerical error of probabilities: outcomes that change at a tighter tolerance.
-
-Replicates are exchangeable, as an index does nothing but name random numbers; so the first few
-of a study, run again at a tighter tolerance, are a random sample of it.
-"""
+"""Outcomes that change at a tighter tolerance: of a study's own second runs, or of two studies."""
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.results.schema import CLASSES, Results
+from flocsim.io.results.schema import CLASSES, NOT_APPLICABLE, Results
 
 
 @attrs.frozen(eq=False)
 class OutcomeChanges:
     """Which replicates change: flags (type, vertices, delta, replicate).
 
-    ``both``: decided collisions in both runs; ``aggregation`` and ``zone``: those of them that
-    change between aggregated and departed, inside and outside; ``outcome``: any change of outcome,
-    also to missed or undecided, among ``all`` replicates.
+    ``checked``: those that were run twice; ``both``: decided collisions in both runs;
+    ``aggregation`` and ``zone``: those of them that change between aggregated and departed, inside
+    and outside; ``outcome``: any change of outcome, also to missed or undecided, among ``checked``.
     """
 
+    checked: np.ndarray
     both: np.ndarray
     aggregation: np.ndarray
     zone: np.ndarray
     outcome: np.ndarray
 
 
-def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
-    """The OutcomeChanges of ``found`` against ``exact``, Results of the same conditions.
+def changes_between(a: np.ndarray, b: np.ndarray) -> OutcomeChanges:
+    """The OutcomeChanges of outcome codes; NOT_APPLICABLE in ``b``: was not run again."""
+    both = (a < len(CLASSES)) & (b < len(CLASSES))
+    checked = b != NOT_APPLICABLE
+    return OutcomeChanges(
+        checked, both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), checked & (a != b)
+    )
 
-    Replicates are paired; the shorter of the two decides how many are compared. UsageError where
-    the conditions differ.
+
+def second_run_changes(results: Results) -> OutcomeChanges:
+    """The OutcomeChanges of a study's second runs; its table of replicates must be there."""
+    assert results.replicates is not None, "the table of replicates was left on the disk"
+    return changes_between(results.replicates["outcome"], results.replicates["checked_outcome"])
+
+
+def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
+    """The OutcomeChanges of the first runs of ``found`` against those of ``exact``.
+
+    Of the same conditions. Replicates are paired; the shorter of the two decides how many are
+    compared. UsageError where the conditions differ.
     """
     same = (
         found.types == exact.types
@@ -42,8 +54,7 @@ def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
     outcomes = [each.replicates["outcome"] for each in (found, exact) if each.replicates]
     count = min(each.shape[-1] for each in outcomes)
     a, b = (each[..., :count] for each in outcomes)
-    both = (a < len(CLASSES)) & (b < len(CLASSES))
-    return OutcomeChanges(both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), a != b)
+    return changes_between(a, b)
 
 
 def percent_changed(changed: np.ndarray, among: np.ndarray) -> float:

@@ -11,41 +11,64 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flocsim.ensembles.estimates.events import (
+    AGGREGATED,
+    DECIDED,
+    FAILED,
+    HOOK,
+    INSIDE_CLASSES,
+    MISSED,
+    OUTSIDE_CLASSES,
+    UNDECIDED,
+)
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.errors import UsageError
 from flocsim.io.confidence import clustered_proportion, proportion, wilson
-from flocsim.io.results.file import CLASSES, NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
+from flocsim.io.results.schema import BONDS
 
 __all__ = ["probabilities", "tabulate", "wilson"]
 
-MISSED = OUTCOMES.index("missed")
-UNDECIDED = OUTCOMES.index("undecided")
-FAILED = OUTCOMES.index("failed")
-DECIDED = len(CLASSES)
-"""Outcomes below this code are classes A to D."""
-AGGREGATED = (0, 2)
-INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
+CODES = ("outcome", "inside", "bond")
+"""The columns of first runs that are counted."""
+
+COUNTED = (*CODES, *(f"checked_{name}" for name in CODES))
+"""All columns that are counted."""
 
 
-def tabulate(outcome: ArrayLike, inside: ArrayLike) -> dict[str, np.ndarray]:
+def tabulate(
+    outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike,
+    checked_outcome: ArrayLike = NOT_APPLICABLE, checked_inside: ArrayLike = NOT_APPLICABLE,
+    checked_bond: ArrayLike = NOT_APPLICABLE,
+) -> dict[str, np.ndarray]:  # fmt: skip
     """Counts and probabilities of every condition, over the last axis of the arrays.
 
-    ``outcome``, ``inside``: codes as in the results file, (…, replicate), in practice
-    (type, vertices, delta, replicate). Returns a dict of arrays (…), and (…, 4) for the classes
-    A–D: the counts ``n_*`` (see `count`) and the probabilities of `probabilities`.
-    Raises UsageError for unknown codes, and where outcome and inside contradict each other.
+    ``outcome``, ``inside``, ``bond``: codes as in the results file, (…, replicate), in practice
+    (type, vertices, delta, replicate). Returns a dict of arrays (…), (…, 4) for the classes A–D and
+    (…, 3) for the kinds of bond: the counts ``n_*`` (see `count`, `count_changes`), the
+    probabilities of `probabilities` and their `numerical_errors`. ``checked_…``: those of second
+    runs, none by default. Raises UsageError for unknown codes, and where they contradict each
+    other.
     """
-    counts = count(*checked_codes(outcome, inside))
-    return counts | probabilities(counts)
+    first = checked_codes(outcome, inside, bond)
+    again = tuple(
+        np.broadcast_to(np.asarray(codes), first[0].shape)
+        for codes in (checked_outcome, checked_inside, checked_bond)
+    )
+    counts = count(*first) | count_changes(first, again)
+    return counts | probabilities(counts) | numerical_errors(counts)
 
 
-def count(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
+def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
     """Whole-number counts over the last axis.
 
     n_total = n_missed + n_undecided + n_failed + Σ n_class. n_collided counts every replicate
     whose outlines touched, whatever came later: a collision that ended undecided or failed still
-    happened inside or outside the zone, and is in n_collided and n_inside.
+    happened inside or outside the zone, and is in n_collided and n_inside. Σ n_bond is the number
+    of aggregated ones, A + C.
     """
     classes = [np.sum(outcome == code, axis=-1) for code in range(len(CLASSES))]
+    bonds = [np.sum(bond == 1 + place, axis=-1) for place in range(len(BONDS))]
     return {
         "n_total": np.sum(np.ones(outcome.shape, dtype=np.int64), axis=-1),
         "n_missed": np.sum(outcome == MISSED, axis=-1),
@@ -54,6 +77,7 @@ def count(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
         "n_collided": np.sum(inside != NOT_APPLICABLE, axis=-1),
         "n_inside": np.sum(inside == 1, axis=-1),
         "n_class": np.stack(classes, axis=-1),
+        "n_bond": np.stack(bonds, axis=-1),
     }
 
 
@@ -63,17 +87,22 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     pr_inside = n_inside / n_collided: where the outlines first touched is known for every one.
     pr_a_given_inside = A/(A+B), pr_a_given_outside = C/(C+D), pr_a = (A+C)/(A+B+C+D) and
     pr_class = (A, B, C, D)/(A+B+C+D): over decided collisions, as an undecided or failed one has
-    no class. NaN where the denominator is 0. pr_inside equals A + B of pr_class, the paper's
+    no class. pr_a = pr_sticks + pr_hangs, by their bonds: a hook hangs, the others stick; pr_bond =
+    n_bond/(A+C). NaN where the denominator is 0. pr_inside equals A + B of pr_class, the paper's
     identity, exactly when every collision was decided.
     """
     a, b, c, d = np.moveaxis(np.asarray(counts["n_class"]), -1, 0)
     decided = a + b + c + d
+    hooks = np.asarray(counts["n_bond"])[..., HOOK - 1]
     estimates = {
         "pr_inside": (counts["n_inside"], counts["n_collided"]),
         "pr_a_given_inside": (a, a + b),
         "pr_a_given_outside": (c, c + d),
         "pr_a": (a + c, decided),
+        "pr_sticks": (a + c - hooks, decided),
+        "pr_hangs": (hooks, decided),
         "pr_class": (counts["n_class"], decided[..., np.newaxis]),
+        "pr_bond": (counts["n_bond"], (a + c)[..., np.newaxis]),
     }
     table: dict[str, np.ndarray] = {}
     for name, (successes, trials) in estimates.items():
@@ -82,27 +111,32 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return table
 
 
-def checked_codes(outcome: ArrayLike, inside: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both arrays; UsageError where a replicate's outcome and inside contradict each other."""
-    outcome, inside = np.asarray(outcome), np.asarray(inside)
-    if outcome.shape != inside.shape or outcome.ndim == 0:
+def checked_codes(
+    outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The arrays; UsageError where what they say of a replicate contradicts itself."""
+    outcome, inside, bond = np.asarray(outcome), np.asarray(inside), np.asarray(bond)
+    if not outcome.shape == inside.shape == bond.shape or outcome.ndim == 0:
         raise UsageError(
-            f"outcome and inside must have one shape, found {outcome.shape} and {inside.shape}"
+            "outcome, inside and bond must have one shape, found "
+            f"{outcome.shape}, {inside.shape} and {bond.shape}"
         )
     touched_inside = (inside == 1) & np.isin(outcome, [*INSIDE_CLASSES, UNDECIDED, FAILED])
     touched_outside = (inside == 0) & np.isin(outcome, [*OUTSIDE_CLASSES, UNDECIDED, FAILED])
     apart = (inside == NOT_APPLICABLE) & np.isin(outcome, [MISSED, UNDECIDED, FAILED])
-    wrong = np.argwhere(~(touched_inside | touched_outside | apart))
+    known = (bond >= 1) & (bond <= len(BONDS))
+    held = np.where(np.isin(outcome, AGGREGATED), known, bond == NOT_APPLICABLE)
+    wrong = np.argwhere(~((touched_inside | touched_outside | apart) & held))
     if len(wrong):
         place = tuple(int(number) for number in wrong[0])
         raise UsageError(
             f"outcome {outcome[place]} with inside {inside[place]} at {place} is impossible "
             f"({len(wrong)} such replicates): check how the outcomes were recorded"
         )
-    return outcome, inside
+    return outcome, inside, bond
 
 
-def pooled_sums(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
+def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
     """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
 
     S and M are a replicate's successes and trials over all displacements; sums are over
@@ -116,6 +150,8 @@ def pooled_sums(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray
         "pr_a_given_inside": (within, within & aggregated),
         "pr_a_given_outside": (without, without & aggregated),
         "pr_a": (outcome < DECIDED, aggregated),
+        "pr_sticks": (outcome < DECIDED, aggregated & (bond != HOOK)),
+        "pr_hangs": (outcome < DECIDED, aggregated & (bond == HOOK)),
     }
     sums = {}
     for name, (trials, successes) in estimates.items():

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.schema import StopConfig
-from flocsim.ensembles.estimates.statistics import count, probabilities
+from flocsim.ensembles.estimates.statistics import CODES, count, probabilities
 from flocsim.ensembles.storage.row_store import RowStore
 
 GROWTH = 1.25
@@ -35,10 +35,7 @@ class StopRule:
     def __call__(self, replicates: int) -> bool:
         """Whether the study may end with this many, all of which exist."""
         for place in range(len(self.store.conditions)):
-            codes = (
-                self.store.read(place, name, self.seen, replicates)
-                for name in ("outcome", "inside")
-            )
+            codes = (self.store.read(place, name, self.seen, replicates) for name in CODES)
             more = count(*codes)
             if place == len(self.counts):
                 self.counts.append(more)

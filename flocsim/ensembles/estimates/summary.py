@@ -5,8 +5,11 @@ from collections.abc import Callable, Iterable
 import attrs
 import numpy as np
 
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
+    CODES,
+    COUNTED,
     checked_codes,
     count,
     pooled_probabilities,
@@ -14,6 +17,7 @@ from flocsim.ensembles.estimates.statistics import (
     probabilities,
 )
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.io.results.schema import POOLED
 
 BLOCK_ROWS = 262_144
 """Rows, of all conditions together, that are looked at together."""
@@ -41,9 +45,9 @@ class Reader:
         ]
         return np.stack(parts).reshape(*self.shape[:3], stop - first)
 
-    def codes(self, first: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
-        """Outcome and inside of replicates [first, stop) of all conditions: Codes."""
-        return self.block("outcome", first, stop), self.block("inside", first, stop)
+    def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
+        """COUNTED of replicates [first, stop) of all conditions: Codes."""
+        return tuple(self.block(name, first, stop) for name in COUNTED)
 
     def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
         """{name: array (type, vertices, delta, replicate)}, in memory."""
@@ -51,7 +55,7 @@ class Reader:
 
 
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]
-"""Gives outcome and inside of replicates [first, stop), each (type, vertices, delta, replicate)."""
+"""Gives COUNTED of replicates [first, stop), each (type, vertices, delta, replicate)."""
 
 Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
@@ -62,11 +66,13 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        outcome, inside = codes(start, min(start + step, stop))
-        checked_codes(outcome, inside)
+        columns = codes(start, min(start + step, stop))
+        first_codes, again = columns[: len(CODES)], columns[len(CODES) :]
+        outcome, inside, bond = checked_codes(*first_codes)
         found = {
-            **count(outcome, inside),
-            **pooled_sums(outcome, inside),
+            **count(outcome, inside, bond),
+            **count_changes((outcome, inside, bond), again),
+            **pooled_sums(outcome, inside, bond),
             "joint": joint_counts(outcome, inside),
         }
         sums = added(sums, found)
@@ -82,8 +88,10 @@ def tables_of(sums: Sums) -> tuple[dict, dict, dict]:
     """(probabilities, pooled, differences) from the Sums of a whole study."""
     counts = {name: values for name, values in sums.items() if name.startswith("n_")}
     pooled = {name: values for name, values in sums.items() if name.startswith("pr_")}
+    together = numerical_errors({name: values.sum(axis=2) for name, values in counts.items()})
     return (
-        counts | probabilities(counts),
-        pooled_probabilities(pooled),
+        counts | probabilities(counts) | numerical_errors(counts),
+        pooled_probabilities(pooled)
+        | {name: values for name, values in together.items() if name in POOLED},
         paired_differences(sums["joint"]),
     )

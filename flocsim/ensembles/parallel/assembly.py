@@ -18,6 +18,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
+from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
@@ -29,9 +30,6 @@ from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file
 
 COUNTED_ROWS = 524_288
 """Rows that a rank counts, at least: an answer has as many numbers as many ranks'."""
-
-CODES = ("outcome", "inside")
-"""The columns that are counted."""
 
 Digests = dict[int, list[bytes]]
 """Of blocks by their numbers, those of all pieces in the order of Plan.pieces_of."""
@@ -111,7 +109,7 @@ class Review(Order):
     """The order to read what others have written: whole blocks, of which ``digests`` are given, and
     outcomes of replicates [first, stop) of all conditions, to be counted.
 
-    ``codes``: block → digests of its CODES.
+    ``codes``: block → digests of its COUNTED.
     """
 
     place: Place
@@ -189,12 +187,13 @@ def counted_in(file: RowFile, shape: Sequence[int], counted: Interval, codes: Di
 
     def read(first: int, stop: int) -> tuple[np.ndarray, ...]:
         for block in blocks_of((first, stop), replicates, conditions):
-            if block not in whole and not file.is_whole(block, codes[block], CODES):
+            if block not in whole and not file.is_whole(block, codes[block], COUNTED):
                 raise FileError(f"{file.path} does not hold what was written to it")
             whole.add(block)
         starts = range(first, first + conditions * replicates, replicates)
         columns = (
-            np.stack([file.values(name, start, stop - first) for start in starts]) for name in CODES
+            np.stack([file.values(name, start, stop - first) for start in starts])
+            for name in COUNTED
         )
         return tuple(column.reshape(*shape[:3], stop - first) for column in columns)
 
@@ -341,7 +340,7 @@ class Assembly:
 
     def codes_of(self, counted: Interval) -> Digests:
         columns = list(self.file.plan.columns)
-        wanted = [columns.index(name) for name in CODES]
+        wanted = [columns.index(name) for name in COUNTED]
         *outer, replicates = self.reader.shape
         blocks = blocks_of(counted, replicates, int(np.prod(outer)))
         return {block: [self.digests[block][column] for column in wanted] for block in blocks}

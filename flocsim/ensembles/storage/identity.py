@@ -62,6 +62,7 @@ def identity_of(study: Study) -> dict:
     facts["start.the integrator"] = digest(np.array(starts, float))
     facts["integrator.name"] = config.integrator.label
     facts["integrator.max_steps"] = config.integrator.max_steps
+    facts["integrator.check_share"] = config.integrator.check_share
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
         facts |= settings(f"forces.{name}", force)

@@ -1,4 +1,4 @@
-"""Figures of a results file: the paper's Figs 4, 5, 6 and 8, and an overview.
+"""Figures of a results file: the paper's Figs 4, 5, 6 and 8, what holds flocs, an overview.
 
 A figure is a function of a `Results`, which may come without its table of replicates, and stands in
 FIGURES at the end, under the name that `flocsim plot` gives it; the first line of its docstring is
@@ -9,8 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import clustered_proportion, proportion
+from flocsim.io.confidence import clustered_proportion, numerical_error, proportion
 from flocsim.io.plots.style import (
+    BOND_COLOURS,
     CLASS_COLOURS,
     CROWDED,
     MARKERS,
@@ -26,17 +27,24 @@ from flocsim.io.plots.style import (
     vertex_positions,
 )
 from flocsim.io.results.file import CLASSES, Results
+from flocsim.io.results.schema import BONDS
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
-BARS = "\n(bars: 95 %)"
+BARS = "\n(bars: 95 %;\nthin: and numerics)"
+ENDS = ("", "_low", "_high", "_numerical")
 CLASS_WORDS = {
     "A": "A  inside, aggregated",
     "B": "B  inside, departed",
     "C": "C  outside, aggregated",
     "D": "D  outside, departed",
+}
+BOND_WORDS = {
+    "certificate": "certificate: no load opens it",
+    "hook": "hook: hangs by its shape",
+    "rest": "rest: sticks as it lies",
 }
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
@@ -44,6 +52,7 @@ LABELS = {
     "pr_a_given_outside": r"$\Pr[A\mid C(d_c\geq D_0)]$",
     "pr_a": r"$\Pr[A]$",
     "classes": "probability of class",
+    "bonds": "share of aggregations",
 }
 NO_EVENTS = {
     "pr_inside": "no collision",
@@ -51,7 +60,13 @@ NO_EVENTS = {
     "pr_a_given_outside": "no decided collision\noutside the zone",
     "pr_a": "no decided collision",
     "classes": "no decided collision",
+    "bonds": "no aggregation",
 }
+SHARES = {
+    "classes": ("n_class", "outcome", range(len(CLASSES)), CLASS_COLOURS),
+    "bonds": ("n_bond", "bond", range(1, 1 + len(BONDS)), BOND_COLOURS),
+}
+"""What is drawn as shares of a whole: its counts, its column, the codes there, its colours."""
 
 
 def figure_4(results: Results) -> Figure:
@@ -70,7 +85,7 @@ def figure_6(results: Results) -> Figure:
 
 
 def probability_figure(results, name):
-    """One panel per type, one line per delta, bars for the 95 % intervals, against N."""
+    """One panel per type, one line per delta, against N, with bars for both errors."""
     with house_style():
         figure, panels = panel_grid(len(results.types))
         for number, axes in enumerate(panels):
@@ -87,34 +102,46 @@ def figure_8(results: Results) -> Figure:
 
     A replicate has the same flocs and orientations at all delta: a cluster, for the intervals.
     """
+    return shares_figure(results, "classes", legend_width=1.75)
+
+
+def bonds(results: Results) -> Figure:
+    """What holds aggregated flocs: shares of certificate, hook and rest, displacements pooled."""
+    return shares_figure(results, "bonds", legend_width=2.1)
+
+
+def shares_figure(results, name, legend_width):
+    """One panel per type, one line for each class or kind of bond, against N."""
     with house_style():
-        figure, panels = panel_grid(len(results.types), legend_width=1.75)
+        figure, panels = panel_grid(len(results.types), legend_width)
         for number, axes in enumerate(panels):
-            draw_classes(axes, results, number)
+            draw_shares(axes, results, number, name)
             axes.set_title(type_title(number, results.types[number]))
         for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS["classes"])
-        add_class_legend(panels[:PANELS_PER_ROW][-1])
+            axes.set_ylabel(LABELS[name])
+        add_shares_legend(panels[:PANELS_PER_ROW][-1], name)
         return figure
 
 
 def overview(results: Results) -> Figure:
-    """Pr[C inside], Pr[A] and the classes in one picture, a column for each type."""
-    rows = ("pr_inside", "pr_a", "classes")
+    """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
+    rows = ("pr_inside", "pr_a", *SHARES)
     with house_style():
         count = len(results.types)
-        figure = new_figure(2.1 * count + 1.9, 5.4)
+        figure = new_figure(2.1 * count + 2.2, 7.1)
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
                 draw_probability(axes, results, number, name)
-            draw_classes(grid[2, number], results, number)
+            for axes, name in zip(grid[2:, number], SHARES, strict=True):
+                draw_shares(axes, results, number, name)
             grid[0, number].set_title(type_title(number, results.types[number]))
-            grid[2, number].set_xlabel("vertices $N$")
+            grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
             axes.set_ylabel(LABELS[name])
         add_delta_legend(grid[0, -1], results.delta)
-        add_class_legend(grid[2, -1])
+        for axes, name in zip(grid[2:, -1], SHARES, strict=True):
+            add_shares_legend(axes, name)
         return figure
 
 
@@ -133,7 +160,7 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
 
 
 def draw_probability(axes, results, number, name):
-    bands = [results.probabilities[name + end][number] for end in ("", "_low", "_high")]
+    bands = [results.probabilities[name + end][number] for end in ENDS]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     count = results.delta.size
@@ -143,39 +170,71 @@ def draw_probability(axes, results, number, name):
     note_if_empty(axes, bands[0], NO_EVENTS[name])
 
 
-def draw_classes(axes, results, number):
-    """The four classes of one type, counts pooled over delta."""
-    bands = class_bands(results, number)
+def draw_shares(axes, results, number, name):
+    """The classes or kinds of bond of one type, counts pooled over delta."""
+    bands = share_bands(results, number, name)
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
-    for index, name in enumerate(CLASSES):
+    colours = SHARES[name][-1].values()
+    for index, colour in enumerate(colours):
         line = [band[:, index] for band in bands]
-        draw_line(axes, results.vertices, line, index, len(CLASSES), CLASS_COLOURS[name])
-    note_if_empty(axes, bands[0], NO_EVENTS["classes"])
+        draw_line(axes, results.vertices, line, index, len(colours), colour)
+    note_if_empty(axes, bands[0], NO_EVENTS[name])
 
 
-def class_bands(results, number):
-    """(share, low, high) (vertices, class) of one type; Wilson's without the replicates."""
+def share_bands(results, number, name):
+    """(share, low, high, numerical error) (vertices, class or bond) of one type."""
+    errors = share_errors(results.probabilities, name)[number]
+    return (*shares_of(results, number, name), errors)
+
+
+def share_errors(table, name):
+    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta."""
+    counted = SHARES[name][0]
+    share = f"pr_{counted.removeprefix('n_')}"
+    gained, lost, checked = (
+        np.moveaxis(table[f"n_{kind}_{share}"].sum(axis=2), -1, 0)
+        for kind in ("gained", "lost", "checked")
+    )
+    trials = table[counted].sum(axis=(2, 3))
+    parts = [
+        numerical_error(g + v, c, trials) for g, v, c in zip(gained, lost, checked, strict=True)
+    ]
+    return np.stack(parts, axis=-1)
+
+
+def shares_of(results, number, name):
+    """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
+    counted, column, codes, _ = SHARES[name]
     if results.replicates is None:
-        counts = results.probabilities["n_class"][number].sum(axis=1)
+        counts = results.probabilities[counted][number].sum(axis=1)
         return proportion(counts, counts.sum(axis=1, keepdims=True))
-    outcome = results.replicates["outcome"][number]
-    m = (outcome < len(CLASSES)).sum(axis=1, dtype=float)[:, None]
-    s = np.stack([(outcome == code).sum(axis=1) for code in range(len(CLASSES))], axis=1)
+    found = results.replicates[column][number]
+    m = np.isin(found, codes).sum(axis=1, dtype=float)[:, None]
+    s = np.stack([(found == code).sum(axis=1) for code in codes], axis=1)
     terms = np.broadcast_arrays(s, m, s * s, s * m, m * m, m > 0.0)
     return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
 
 
 def draw_line(axes, vertices, bands, index, count, colour):
-    """Line ``index`` of ``count``: points with interval bars, joined in the order of N."""
+    """Line ``index`` of ``count``: points with bars, joined in the order of N.
+
+    Inner bars are intervals, outer ones, thin, these and the numerical error on either side.
+    """
     order = np.argsort(vertices)
     places = vertex_positions(vertices)[order] + dodge(index, count)
-    value, low, high = (np.asarray(band)[order] for band in bands)
+    value, low, high, numerical = (np.asarray(band)[order] for band in bands)
     reach = np.clip([value - low, high - value], 0.0, None)
     size, width = (2.2, 0.8) if len(order) > CROWDED else (4.0, 1.2)
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
                   marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
                   elinewidth=0.6 * width)  # fmt: skip
+    if np.any(numerical > 0.0):
+        beyond = np.nan_to_num(numerical)
+        outer = [value - np.maximum(low - beyond, 0.0), np.minimum(high + beyond, 1.0) - value]
+        thin = 0.2 * width
+        axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
+                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin)  # fmt: skip
 
 
 def note_if_empty(axes, values, text):
@@ -196,14 +255,15 @@ def add_delta_legend(axes, delta):
     place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS)
 
 
-def add_class_legend(axes):
+def add_shares_legend(axes, name):
     from matplotlib.lines import Line2D
 
+    words, title = (CLASS_WORDS, "class") if name == "classes" else (BOND_WORDS, "bond")
     handles = [
-        Line2D([], [], color=CLASS_COLOURS[name], marker=MARKERS[index], label=plain(words))
-        for index, (name, words) in enumerate(CLASS_WORDS.items())
+        Line2D([], [], color=colour, marker=MARKERS[index], label=plain(words[each]))
+        for index, (each, colour) in enumerate(SHARES[name][-1].items())
     ]
-    place_legend(axes, handles, "class" + BARS)
+    place_legend(axes, handles, title + BARS)
 
 
 def place_legend(axes, handles, title):
@@ -223,5 +283,6 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "5": figure_5,
     "6": figure_6,
     "8": figure_8,
+    "bonds": bonds,
     "overview": overview,
 }

@@ -43,6 +43,7 @@ STYLE: dict[str, Any] = {
 
 CLASS_COLOURS = {"A": "#0072B2", "B": "#56B4E9", "C": "#D55E00", "D": "#E69F00"}
 """Okabe and Ito's palette, told apart by the colour-blind: blues inside the zone, warm outside."""
+BOND_COLOURS = {"certificate": "#009E73", "hook": "#CC79A7", "rest": "#999999"}
 BODY_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
 CONTACT_COLOUR = "#D7191C"
 MARKERS = "osD^vPX*"

@@ -14,12 +14,14 @@ from flocsim.io.results.schema import (
     CLASSES,
     DIFFERENCES,
     EVENTS,
+    LAST_AXES,
     NOT_APPLICABLE,
     OUTCOMES,
     POOLED,
     REPLICATES,
     TABLE,
     Results,
+    tail_of,
 )
 
 TYPE, VERTICES, DELTA = (Column(kind, (axis,)) for kind, axis in zip(
@@ -32,15 +34,13 @@ FAILED = OUTCOMES.index("failed")
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
+BOUND_CLASSES = [CLASSES.index(name) for name in AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
-def columns_of(schema, axes, more=()):
-    """{name: Column} of the arrays of a schema; those of classes have one axis more."""
-    return {
-        name: Column(kind, (*axes, len(CLASSES)) if "class" in name and "class" in more else axes)
-        for name, (kind, _, _) in schema.items()
-    }
+def columns_of(schema, axes):
+    """{name: Column} of the arrays of a schema."""
+    return {name: Column(kind, axes) for name, (kind, _, _) in schema.items()}
 
 
 def check_structure(nodes: Mapping[str, Node]) -> None:
@@ -51,8 +51,9 @@ def check_structure(nodes: Mapping[str, Node]) -> None:
         if path.startswith("run/") and node.type in RUN_TYPES
     }
     groups = {
-        "probabilities": columns_of(TABLE, AXES, ("class",))
-        | STUDY | {"class": Column("text", (len(CLASSES),))},
+        "probabilities": {
+            name: Column(kind, (*AXES, *tail_of(name))) for name, (kind, _, _) in TABLE.items()
+        } | STUDY | {axis: Column("text", (len(words),)) for axis, words in LAST_AXES.items()},
         "pooled": columns_of(POOLED, AXES[:2]) | {"type": TYPE, "vertices": VERTICES},
         "differences": columns_of(DIFFERENCES, (len(AXES), len(EVENTS), *AXES))
         | STUDY
@@ -79,7 +80,8 @@ def check_coordinates(file: Any) -> None:
         for axis in {*AXES} & group.keys():
             if group[axis][()].tolist() != first[axis][()].tolist():
                 raise ValueError(f"{group.name.strip('/')}/{axis} is not probabilities/{axis}")
-    for path, words in (("probabilities/class", CLASSES), ("differences/event", EVENTS)):
+    lists = {f"probabilities/{axis}": words for axis, words in LAST_AXES.items()}
+    for path, words in (lists | {"differences/event": EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
             raise ValueError(f"{path} holds other words than {', '.join(words)}")
 
@@ -103,7 +105,10 @@ def check_tables(results: Results) -> None:
         np.any(table["n_total"] != results.count)
         or np.any(ends + table["n_class"].sum(axis=-1) != results.count)
         or np.any(table["n_collided"] > results.count)
-        or np.any(table["n_inside"] > table["n_collided"]),
+        or np.any(table["n_inside"] > table["n_collided"])
+        or np.any(table["n_bond"].sum(axis=-1) != table["n_class"][..., BOUND_CLASSES].sum(axis=-1))
+        or np.any(table["n_checked"] > results.count)
+        or np.any(table["n_flipped"] > table["n_checked"]),
         "counts that contradict each other",
     )
     for name, values in results.pooled.items():
@@ -133,13 +138,17 @@ def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
-    for name in ("inside", "crossed_zone"):
+    for name in ("inside", "crossed_zone", "checked_inside"):
         codes = column(name)
         refuse_row((codes > 1) & (codes != NOT_APPLICABLE), name)
+    again = column("checked_outcome")
+    refuse_row((again >= len(OUTCOMES)) & (again != NOT_APPLICABLE), "checked_outcome")
+    again = column("checked_bond")
+    refuse_row(((again < 1) | (again > len(BONDS))) & (again != NOT_APPLICABLE), "checked_bond")
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
-    bound = np.isin(outcome, [OUTCOMES.index(name) for name in AGGREGATED])
+    bound = np.isin(outcome, BOUND_CLASSES)
     bond = column("bond")
     held = (bond >= 1) & (bond <= len(BONDS))
     refuse_row(np.where(bound, ~held, bond != NOT_APPLICABLE), "bond")

@@ -1,9 +1,9 @@
 """The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
 
-Layout (schema version 2). Every group holds its own coordinates as dimension scales, and every
+Layout (schema version 3). Every group holds its own coordinates as dimension scales, and every
 dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_meanings``:
 
-- ``probabilities``  (type, vertices, delta[, class]): counts, probabilities, ``_low``, ``_high``
+- ``probabilities``  (type, vertices, delta[, class or bond]): counts, probabilities, bounds
 - ``pooled``         (type, vertices): probabilities over all displacements
 - ``differences``    (against, event, type, vertices, delta): between conditions, replicates paired
 - ``replicates``     (type, vertices, delta, replicate): what became of every single collision

@@ -13,19 +13,20 @@ import numpy as np
 from flocsim.errors import UsageError
 from flocsim.io.results.schema import (
     AXES,
-    CLASSES,
     COORDINATES,
     DIFFERENCES,
     EVENTS,
     FLAGS,
+    LAST_AXES,
     POOLED,
     REPLICATES,
     TABLE,
     Results,
+    last_axis,
 )
 
 FORMAT = "flocsim results"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 class SparseImage(io.RawIOBase):
@@ -96,8 +97,8 @@ def frame_of(results: Results) -> Frame:
     with h5py.File(frame.image, "w") as file:
         file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
         study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
-        write_group(file, "probabilities", results.probabilities, TABLE, (*AXES, "class"),
-                    study | {"class": list(CLASSES)})  # fmt: skip
+        lists = {axis: list(words) for axis, words in LAST_AXES.items()}
+        write_group(file, "probabilities", results.probabilities, TABLE, AXES, study | lists)
         if results.pooled:
             write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)
         if results.differences:
@@ -120,10 +121,12 @@ def frame_of(results: Results) -> Frame:
 
 def write_group(file, name, arrays, schema, axes, coordinates):
     group = file.create_group(name)
-    for axis in axes:
+    lasts = {variable: (last_axis(variable),) for variable in schema if last_axis(variable)}
+    for axis in dict.fromkeys((*axes, *(axis for last in lasts.values() for axis in last))):
         write_coordinate(group, axis, coordinates[axis])
     for variable, about in schema.items():
-        annotate(group.create_dataset(variable, data=arrays[variable]), about, group, axes)
+        dataset = group.create_dataset(variable, data=arrays[variable])
+        annotate(dataset, about, group, (*axes, *lasts.get(variable, ())))
 
 
 def annotate(dataset, about, group, axes):

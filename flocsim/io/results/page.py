@@ -39,8 +39,11 @@ interruptions, on processors of one kind ([cluster.md](cluster.md) says what dif
 """
 
 GROUPS = (
-    ("probabilities", "(type, vertices, delta), `class` A to D last where the name has it. "
-     "`_low` and `_high` bound Wilson's 95 % interval; NaN where there was no event.", TABLE),
+    ("probabilities", "(type, vertices, delta), `class` A to D or the kind of `bond` last where "
+     "the name has it. Some aggregates stick, others hang by their shapes: pr_a = pr_sticks + "
+     "pr_hangs. "
+     "`_low` and `_high` bound Wilson's 95 % interval; NaN where there was no event. `_numerical` "
+     "is what numerics add on either side (below).", TABLE),
     ("pooled", "(type, vertices): all displacements together. A replicate has the same "
      "orientations at every displacement, so its collisions are correlated; the interval is "
      "Wilson's at the number of independent events that they are worth.", POOLED),
@@ -50,6 +53,26 @@ GROUPS = (
     ("replicates", "(type, vertices, delta, replicate): every single collision. `flocsim "
      "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again.", REPLICATES),
 )  # fmt: skip
+
+NUMERICAL = """\
+## The numerical error of a probability
+
+`[integrator] check_share` of the replicates are run again at a 100 times tighter tolerance (fixed
+steps: at a quarter of the step); which, follows from the seed and the replicate's index alone. One
+that then counts otherwise in a probability, as success, as failure or not at all, has *flipped*:
+`n_gained` of them raise the probability and `n_lost` lower it, among `n_checked` that count in
+either run. What runs out of steps (five times as many) in its second run has flipped too. The
+probabilities are those of the first runs; run more exactly they would change by no more than
+flips/trials. `_numerical` is the 95 % bound of that for all trials of the condition,
+(f + q)/(c + u): f flips of c that were run again are known, q of the u others are predicted.
+With F flips of C in all other conditions of the type, the rate of flips has a gamma distribution
+of shape 1 + f and rate (C + 2)/(F + 1) + c (rates of conditions scatter like an exponential
+distribution with the mean of the others, by Laplace's rule), flips of the u others have a
+negative binomial one, and q is its 95 % quantile. So a condition with few checks borrows from its
+type, one with many speaks for itself, and where all is run again nothing is predicted. NaN where
+nothing was.
+
+"""
 
 RUN = """\
 ## run
@@ -69,20 +92,25 @@ with reasons).
 """
 
 
+ENDS = ("_low", "_high", "_numerical")
+"""Ends of the names of bounds."""
+
+
 def results_page() -> str:
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
-    return "\n".join([*parts, RUN, "## Coordinates\n", coordinates()])
+    return "\n".join([*parts, NUMERICAL + RUN, "## Coordinates\n", coordinates()])
 
 
 def table(schema):
     """A Markdown table of one group; bounds go with what they bound."""
     rows = []
     for name, (kind, unit, text) in schema.items():
-        if not name.endswith(("_low", "_high")):
-            bounded = f"{name}_low" in schema
-            shown = f"`{name}`" + (", `_low`, `_high`" if bounded else "")
+        if not name.endswith(ENDS):
+            shown = ", ".join(
+                [f"`{name}`", *(f"`{end}`" for end in ENDS if f"{name}{end}" in schema)]
+            )
             rows.append([shown, kind, unit, text + codes(name)])
     return markdown_table(["dataset", "type", "unit", "meaning"], rows) + "\n"
 

@@ -15,7 +15,8 @@ OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed")
 CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
-"""In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound."""
+"""In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound; in
+``checked_outcome``: the replicate was not run again."""
 
 AXES = ("type", "vertices", "delta")
 
@@ -26,6 +27,9 @@ REPLICATES = {  # name: (dtype, units, long name)
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
+    "checked_outcome": ("u1", "1", "outcome at the tighter tolerance"),
+    "checked_inside": ("u1", "1", "centre distance below D_0 at the collision, when run again"),
+    "checked_bond": ("u1", "1", "what holds an aggregated pair, when run again"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
     "d_c_last": ("f8", "m", "last centre distance"),
@@ -51,27 +55,53 @@ COUNTS = {
     "n_collided": "replicates whose outlines touched",
     "n_inside": "collisions inside the attraction zone",
     "n_class": "collisions of each class",
+    "n_bond": "aggregated replicates of each kind of bond",
+    "n_checked": "replicates that were run again at a tighter tolerance",
+    "n_flipped": "replicates run again that ended with another outcome, or on the other side of "
+    "the zone",
 }
 PROBABILITIES = {
     "pr_inside": "Pr[inside | collision]",
     "pr_a_given_inside": "Pr[aggregation | decided collision inside]",
     "pr_a_given_outside": "Pr[aggregation | decided collision outside]",
     "pr_a": "Pr[aggregation | decided collision]",
+    "pr_sticks": "Pr[aggregation that sticks, by certificate or rest | decided collision]",
+    "pr_hangs": "Pr[aggregation that hangs, by a hook | decided collision]",
     "pr_class": "Pr[class | decided collision]",
+    "pr_bond": "Pr[bond | aggregation]",
 }
-BOUNDS = {"": "", "_low": ", lower 95 % bound", "_high": ", upper 95 % bound"}
+CHANGES = {
+    "n_checked": "replicates run again that count in {} in either run",
+    "n_gained": "of these, raised {} when run again",
+    "n_lost": "of these, lowered {} when run again",
+}
+"""What is counted for every probability, beside `COUNTS`."""
+BOUNDS = {
+    "": "",
+    "_low": ", lower 95 % bound",
+    "_high": ", upper 95 % bound",
+    "_numerical": ", numerical error: 95 % bound of the share that flips",
+}
 TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
     name + suffix: ("f8", "1", text + bound)
     for name, text in PROBABILITIES.items()
     for suffix, bound in BOUNDS.items()
 }
+TABLE |= {
+    f"{count}_{name}": ("i8", "1", words.format(text))
+    for name, text in PROBABILITIES.items()
+    for count, words in CHANGES.items()
+}
+POOLED_PROBABILITIES = (
+    "pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a", "pr_sticks", "pr_hangs",
+)  # fmt: skip
 POOLED = {
     name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
-    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+    for name in POOLED_PROBABILITIES
     for suffix, bound in BOUNDS.items()
 } | {
     f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
-    for name in ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
+    for name in POOLED_PROBABILITIES
 }
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),
@@ -82,13 +112,18 @@ DIFFERENCES = {
 BONDS = ("certificate", "hook", "rest")
 """Kinds of bond, from code 1 on: no later load can open it; shapes hook into each other, attraction
 being weaker than the load; the pair rests, held by more attraction than load."""
+LAST_AXES = {"class": CLASSES, "bond": BONDS}
+"""The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
 EVENTS = ("inside", "aggregated")
 """Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
 FLAGS = {
     "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
     "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
+    "checked_outcome": ((*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")),
+    "checked_inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
     "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
+    "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
 COORDINATES = {
     "type": ("1", "collision type or pair of equivalent radii (i/j)"),
@@ -98,11 +133,27 @@ COORDINATES = {
         "1",
         "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
     ),
+    "bond": (
+        "1",
+        "certificate: no later load can open it; hook: shapes hook into each other, attraction "
+        "being weaker than the load; rest: it rests, held by more attraction than load",
+    ),
     "replicate": ("1", "replicate index"),
     "floc": ("1", "name of the floc"),
     "against": ("1", "compared with the condition that comes first along this axis"),
     "event": ("1", "inside: of all collisions; aggregated: of the decided ones"),
 }
+
+
+def last_axis(name: str) -> str | None:
+    """The last axis of an array of `TABLE`, where it has one more than the conditions."""
+    return next((axis for axis in LAST_AXES if axis in name), None)
+
+
+def tail_of(name: str) -> tuple[int, ...]:
+    """The length of `last_axis`, or nothing."""
+    axis = last_axis(name)
+    return () if axis is None else (len(LAST_AXES[axis]),)
 
 
 def as_names(names: Iterable) -> tuple[str, ...]:
@@ -128,7 +179,7 @@ class Results:
     ``types`` names; ``vertices`` N [-]; ``delta`` shares of delta_max [-]; ``replicates`` the
     arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where they were left
     on the disk, with their ``count`` then; ``probabilities`` those of `TABLE`, each (type,
-    vertices, delta), with ``class`` A–D last where the name has it; ``run`` plain scalars;
+    vertices, delta), with `LAST_AXES` last where the name has one; ``run`` plain scalars;
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
@@ -150,8 +201,7 @@ class Results:
 
     def __attrs_post_init__(self):
         shape = self.shape
-        tails = {name: (len(CLASSES),) for name in TABLE if "class" in name}
-        shapes = {name: shape + tails.get(name, ()) for name in TABLE}
+        shapes = {name: (*shape, *tail_of(name)) for name in TABLE}
         self.check("probabilities", TABLE, shapes)
         if self.pooled:
             self.check("pooled", POOLED, dict.fromkeys(POOLED, shape[:2]))

@@ -1,11 +1,18 @@
 """Outcomes that change between two runs of one study."""
 
+import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.outcome_changes import outcome_changes, percent_changed
+from flocsim.ensembles.estimates.outcome_changes import (
+    outcome_changes,
+    percent_changed,
+    second_run_changes,
+)
 from flocsim.errors import UsageError
+from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.paper_like import paper_results, relabelled
+from tests.helpers.synthetic_results import make_results
 
 
 def test_nothing_changes_in_a_run_against_itself():
@@ -46,3 +53,20 @@ def test_other_conditions_are_refused():
 def test_the_share_of_nothing_is_unknown():
     nothing = np.zeros(3, dtype=bool)
     assert np.isnan(percent_changed(nothing, nothing))
+
+
+def test_changes_of_second_runs_are_those_of_two_studies_where_both_are():
+    found = make_results(count=30)
+    again = found.replicates["checked_outcome"]
+    checked = again != NOT_APPLICABLE
+    codes = {name: np.where(checked, found.replicates[f"checked_{name}"], found.replicates[name])
+             for name in ("outcome", "inside")}  # fmt: skip
+    exact = attrs.evolve(found, replicates=found.replicates | codes)
+    one, other = second_run_changes(found), outcome_changes(found, exact)
+    np.testing.assert_array_equal(one.checked, checked)
+    assert one.outcome.any() and one.zone.any() and one.aggregation.any()
+    for name in ("zone", "aggregation", "outcome"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    np.testing.assert_array_equal(one.both, other.both & checked)
+    counted = found.probabilities["n_flipped"].sum()
+    assert counted >= one.outcome.sum()

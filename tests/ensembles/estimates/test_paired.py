@@ -9,7 +9,7 @@ from flocsim.ensembles.estimates.paired import joint_counts, newcombe, paired_di
 from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums, tabulate
 from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import NOT_APPLICABLE
-from tests.helpers.synthetic_results import draw_outcomes
+from tests.helpers.synthetic_results import bonds_of, draw_codes
 
 CELLS = st.tuples(*[st.integers(0, 60)] * 4).filter(any)
 
@@ -61,10 +61,10 @@ def test_the_interval_covers_as_often_as_it_says(p, q, overlap):
 
 
 def test_joint_counts_are_the_counts_of_pairs():
-    outcome, inside = draw_outcomes(np.random.default_rng(1), (2, 3, 2, 50))
+    outcome, inside, bond = draw_codes(np.random.default_rng(1), (2, 3, 2, 50))
     joint = joint_counts(outcome, inside)
     assert joint.shape == (3, 2, 2, 3, 2, 4)
-    table = tabulate(outcome, inside)
+    table = tabulate(outcome, inside, bond)
     # Against itself an event happens in both or in neither.
     for axis, first in enumerate([np.s_[0], np.s_[:, 0], np.s_[:, :, 0]]):
         own = joint[axis][(slice(None), *([first] if axis == 0 else first))]
@@ -78,12 +78,13 @@ def test_joint_counts_are_the_counts_of_pairs():
 
 
 def test_blocks_of_replicates_add_up():
-    outcome, inside = draw_outcomes(np.random.default_rng(2), (1, 2, 3, 40))
+    outcome, inside, bond = draw_codes(np.random.default_rng(2), (1, 2, 3, 40))
     parts = [np.s_[..., :13], np.s_[..., 13:]]
     np.testing.assert_array_equal(
         joint_counts(outcome, inside), sum(joint_counts(outcome[p], inside[p]) for p in parts)
     )
-    whole, sums = pooled_sums(outcome, inside), [pooled_sums(outcome[p], inside[p]) for p in parts]
+    whole = pooled_sums(outcome, inside, bond)
+    sums = [pooled_sums(outcome[p], inside[p], bond[p]) for p in parts]
     for name in whole:
         np.testing.assert_array_equal(whole[name], sums[0][name] + sums[1][name])
 
@@ -98,7 +99,7 @@ def test_no_pairs_give_nan():
 def independent(shape, seed=3):
     """Codes of collisions that are decided, inside, and aggregate half of the time."""
     outcome = np.random.default_rng(seed).integers(0, 2, shape)
-    return outcome, np.ones(shape, int)
+    return outcome, np.ones(shape, int), bonds_of(outcome)
 
 
 def test_independent_displacements_are_worth_their_number():
@@ -109,15 +110,16 @@ def test_independent_displacements_are_worth_their_number():
 
 
 def test_displacements_that_all_agree_are_worth_one():
-    outcome, inside = independent((1, 1, 1, 4000))
-    five = np.repeat(outcome, 5, axis=2), np.repeat(inside, 5, axis=2)
-    pooled = pooled_probabilities(pooled_sums(*five))
-    alone = pooled_probabilities(pooled_sums(outcome, inside))
+    codes = independent((1, 1, 1, 4000))
+    pooled = pooled_probabilities(pooled_sums(*(np.repeat(code, 5, axis=2) for code in codes)))
+    alone = pooled_probabilities(pooled_sums(*codes))
     np.testing.assert_allclose(pooled["n_effective_pr_a"], 4000, rtol=1e-3)
     np.testing.assert_allclose(pooled["pr_a_low"], alone["pr_a_low"], rtol=1e-3)
 
 
 def test_no_events_pooled_give_nan():
     outcome = np.full((1, 1, 2, 3), 4)
-    table = pooled_probabilities(pooled_sums(outcome, np.full(outcome.shape, NOT_APPLICABLE)))
+    table = pooled_probabilities(
+        pooled_sums(outcome, *[np.full(outcome.shape, NOT_APPLICABLE)] * 2)
+    )
     assert all(np.isnan(values).all() for values in table.values())

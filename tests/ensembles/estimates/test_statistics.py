@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from flocsim.ensembles.estimates.numerical import numerical_errors
 from flocsim.ensembles.estimates.statistics import probabilities, tabulate, wilson
 from flocsim.ensembles.report import format_table
 from flocsim.errors import UsageError
 from flocsim.io.results.file import NOT_APPLICABLE
 from tests.helpers.rounding import to_rounding
-from tests.helpers.synthetic_results import draw_outcomes, make_results
+from tests.helpers.synthetic_results import bonds_of, draw_codes, make_results
 
 Z = 1.959963984540054
-COUNTS = ("n_total", "n_missed", "n_undecided", "n_failed", "n_collided", "n_inside", "n_class")
+COUNTS = ("n_total", "n_missed", "n_undecided", "n_failed", "n_collided", "n_inside", "n_class",
+          "n_bond")  # fmt: skip
 
 
 @pytest.mark.parametrize("n", [1, 7, 50, 4000])
@@ -80,7 +82,8 @@ def test_every_count_and_probability_of_a_small_case():
     #           A  A  A  B  C  D  D  missed        undecided in, out, apart     failed in, apart
     outcome = [[0, 0, 0, 1, 2, 3, 3, 4, 5, 5, 5, 6, 6]]
     inside = [[1, 1, 1, 1, 0, 0, 0, 255, 1, 0, 255, 1, 255]]
-    table = tabulate(outcome, inside)
+    bond = [[1, 1, 2, 255, 3, *[255] * 8]]
+    table = tabulate(outcome, inside, bond)
     counts = {name: table[name][0].tolist() for name in COUNTS}
     assert counts == {
         "n_total": 13,
@@ -90,12 +93,17 @@ def test_every_count_and_probability_of_a_small_case():
         "n_collided": 10,
         "n_inside": 6,
         "n_class": [3, 1, 1, 2],
+        "n_bond": [2, 1, 1],
     }
     assert table["pr_inside"][0] == 6 / 10
     assert table["pr_a_given_inside"][0] == 3 / 4
     assert table["pr_a_given_outside"][0] == 1 / 3
     assert table["pr_a"][0] == 4 / 7
     np.testing.assert_array_equal(table["pr_class"][0], np.array([3, 1, 1, 2]) / 7)
+    np.testing.assert_array_equal(table["pr_bond"][0], np.array([2, 1, 1]) / 4)
+    assert (table["pr_sticks"][0], table["pr_hangs"][0]) == (3 / 7, 1 / 7)
+    bounds = [table["pr_hangs_low"][0], table["pr_hangs_high"][0]]
+    assert bounds == to_rounding(np.array(wilson(1, 7)))
     # Squares of numpy's scalars go by pow, those of its arrays do not.
     assert [table["pr_a_low"][0], table["pr_a_high"][0]] == to_rounding(np.array(wilson(4, 7)))
     inside = [table["pr_inside_low"][0], table["pr_inside_high"][0]]
@@ -108,50 +116,53 @@ def test_counts_are_whole_numbers_that_add_up():
         assert table[name].dtype == np.int64
     ends = table["n_missed"] + table["n_undecided"] + table["n_failed"]
     np.testing.assert_array_equal(table["n_total"], ends + table["n_class"].sum(axis=-1))
+    aggregated = table["n_class"][..., [0, 2]].sum(axis=-1)
+    np.testing.assert_array_equal(table["n_bond"].sum(axis=-1), aggregated)
+    np.testing.assert_allclose(table["pr_a"], table["pr_sticks"] + table["pr_hangs"], atol=1e-15)
 
 
 def test_no_events_give_nan_not_zero():
-    table = tabulate(np.full((1, 5), 4), np.full((1, 5), NOT_APPLICABLE))
+    table = tabulate(np.full((1, 5), 4), *[np.full((1, 5), NOT_APPLICABLE)] * 2)
     for name in [name for name in table if name.startswith("pr_")]:
         assert np.isnan(table[name]).all(), name
 
 
 def test_order_of_replicates_changes_nothing():
     rng = np.random.default_rng(1)
-    outcome, inside = draw_outcomes(rng, (2, 3, 2, 40))
+    codes = draw_codes(rng, (2, 3, 2, 40))
     shuffled = rng.permutation(40)
-    before, after = (
-        tabulate(outcome, inside),
-        tabulate(outcome[..., shuffled], inside[..., shuffled]),
-    )
+    before, after = tabulate(*codes), tabulate(*(each[..., shuffled] for each in codes))
     for name in before:
         np.testing.assert_array_equal(before[name], after[name])
 
 
 def test_counts_of_two_halves_pool_to_the_whole():
-    outcome, inside = draw_outcomes(np.random.default_rng(2), (2, 3, 2, 50))
-    whole = tabulate(outcome, inside)
-    parts = [tabulate(outcome[..., k], inside[..., k]) for k in (slice(17), slice(17, None))]
-    pooled = {name: parts[0][name] + parts[1][name] for name in COUNTS}
-    pooled |= probabilities(pooled)
+    codes = draw_codes(np.random.default_rng(2), (2, 3, 2, 50))
+    whole = tabulate(*codes)
+    halves = (slice(17), slice(17, None))
+    parts = [tabulate(*(each[..., k] for each in codes)) for k in halves]
+    counts = [name for name in whole if name.startswith("n_")]
+    pooled = {name: parts[0][name] + parts[1][name] for name in counts}
+    pooled |= probabilities(pooled) | numerical_errors(pooled)
     for name in whole:
         np.testing.assert_array_equal(whole[name], pooled[name])
 
 
 def test_swapping_inside_and_outside_mirrors_the_table():
-    outcome, inside = draw_outcomes(np.random.default_rng(3), (2, 2, 2, 50))
+    outcome, inside, bond = draw_codes(np.random.default_rng(3), (2, 2, 2, 50))
     swapped = np.choose(outcome, [2, 3, 0, 1, 4, 5, 6])
     other = np.where(inside == NOT_APPLICABLE, inside, 1 - inside)
-    before, after = tabulate(outcome, inside), tabulate(swapped, other)
+    before, after = tabulate(outcome, inside, bond), tabulate(swapped, other, bond)
     np.testing.assert_array_equal(before["pr_a_given_inside"], after["pr_a_given_outside"])
     np.testing.assert_array_equal(before["pr_a"], after["pr_a"])
     np.testing.assert_allclose(before["pr_inside"], 1 - after["pr_inside"], atol=1e-15)
 
 
 def test_inside_equals_a_plus_b_when_all_collisions_are_decided():
-    outcome, inside = draw_outcomes(np.random.default_rng(4), (3, 4, 5, 60))
+    outcome, inside, bond = draw_codes(np.random.default_rng(4), (3, 4, 5, 60))
     decided = outcome < 4
-    table = tabulate(np.where(decided, outcome, 4), np.where(decided, inside, NOT_APPLICABLE))
+    codes = np.where(decided, outcome, 4), np.where(decided, inside, NOT_APPLICABLE)
+    table = tabulate(*codes, bonds_of(codes[0], bond))
     np.testing.assert_allclose(table["pr_inside"], table["pr_class"][..., :2].sum(axis=-1))
     np.testing.assert_allclose(table["pr_class"].sum(axis=-1), 1.0)
 
@@ -161,12 +172,18 @@ def test_inside_equals_a_plus_b_when_all_collisions_are_decided():
 )
 def test_contradictions_are_refused_with_their_place(outcome, inside):
     with pytest.raises(UsageError, match=r"at \(0, 1\) is impossible \(1 such"):
-        tabulate([[0, outcome]], [[1, inside]])
+        tabulate([[0, outcome]], [[1, inside]], [[1, bonds_of(outcome)]])
+
+
+@pytest.mark.parametrize(("outcome", "bond"), [(0, 255), (0, 0), (0, 4), (1, 1), (5, 3)])
+def test_a_bond_that_does_not_go_with_the_outcome_is_refused(outcome, bond):
+    with pytest.raises(UsageError, match=r"at \(0, 1\) is impossible \(1 such"):
+        tabulate([[0, outcome]], [[1, 1]], [[1, bond]])
 
 
 def test_shapes_must_agree():
     with pytest.raises(UsageError, match="one shape"):
-        tabulate([[0, 1]], [[1]])
+        tabulate([[0, 1]], [[1]], [[1, 255]])
 
 
 @pytest.mark.parametrize("count", [0, 9, 60, 99_999])
@@ -187,21 +204,32 @@ def test_table_is_aligned_and_narrow(count):
 def test_table_tells_the_numbers():
     outcome = np.array([0] * 6 + [3] * 3 + [4]).reshape(1, 1, 1, 10)
     inside = np.select([outcome == 0, outcome == 3], [1, 0], NOT_APPLICABLE)
-    text = format_table(["II"], [16], [0.25], tabulate(outcome, inside))
+    bond = bonds_of(outcome, np.array([1, 1, 2, 3, 1, 2, 1, 1, 1, 1]))
+    text = format_table(["II"], [16], [0.25], tabulate(outcome, inside, bond))
     row = text.splitlines()[-1]
     assert " ".join(row.split()) == (
-        "16 0.25 10 9 6 .667 [.354, .879] .667 [.354, .879] 6 0 0 3 1 0 0"
+        "16 0.25 10 9 6 .667 +-.312 - .667 +-.312 - .333 6 0 0 3 1 0 0"
     )
     assert "type II" in text
 
 
 def test_table_shows_a_dash_without_events():
-    table = tabulate(np.full((1, 1, 1, 2), 4), np.full((1, 1, 1, 2), NOT_APPLICABLE))
+    table = tabulate(np.full((1, 1, 1, 2), 4), *[np.full((1, 1, 1, 2), NOT_APPLICABLE)] * 2)
     row = format_table(["I"], [4], [1.0], table).splitlines()[-1]
-    assert " ".join(row.split()) == "4 1 2 0 0 - - 0 0 0 0 2 0 0"
+    assert " ".join(row.split()) == "4 1 2 0 0 - - - 0 0 0 0 2 0 0"
 
 
 def test_table_tells_certainty_from_rounding():
     outcome = np.zeros((1, 1, 1, 40), dtype=int)
-    text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1))
-    assert text.count("1.00 [.912, 1.00]") == 2
+    text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1, bonds_of(outcome)))
+    assert text.count("1.00 +-.088      -") == 2
+
+
+def test_table_tells_the_numerical_error():
+    outcome = np.zeros((1, 1, 1, 40), dtype=int)
+    first = outcome, outcome + 1, bonds_of(outcome)
+    again = np.where(np.arange(40) < 4, 1, outcome)
+    table = tabulate(*first, again, outcome + 1, bonds_of(again))
+    text = format_table(["III"], [1], [0.0], table)
+    assert text.count("1.00 +-.088 +-.000") == 1
+    assert text.count("1.00 +-.088 +-.100") == 1

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.config.schema import StopConfig
-from flocsim.ensembles.estimates.statistics import count, tabulate
+from flocsim.ensembles.estimates.statistics import CODES, count, tabulate
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.io.results.file import read_results, same_data
 from tests.helpers.small_study import small_config
+from tests.helpers.synthetic_results import bonds_of
 
 RULE = {"half_width": 0.12, "least": 10}
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 300}
@@ -33,7 +34,7 @@ def test_a_study_ends_at_the_first_look_that_is_narrow_enough(tmp_path):
     assert results.count in looks[:-1]
     assert np.max(half_widths(results.probabilities)) <= 0.12
     before = looks[looks.index(results.count) - 1]
-    codes = (results.replicates[name][..., :before] for name in ("outcome", "inside"))
+    codes = (results.replicates[name][..., :before] for name in CODES)
     assert np.max(half_widths(tabulate(*codes))) > 0.12
 
 
@@ -67,9 +68,9 @@ class Drawn:
         self.outcome = outcome
 
     def read(self, place, name, first, stop):
-        """Part of a column; all are inside."""
+        """Part of a column; all are inside, and those that hold do so for good."""
         part = self.outcome[first:stop]
-        return part if name == "outcome" else np.ones_like(part)
+        return {"outcome": part, "inside": np.ones_like(part), "bond": bonds_of(part)}[name]
 
 
 def ended_at(outcome, stop):
@@ -87,12 +88,12 @@ def test_intervals_of_a_study_that_was_ended_still_cover(share):
         outcome = (rng.random(1000) >= share).astype(int)
         number = ended_at(outcome, stop)
         assert number < 1000
-        table = tabulate(outcome[:number], np.ones(number, int))
+        table = tabulate(outcome[:number], np.ones(number, int), bonds_of(outcome[:number]))
         covered += table["pr_a_low"] <= share <= table["pr_a_high"]
     assert 0.91 < covered / 400 < 0.985
 
 
 def test_a_condition_without_events_holds_nothing_up():
     rule = StopRule(StopConfig(half_width=0.01), Drawn(np.full(100, 4)))
-    counts = count(np.full(5, 4), np.full(5, 255))
+    counts = count(np.full(5, 4), np.full(5, 255), np.full(5, 255))
     assert rule.is_narrow(counts)

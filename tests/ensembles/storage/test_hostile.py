@@ -99,8 +99,9 @@ def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
 @pytest.mark.parametrize(
     ("column", "value"),
     [("outcome", 7), ("outcome", 255), ("inside", 0), ("inside", 9), ("crossed_zone", 3),
-     ("failure", 99), ("steps", -1), ("floc_i", -2), ("angle_i", np.nan), ("t_end", np.inf),
-     ("d_c_last", np.nan)],
+     ("bond", 0), ("bond", 4), ("failure", 99), ("steps", -1), ("floc_i", -2),
+     ("angle_i", np.nan), ("t_end", np.inf), ("d_c_last", np.nan),
+     ("checked_outcome", 7), ("checked_inside", 2), ("checked_bond", 0)],
 )  # fmt: skip
 def test_rows_that_no_run_has_given_are_computed_again(reader, tmp_path, column, value):
     session, (kind, description, _), second = reader.parts

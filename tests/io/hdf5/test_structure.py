@@ -191,6 +191,7 @@ def put(name, place, value):
         ("replicates/outcome", (0, 0, 0, 0), 200, "outcome are impossible"),
         ("replicates/inside", ..., 2, "inside are impossible"),
         ("replicates/crossed_zone", (0, 0, 0, 1), 9, "crossed_zone are impossible"),
+        ("replicates/bond", (0, 0, 0, 1), 4, "bond are impossible"),
         ("replicates/failure", (0, 0, 0, 1), 3, "replicates/failure"),
         ("replicates/steps", (1, 0, 0, 1), -1, "steps are impossible"),
         ("replicates/floc_i", (1, 0, 0, 1), -2, "floc_i are impossible"),
@@ -201,7 +202,9 @@ def put(name, place, value):
         ("probabilities/pr_a", (0, 0, 0), 1.5, "outside"),
         ("probabilities/n_total", (0, 0, 0), 6, "contradict"),
         ("probabilities/n_class", (0, 0, 0, 0), -1, "negative"),
+        ("probabilities/n_bond", (0, 0, 0, 0), 7, "contradict"),
         ("probabilities/class", 0, "Z", "other words"),
+        ("probabilities/bond", 0, "glue", "other words"),
     ],
 )
 def test_values_that_no_run_has_given_are_refused(results, name, place, value, said):

@@ -7,7 +7,7 @@ import pytest
 from flocsim.ensembles.estimates.statistics import tabulate, wilson
 from flocsim.io.plots.results import FIGURES, figure_4, figure_6, figure_8
 from flocsim.io.plots.style import save
-from tests.helpers.synthetic_results import make_results
+from tests.helpers.synthetic_results import bonds_of, make_results
 
 
 def texts(axes):
@@ -15,10 +15,22 @@ def texts(axes):
     return " ".join(text.get_text() for text in axes.texts)
 
 
+def inner(axes):
+    """The lines of a panel with their interval bars."""
+    return [container for container in axes.containers if container.lines[0] is not None]
+
+
+def outer(axes):
+    """(low, high) of the outer bars of every line in a panel."""
+    found = [container for container in axes.containers if container.lines[0] is None]
+    ends = (np.array(container.lines[2][0].get_segments())[:, :, 1] for container in found)
+    return [(each[:, 0], each[:, 1]) for each in ends]
+
+
 def bars(axes):
     """(value, low, high) of every line with interval bars in a panel, as lists."""
     found = []
-    for container in axes.containers:
+    for container in inner(axes):
         segments = np.array(container.lines[2][0].get_segments())
         found.append((container.lines[0].get_ydata(), segments[:, 0, 1], segments[:, 1, 1]))
     return found
@@ -28,6 +40,7 @@ def with_outcomes(results, outcome, inside):
     """The same conditions with one outcome everywhere."""
     shape = results.replicates["outcome"].shape
     codes = {"outcome": np.full(shape, outcome, "u1"), "inside": np.full(shape, inside, "u1")}
+    codes["bond"] = bonds_of(codes["outcome"]).astype("u1")
     table = tabulate(**codes)
     return attrs.evolve(results, probabilities=table, replicates=results.replicates | codes)
 
@@ -49,6 +62,28 @@ def test_figure_4_shows_every_probability_and_interval():
                 np.testing.assert_allclose(drawn, expected, atol=1e-12)
 
 
+def test_outer_bars_have_the_numerical_error_on_either_side():
+    results = make_results()
+    table = results.probabilities
+    for number, axes in enumerate(figure_4(results).axes):
+        lines = outer(axes)
+        assert len(lines) == 5
+        for index, (low, high) in enumerate(lines):
+            ends = (table[f"pr_inside_{end}"][number, :, index] for end in ("low", "high"))
+            error = table["pr_inside_numerical"][number, :, index]
+            least, most = ends
+            np.testing.assert_allclose(low, np.maximum(least - error, 0.0), atol=1e-12)
+            np.testing.assert_allclose(high, np.minimum(most + error, 1.0), atol=1e-12)
+
+
+def test_without_second_runs_there_are_no_outer_bars():
+    results = make_results()
+    codes = (results.replicates[name] for name in ("outcome", "inside", "bond"))
+    plain = attrs.evolve(results, probabilities=tabulate(*codes))
+    assert not any(outer(axes) for draw in (figure_4, figure_8) for axes in draw(plain).axes)
+    assert any(outer(axes) for axes in figure_8(results).axes)
+
+
 def test_figure_8_pools_the_counts_of_all_displacements():
     results = make_results()
     counts = results.probabilities["n_class"].sum(axis=2)
@@ -59,14 +94,43 @@ def test_figure_8_pools_the_counts_of_all_displacements():
             assert (low <= value).all() and (value <= high).all()
 
 
+def test_bonds_are_shares_of_the_aggregations():
+    results = make_results()
+    counts = results.probabilities["n_bond"].sum(axis=2)
+    drawn = {
+        "bonds": FIGURES["bonds"](results).axes,
+        "overview": FIGURES["overview"](results).axes[-3:],
+    }
+    for name, panels in drawn.items():
+        for number, axes in enumerate(panels):
+            lines = bars(axes)
+            assert len(lines) == 3, name
+            for index, (value, low, high) in enumerate(lines):
+                trials = counts[number].sum(axis=-1)
+                np.testing.assert_allclose(value, counts[number, :, index] / trials)
+                assert (low <= value).all() and (value <= high).all()
+
+
+def test_without_its_rows_a_file_gives_the_same_bonds():
+    results = make_results()
+    for one, other in zip(
+        FIGURES["bonds"](results).axes,
+        FIGURES["bonds"](attrs.evolve(results, replicates=None, count=results.count)).axes,
+        strict=True,
+    ):
+        for mine, theirs in zip(bars(one), bars(other), strict=True):
+            np.testing.assert_allclose(mine[0], theirs[0])
+
+
 def test_replicates_that_agree_at_all_displacements_count_once():
     results = make_results()
     outcome = results.replicates["outcome"].copy()
     outcome[:] = np.arange(outcome.shape[-1]) % 4
     inside = np.where(outcome < 2, 1, 0)
     same = attrs.evolve(
-        results, probabilities=tabulate(outcome, inside),
-        replicates=results.replicates | {"outcome": outcome, "inside": inside.astype("u1")},
+        results, probabilities=tabulate(outcome, inside, bonds_of(outcome)),
+        replicates=results.replicates
+        | {"outcome": outcome, "inside": inside.astype("u1"), "bond": bonds_of(outcome)},
     )  # fmt: skip
     count = outcome.shape[-1]
     for index, (_, low, high) in enumerate(bars(figure_8(same).axes[0])):
@@ -82,7 +146,7 @@ def test_order_of_vertex_counts_does_not_matter():
         results, vertices=results.vertices[::-1], probabilities=turned, replicates=rows
     )
     for one, other in zip(figure_8(results).axes, figure_8(backwards).axes, strict=True):
-        for a, b in zip(one.containers, other.containers, strict=True):
+        for a, b in zip(inner(one), inner(other), strict=True):
             np.testing.assert_array_equal(a.lines[0].get_xydata(), b.lines[0].get_xydata())
 
 
@@ -128,5 +192,5 @@ def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
     save(figure, tmp_path / "figure.svg")
     assert len([axes for axes in figure.axes if axes.get_visible()]) in (
         len(results.types),
-        3 * len(results.types),
+        4 * len(results.types),
     )

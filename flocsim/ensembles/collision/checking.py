@@ -1,0 +1,84 @@
+"""Which replicates are run again, more exactly, so that what numerics change is seen and counted.
+
+The choice follows from the seed and the replicate's index alone: whatever ranks, kills, and later
+extensions there are, the same ones are run again. An index does nothing but name random numbers, so
+that any choice which does not look at them is a random sample of the replicates.
+"""
+
+import math
+from functools import cache
+
+import attrs
+import numpy as np
+
+from flocsim.integrators.base import Integrator
+
+TIGHTER = 0.01
+"""Tolerance of a second run over that of the first."""
+
+SHORTER = 0.25
+"""The same for a fixed step: 16 times less error of a method of second order."""
+
+MORE_STEPS = 5
+"""By how much a second run may take more steps than a first."""
+
+Z = 1.959963984540054
+"""Normal quantile of 95 % intervals."""
+
+LEAST_SHARE = 0.01
+"""Of the replicates that "auto" has run again."""
+
+STREAM = (0, 0, 1)
+"""Spawn key of the number that the choice starts from; replicates have keys of one part."""
+
+
+def expected_checks(replicates: int, share: float | str) -> float:
+    """How many of the first so many replicates of a condition are run again, before rounding.
+
+    "auto": where no outcome flips, Wilson's interval of the flip rate at m is as wide as that of a
+    probability of ½ at n replicates, z²/(m + z²) = z/√(n + z²), so m = z √(n + z²) − z²; and at
+    least 1 %. Never falls, nor rises by more than 1 from one replicate to the next.
+    """
+    if isinstance(share, str):
+        return max(Z * math.sqrt(replicates + Z * Z) - Z * Z, LEAST_SHARE * replicates)
+    return share * replicates
+
+
+@cache
+def beginning(seed: int) -> float:
+    """A number in [0, 1) that says where the choice begins."""
+    stream = np.random.SeedSequence(seed, spawn_key=STREAM)
+    return float(np.random.Generator(np.random.Philox(stream)).random())
+
+
+def is_checked(seed: int, replicate: int, share: float | str) -> bool:
+    """Whether a replicate is run again: a systematic sample from a random beginning.
+
+    Of the first n of any condition expected_checks(n) are, up or down to a whole number.
+    """
+    start = beginning(seed)
+    before, after = (expected_checks(n, share) for n in (replicate, replicate + 1))
+    return math.floor(after + start) > math.floor(before + start)
+
+
+def count_checks(seed: int, replicates: int, share: float | str) -> int:
+    """How many of the first so many replicates of a condition are run again."""
+    return math.floor(expected_checks(replicates, share) + beginning(seed))
+
+
+def exact_method(method: Integrator) -> Integrator | None:
+    """The method with a 100 times tighter tolerance, or a quarter of its step; None for neither.
+
+    A class of a user's own has them as parameters of these names, or cannot be checked.
+    """
+    names = {field.alias for field in attrs.fields(type(method)) if field.init}
+    for name, factor in (("tolerance", TIGHTER), ("step", SHORTER)):
+        value = getattr(method, name, math.inf)
+        if name in names and value < math.inf:
+            return attrs.evolve(method, **{name: float(f"{factor * value:.15g}")})
+    return None
+
+
+def checks_wanted(method: Integrator, share: float | str) -> bool:
+    """Whether any replicate is run again by this method."""
+    return share != 0.0 and exact_method(method) is not None

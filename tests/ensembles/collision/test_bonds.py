@@ -1,0 +1,229 @@
+"""What counts as bound, and as what: certificates by pull and by trap, hooks, rest."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.arrays import NOW
+from flocsim.ensembles.collision import bonds
+from flocsim.ensembles.collision import observed as numbers
+from flocsim.ensembles.collision.bonds import CERTIFICATE, HOOK, NO_BOND, REST
+from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.outcomes import BOUND, watch_pair
+from flocsim.forces import VanDerWaals
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.rhs.views import centre_line
+from flocsim.io.results.schema import BONDS
+from tests.helpers.small_study import small_config
+
+RADII = (16.41e-6, 23.02e-6)
+NO_VOLTAGE = {"double_layer": {"potential": 0.0}}
+
+
+def hamaker(strength):
+    """Forces with this Hamaker constant [J], nothing repelling."""
+    return {"forces": {"van_der_waals": {"hamaker": strength}, **NO_VOLTAGE}}
+
+
+class Doublet:
+    """Two bodies of the paper's Type I that touch, seen by the observer uncompiled."""
+
+    def __init__(self, folder, overrides=None, shapes=None, places=None):
+        """Where the bodies are (2, 3), one below the other by default; they stand still."""
+        self.shapes = shapes or [Sphere(radius) for radius in RADII]
+        config = small_config(folder, overrides)
+        self.encounter = make_encounter(config, self.shapes, 1e-3)
+        self.scene = self.encounter.system.scene(jit=False)
+        self.work = self.encounter.start((0.0, 0.0), 0.0)
+        self.observed = self.encounter.observed()
+        self.observed[numbers.COLLIDED] = 1.0
+        if places is None:
+            places = [(0.0, 0.0, 0.0), (0.0, 1e-9 - sum(RADII), 0.0)]
+        self.place(*places)
+
+    def place(self, *places):
+        """Put the bodies somewhere, at rest."""
+        self.work.motion[NOW, :, :3], self.work.motion[NOW, :, 3:] = places, 0.0
+        assert list_candidates(self.scene, self.work)
+        locate_contacts(self.scene, self.work, NOW)
+        set_modes(self.work)
+
+    def move(self, vx=0.0, vy=0.0, spin=0.0):
+        """Let the second body move so against the first."""
+        self.work.motion[NOW, 1, 3:] = vx, vy, spin
+
+    @property
+    def drift(self):
+        return math.hypot(*self.encounter.drift)
+
+    @property
+    def load(self):
+        """The greatest pull of settling on the bond [N]."""
+        return bonds.largest_load(self.observed)
+
+    def attraction(self):
+        return bonds.centre_attraction(self.scene, self.work, 0.0)
+
+    def bond(self, time=0.0, gap=-1e-9):
+        """The kind of bond now."""
+        nx, ny, distance = centre_line(self.work, NOW, 1, 0)
+        return bonds.bond_of(self.scene, self.work, self.observed, time, gap, nx, ny, distance)
+
+    def rest(self, turns):
+        """The kind of bond after so many rest times in this pose."""
+        bonds.start_rest(self.work, self.observed, 0.0)
+        return self.bond(turns * self.observed[numbers.REST_TIME])
+
+
+def strength_for(folder, share):
+    """A Hamaker constant [J] at which spheres in contact attract by this share of the load."""
+    doublet = Doublet(folder, hamaker(1e-18))
+    return 1e-18 * share * doublet.load / doublet.attraction()
+
+
+@pytest.mark.parametrize("share", [0.5, 2.9, 3.1, 10.0])
+def test_attraction_that_outweighs_three_times_the_load_is_a_certificate(tmp_path, share):
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, share)))
+    assert doublet.attraction() == pytest.approx(share * doublet.load, rel=1e-6)
+    assert doublet.bond() == (CERTIFICATE if share > bonds.SAFETY else NO_BOND)
+
+
+def test_bodies_that_part_quickly_have_no_certificate(tmp_path):
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 10.0)))
+    doublet.move(vy=-1.1 * bonds.CALM * doublet.drift)
+    assert doublet.bond() == NO_BOND
+    doublet.move(vy=-0.9 * bonds.CALM * doublet.drift)
+    assert doublet.bond() == CERTIFICATE
+
+
+def test_a_doublet_that_spins_carries_its_centrifugal_load_too(tmp_path):
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 4.0)))
+    assert doublet.bond() == CERTIFICATE
+    mass = np.prod([body.mass for body in doublet.encounter.system.bodies])
+    mass /= sum(body.mass for body in doublet.encounter.system.bodies)
+    # As a rigid body, so fast that it doubles the load.
+    spin = math.sqrt(doublet.load / (mass * sum(RADII)))
+    doublet.work.motion[NOW, :, 5] = spin
+    doublet.move(vx=spin * sum(RADII), spin=spin)
+    assert doublet.bond() == NO_BOND
+
+
+def square(half, radius=1e-6):
+    """A square of this half width, rounded."""
+    return SpheroPolygon([(-half, -half), (half, -half), (half, half), (-half, half)], radius)
+
+
+@pytest.mark.parametrize(("tilt", "expected"), [(0.0, True), (0.2, False)])
+def test_two_contacts_on_either_side_hold_against_prying(tmp_path, tilt, expected):
+    """Faces that lie flat on each other cannot be pried open, a corner on a face can."""
+    shapes = [square(14e-6), square(9e-6)]
+    corner = 9e-6 * (math.cos(tilt) + math.sin(tilt))
+    places = [(0.0, 0.0, 0.0), (0.0, 16e-6 - 1e-9 + corner, tilt)]
+    doublet = Doublet(tmp_path, hamaker(1e-16), shapes, places)
+    assert doublet.attraction() > 10.0 * bonds.SAFETY * doublet.load
+    # By itself: at rest the bodies could not climb out of the attraction either.
+    nx, ny, distance = centre_line(doublet.work, NOW, 1, 0)
+    known = doublet.scene, doublet.work, doublet.observed
+    assert bonds.is_held(*known, 0.0, nx, ny, distance) == expected
+
+
+def nested(folder, overrides, x=0.0):
+    """A small body around the middle of a wide ring with a slit, without touching it."""
+    ways = np.linspace(0.2, 2.0 * math.pi - 0.2, 40)
+    ring = np.array([np.cos(ways), np.sin(ways)]).T
+    outer = SpheroPolygon(np.concatenate([30e-6 * ring, 28e-6 * ring[::-1]]), 1e-6)
+    shapes = [outer, Sphere(18e-6)]
+    return Doublet(folder, overrides, shapes, [(0.0, 0.0, 0.0), (x, 0.0, 0.0)])
+
+
+def climb(doublet):
+    """Work [J] against the attraction, less three loads, from here to where the equivalent spheres
+    part: it is constant on the way."""
+    (force,) = (each for each in doublet.encounter.system.forces if isinstance(each, VanDerWaals))
+    outer = sum(shape.equivalent_radius for shape in doublet.shapes)
+    radii = [shape.equivalent_radius for shape in doublet.shapes]
+    pull = force.hamaker * (radii[0] * radii[1] / outer) / (6.0 * force.d_min**2)
+    distance = math.hypot(*doublet.work.motion[NOW, 1, :2])
+    return (pull - bonds.SAFETY * doublet.load) * (outer - distance)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_body_with_less_energy_than_the_climb_is_trapped(tmp_path, share):
+    """Nothing touches, and it moves: it could not get out all the same."""
+    doublet = nested(tmp_path, hamaker(1e-16), x=2e-6)
+    assert sum(shape.equivalent_radius for shape in doublet.shapes) > 2e-6
+    masses = [body.mass for body in doublet.encounter.system.bodies]
+    reduced = masses[0] * masses[1] / sum(masses)
+    speed = math.sqrt(2.0 * share * climb(doublet) / (bonds.SAFETY * reduced))
+    doublet.move(vx=speed * math.cos(1.0), vy=speed * math.sin(1.0))
+    assert bonds.energy(doublet.scene, doublet.work) == pytest.approx(0.5 * reduced * speed**2)
+    assert doublet.bond(gap=1e-6) == (NO_BOND if share > 1.0 else CERTIFICATE)
+
+
+def test_attraction_weaker_than_the_load_is_no_trap(tmp_path):
+    doublet = nested(tmp_path, hamaker(strength_for(tmp_path, 0.1)))
+    assert doublet.bond(gap=1e-6) == NO_BOND
+
+
+def test_spin_counts_as_energy_to_climb_out_with(tmp_path):
+    doublet = nested(tmp_path, hamaker(1e-16), x=2e-6)
+    inertia = doublet.encounter.system.bodies[1].inertia
+    doublet.move(spin=math.sqrt(2.0 * 1.1 * climb(doublet) / (bonds.SAFETY * inertia)))
+    assert doublet.bond(gap=1e-6) == NO_BOND
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"), [(0.01, HOOK), (0.9, HOOK), (1.1, REST), (2.9, REST)]
+)
+def test_a_doublet_that_rests_hangs_or_sticks(tmp_path, share, expected):
+    """Attraction that could not carry the load is not what carries it."""
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, share)))
+    assert doublet.rest(0.99) == NO_BOND
+    assert doublet.rest(1.01) == expected
+    assert BONDS[expected - 1] == {HOOK: "hook", REST: "rest"}[expected]
+
+
+def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
+    rest = doublet.observed[numbers.REST_TIME]
+    bonds.start_rest(doublet.work, doublet.observed, 0.0)
+    (still, low), way = doublet.work.motion[NOW, :, :3].copy(), doublet.drift * rest
+    doublet.place(still, low + [1.1 * bonds.STILL * way, 0.0, 0.0])
+    assert doublet.bond(1.1 * rest) == NO_BOND
+    assert doublet.bond(2.0 * rest) == NO_BOND
+    assert doublet.bond(2.2 * rest) == HOOK
+
+
+def test_a_doublet_that_lies_askew_does_not_rest_for_good(tmp_path):
+    """The load is at its worst where the faster body hangs straight below."""
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
+    way = math.acos(bonds.HANGING)
+    reach = sum(RADII) - 1e-9
+    for turn, expected in ((1.1 * way, NO_BOND), (0.9 * way, HOOK), (math.pi, NO_BOND)):
+        place = (reach * math.sin(turn), -reach * math.cos(turn), 0.0)
+        doublet.place((0.0, 0.0, 0.0), place)
+        assert doublet.rest(1000.0) == expected
+
+
+def test_a_nest_is_bound_after_ten_rest_times(tmp_path):
+    """Around the other's centre no load has a lever that could turn it to hang."""
+    overrides = hamaker(strength_for(tmp_path, 0.01))
+    doublet = nested(tmp_path, overrides, x=0.0)
+    reach = sum(shape.equivalent_radius for shape in doublet.shapes)
+    for x, turns, expected in (
+        (0.9 * bonds.NEST * reach, 0.99 * bonds.FAR_LONGER, NO_BOND),
+        (0.9 * bonds.NEST * reach, 1.01 * bonds.FAR_LONGER, HOOK),
+        (1.1 * bonds.NEST * reach, 1.01 * bonds.FAR_LONGER, NO_BOND),
+    ):
+        doublet.place((0.0, 0.0, 0.0), (x, 0.0, 0.0))
+        assert doublet.rest(turns) == expected
+
+
+def test_the_observer_keeps_the_kind_of_bond(tmp_path):
+    doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 10.0)))
+    assert watch_pair(doublet.scene, doublet.work, doublet.observed, 0.0) == BOUND
+    assert doublet.observed[numbers.BOND] == CERTIFICATE

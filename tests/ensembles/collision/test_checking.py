@@ -1,0 +1,136 @@
+"""Which replicates are run again and how: few, random, and the same whatever else is asked for."""
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim.ensembles import study as study_module
+from flocsim.ensembles.collision.checking import (
+    checks_wanted,
+    count_checks,
+    exact_method,
+    expected_checks,
+    is_checked,
+)
+from flocsim.ensembles.collision.failures import FAILED, run_safely
+from flocsim.ensembles.dry_run import checked_words
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.errors import ConfigError
+from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
+from flocsim.integrators.parts import FixedStep
+from flocsim.io.confidence import score_interval
+from flocsim.io.results.schema import NOT_APPLICABLE
+from tests.helpers.small_study import small_config, small_study
+
+POLYGONS = {"shapes": {"vertices": (4,), "pool": 2}, "scene": {"types": ("I",), "delta": (0.0,)}}
+CHECKS = ("checked_outcome", "checked_inside", "checked_bond")
+
+
+@pytest.mark.parametrize("share", ["auto", 0.0, 0.03, 0.5, 1.0])
+@pytest.mark.parametrize("seed", [1, 2, 77])
+def test_of_the_first_so_many_just_as_many_are_checked_as_are_said_to_be(seed, share):
+    chosen = np.cumsum([is_checked(seed, k, share) for k in range(3000)])
+    for count in (1, 2, 10, 100, 999, 3000):
+        assert chosen[count - 1] == count_checks(seed, count, share)
+        assert abs(chosen[count - 1] - expected_checks(count, share)) < 1.0
+    assert chosen[-1] == {0.0: 0, 1.0: 3000}.get(share, chosen[-1])
+
+
+def test_the_seed_chooses():
+    chosen = {tuple(is_checked(seed, k, "auto") for k in range(40)) for seed in range(30)}
+    assert len(chosen) > 10
+
+
+@pytest.mark.parametrize("count", [3, 20, 60, 1000, 30_000, 10**6, 10**9])
+def test_auto_makes_the_interval_of_flips_as_narrow_as_the_sampling_one(count):
+    wanted = expected_checks(count, "auto")
+    flips = np.diff(score_interval(np.array(0.0), np.array(wanted)), axis=0)[0]
+    sampling = np.diff(score_interval(np.array(0.5), np.array(float(count))), axis=0)[0]
+    assert flips <= sampling * (1.0 + 1e-9)
+    assert wanted >= 0.01 * count
+    assert wanted == 0.01 * count or flips == pytest.approx(sampling)
+
+
+def test_methods_are_made_more_exact_and_no_other():
+    for method in (Implicit(1e-9), DormandPrince54(1e-9), Overdamped(1e-9)):
+        exact = exact_method(method)
+        assert exact == attrs.evolve(method, tolerance=1e-11)
+    assert exact_method(VelocityVerlet(4e-8)) == VelocityVerlet(1e-8)
+
+
+@attrs.frozen
+class Unchangeable(FixedStep):
+    """A method whose step is nobody's business."""
+
+    step: float = attrs.field(init=False, default=1e-6)
+
+    @staticmethod
+    def attempt(scene, work, clock, step):
+        return 0.0
+
+
+def with_method(config, method, **options):
+    integrator = attrs.evolve(config.integrator, own=method, name=None, **options)
+    return attrs.evolve(config, integrator=integrator)
+
+
+def test_a_method_without_tolerance_and_step_is_not_checked_and_cannot_be_asked_to(tmp_path):
+    assert exact_method(Unchangeable()) is None
+    assert not checks_wanted(Unchangeable(), "auto") and checks_wanted(Implicit(), "auto")
+    config = small_config(tmp_path, {"shapes": {"vertices": (1,)}})
+    own = with_method(config, Unchangeable())
+    assert "no tolerance or step" in checked_words(own)
+    with pytest.raises(ConfigError, match=r"check_share = 0\.2 cannot be: .*Unchangeable") as told:
+        check_study(with_method(config, Unchangeable(), check_share=0.2))
+    assert "\n" not in str(told.value)
+
+
+def test_the_dry_run_says_how_many_and_at_what(tmp_path):
+    config = small_config(tmp_path, {"replicates": 1000, "shapes": {"vertices": (1,)}})
+    words = checked_words(config)
+    assert f"{count_checks(1, 1000, 'auto')} of the 1000 replicates" in words
+    assert "1e-11 m" in words
+    off = small_config(tmp_path, {"integrator": {"check_share": 0.0}})
+    assert "none" in checked_words(off)
+
+
+def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(tmp_path):
+    all_of_them = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 1.0}})
+    none = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 0.0}})
+    tight = {"integrator": {"check_share": 0.0, "tolerance": 1e-11}}
+    exact = small_study(tmp_path, POLYGONS | tight)
+    place = all_of_them.places[0]
+    for k in range(6):
+        row, plain, tighter = (each.run(*place, k) for each in (all_of_them, none, exact))
+        assert [plain[name] for name in CHECKS] == [NOT_APPLICABLE] * 3
+        assert [row[name] for name in CHECKS] == [
+            tighter[name] for name in ("outcome", "inside", "bond")
+        ]
+        assert {**row, **dict.fromkeys(CHECKS, NOT_APPLICABLE)} == pytest.approx(plain, nan_ok=True)
+        assert tighter["steps"] > plain["steps"]
+
+
+def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
+    study = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 1.0}})
+    whole, plain_run = study.run(*study.places[0], 0), study_module.run_encounter
+
+    def broken(*args, integrator=None, **options):
+        if integrator is not None:
+            raise ValueError("no second run")
+        return plain_run(*args, **options)
+
+    monkeypatch.setattr(study_module, "run_encounter", broken)
+    row, note = run_safely(study, study.places[0], 0)
+    assert note is None
+    assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
+    assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])
+
+
+def test_rows_of_another_share_are_rows_of_another_study(tmp_path):
+    spheres = {"shapes": {"vertices": (1,)}}
+    one, other = (
+        identity_of(small_study(tmp_path, spheres | {"integrator": {"check_share": share}}))
+        for share in ("auto", 0.1)
+    )
+    assert differences(one, other) == ['integrator.check_share is "auto" in the file, 0.1 now']

@@ -1,0 +1,81 @@
+"""The line of centres, where it has no direction."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flocsim import Body, System
+from flocsim.arrays import EQUIVALENT_RADIUS, NOW
+from flocsim.constants import CENTRE_SOFTENING
+from flocsim.forces import VanDerWaals
+from flocsim.integrators.rhs import views
+from flocsim.integrators.rhs.views import soft_centre_line
+from flocsim.io.results.schema import OUTCOMES
+from tests.helpers.fast_scene import FastScene
+from tests.helpers.small_study import small_study
+from tests.helpers.trial_scenes import hook, star
+
+
+@pytest.fixture(scope="module")
+def fast():
+    """A star in the notch of a hook, attracted to its centre."""
+    bodies = [Body(shape, surface_density=2.0) for shape in (star(size=2e-6), hook())]
+    return FastScene(System(bodies, [VanDerWaals()]))
+
+
+def softening(scene):
+    """ε [m] of the two bodies."""
+    return CENTRE_SOFTENING * sum(scene.bodies[:, EQUIVALENT_RADIUS])
+
+
+def attraction(fast, x, y):
+    """Force (2,) on the second body with its centroid there."""
+    fast.work.motion[NOW, 1, :2] = x, y
+    return fast.loads()[1, :2]
+
+
+def test_the_pull_between_centres_fades_out_where_they_meet(fast):
+    epsilon = softening(fast.scene)
+    assert attraction(fast, 0.0, 0.0).tolist() == [0.0, 0.0]
+    far = 1000.0 * epsilon
+    full = math.hypot(*attraction(fast, far, 0.0))
+    # F d_c/d, from nothing to all of it.
+    for share in (1e-6, 0.1, 1.0, 10.0):
+        reach = share / math.sqrt(1.0 + share * share)
+        found = attraction(fast, 0.0, share * epsilon)
+        assert found == pytest.approx([0.0, -reach * full], rel=1e-3, abs=1e-9 * full)
+
+
+def test_the_pull_between_centres_is_the_same_from_all_sides_and_continuous(fast):
+    epsilon = softening(fast.scene)
+    full = math.hypot(*attraction(fast, 1000.0 * epsilon, 0.0))
+    for way in np.linspace(0.0, 2.0 * math.pi, 7):
+        x, y = math.cos(way), math.sin(way)
+        here, there = (attraction(fast, s * epsilon * x, s * epsilon * y) for s in (1e-3, -1e-3))
+        assert np.abs(here - there).max() < 3e-3 * full
+        assert here @ (x, y) < 0.0
+        steps = np.linspace(-3.0, 3.0, 121)
+        pulls = np.array([attraction(fast, s * epsilon * x, s * epsilon * y) for s in steps])
+        assert np.abs(np.diff(pulls, axis=0)).max() < 0.06 * full
+
+
+def test_elsewhere_the_soft_line_of_centres_is_the_line_of_centres(fast):
+    reach = sum(fast.scene.bodies[:, EQUIVALENT_RADIUS])
+    fast.work.motion[NOW, 1, :2] = 0.6 * reach, -0.8 * reach
+    nx, ny, distance = soft_centre_line(fast.scene, fast.work, NOW, 1, 0)
+    assert (nx, ny) == pytest.approx((0.6, -0.8), rel=1e-8)
+    assert distance == pytest.approx(reach, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_no_outcome_hangs_on_the_softening(tmp_path, monkeypatch):
+    scene = {"types": ["I", "II", "III"], "delta": [0.0, 0.3, 0.7]}
+    found = []
+    for factor in (1.0, 10.0, 0.1):
+        monkeypatch.setattr(views, "CENTRE_SOFTENING", factor * CENTRE_SOFTENING)
+        study = small_study(tmp_path, {"scene": scene, "replicates": 10})
+        found.append([OUTCOMES[study.run(place, n, share, k)["outcome"]] for place in range(3)
+                      for n in (4, 16) for share in (0.0, 0.3, 0.7) for k in range(5)])  # fmt: skip
+    assert len(found[0]) == 90 and len(set(found[0])) > 2
+    assert found[0] == found[1] == found[2]

@@ -1,0 +1,100 @@
+"""Scenes that a model with jumps in it gets wrong: energy from nowhere, gaps that change suddenly,
+forces without a value at one place, bodies that count as gone too early."""
+
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+import pytest
+
+from flocsim import Body, SpheroPolygon, System
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.study import Study
+from flocsim.forces import DoubleLayer, Gravity, StokesDrag
+from flocsim.integrators import Implicit, Status
+from flocsim.io.results.schema import BONDS, OUTCOMES
+
+STUDY = """\
+preset = "{}"
+seed = 77
+replicates = 2000
+[shapes]
+vertices = [8, 16, 32, 64]
+"""
+TYPE_I, TYPE_II, TYPE_III = range(3)
+
+
+@cache
+def flocs(preset):
+    """The flocs of the study, grown once."""
+    return tuple(Study(config_of(preset)).flocs)
+
+
+def config_of(preset, **over):
+    """The study's Config with nested overrides."""
+    path = Path(mkdtemp()) / "study.toml"
+    path.write_text(STUDY.format(preset))
+    return load_config(path, over)
+
+
+def replicate(number, place, vertices, delta, preset="tang2014", **over):
+    """(outcome's word, row) of a replicate of the study; ``over`` replaces keys of its config."""
+    study = Study(config_of(preset, **over), flocs=list(flocs(preset)))
+    row = study.run(place, vertices, delta, number)
+    return OUTCOMES[row["outcome"]], row
+
+
+def test_a_hanging_doublet_comes_to_rest():
+    """A displacement handed to a contact point far off would create energy, for ever."""
+    outcome, row = replicate(1256, TYPE_I, 8, 0.477)
+    assert outcome == "A"
+    assert row["steps"] < 500
+
+
+def test_a_floc_in_the_cavity_of_another_comes_to_rest():
+    """Its centre lies at the other's, where the line between them has no direction."""
+    outcome, row = replicate(766, TYPE_II, 8, 0.133)
+    assert outcome in "AC"
+    assert row["bond"] != 0 and BONDS[row["bond"] - 1] != "hook"
+    assert row["steps"] < 1000
+
+
+def test_to_pass_an_arm_is_not_to_have_departed():
+    """It drifts on to a lower arm, whatever the steps are in which it does so."""
+    (implicit, one), (explicit, other) = (
+        replicate(1640, TYPE_I, 8, 0.883, integrator={"name": name})
+        for name in ("implicit", "dormand_prince54")
+    )
+    assert implicit == explicit != "missed"
+    assert one["d_c_collision"] == pytest.approx(other["d_c_collision"], abs=1e-8)
+    assert one["t_collision"] == pytest.approx(other["t_collision"], rel=1e-3)
+
+
+def test_a_floc_of_a_stable_colloid_is_decided():
+    layer = {"double_layer": {"debye_length": 30e-9, "potential": 0.03}}
+    outcome, row = replicate(3, TYPE_III, 32, 0.043, "si", forces=layer)
+    assert outcome in "ABCD" or outcome == "missed"
+    assert row["steps"] < 20_000
+
+
+def test_a_box_that_hovers_over_a_floor_comes_to_rest():
+    """Repulsion holds it up; as it rocks, the closest corner changes from one to the other."""
+    floor = SpheroPolygon([(-2e-4, 0), (2e-4, 0)], 1e-6)
+    box = SpheroPolygon([(-1e-5, -5e-6), (1e-5, -5e-6), (1e-5, 5e-6), (-1e-5, 5e-6)], 1e-6)
+    layer = DoubleLayer(0.2, 0.98e-6, gap="surface")
+    bodies = [
+        Body(floor, fixed=True, surface_density=2.0),
+        Body(box, (0.0, 1e-5), 0.02, density=2650.0),
+    ]
+    run = System(bodies, [Gravity(), StokesDrag(), layer], Implicit()).run(0.5, max_steps=2000)
+    assert run.status is Status.FINISHED
+    # Level, still, and where the repulsion of its lower edge carries its weight.
+    weight = 9.81 * bodies[1].mass
+    floor_radius, box_radius = (each.shape.equivalent_radius for each in bodies)
+    reduced = floor_radius * box_radius / (floor_radius + box_radius)
+    gap = layer.debye_length * np.log(layer.strength * reduced / weight)
+    _, y, angle = run.position[-1, 1]
+    assert np.abs(run.velocity[-1, 1, :2]).max() < 1e-9
+    assert angle == pytest.approx(0.0, abs=1e-4)
+    assert y - 7e-6 == pytest.approx(gap, abs=0.03 * layer.debye_length)
