@@ -23,7 +23,7 @@ from flocsim.forces import (
     SurfaceForce,
     VanDerWaals,
 )
-from flocsim.forces.check import check_kernel, decay_length
+from flocsim.forces.check import check_kernel
 from flocsim.forces.codegen import laws_of
 
 
@@ -283,46 +283,3 @@ def test_what_lies_beyond_a_kernels_arithmetic_is_no_fault_of_its_form():
 @pytest.mark.parametrize("fluid", [Fluid(), Fluid(gradient=(0.0, 1.0, 0.0, 0.0))])
 def test_right_forces_pass(force, fluid):
     check_kernel(force, fluid)
-
-
-COARSE = pytest.mark.xfail(strict=True, reason="gaps are 12 % apart: found up to 28 % too long")
-
-
-@pytest.mark.parametrize(
-    ("force", "expected"),
-    [
-        (DoubleLayer(debye_length=0.98e-6), 0.98e-6),
-        (DoubleLayer(debye_length=3e-9), 3e-9),
-        # |F|/|F'| = d/2, least where the law begins to fall.
-        pytest.param(VanDerWaals(d_min=2e-8), 1e-8, marks=COARSE),
-        pytest.param(VanDerWaals(d_min=1e-6), 5e-7, marks=COARSE),
-    ],
-)
-def test_over_what_length_a_force_changes(force, expected):
-    assert decay_length(force, Fluid()) == pytest.approx(expected, rel=0.1)
-
-
-@attrs.frozen
-class Even(SurfaceForce):
-    """The same at all gaps."""
-
-    @staticmethod
-    def kernel(pair):
-        return 1e-9
-
-
-@attrs.frozen
-class Film(SurfaceForce):
-    """In proportion to the gap's rate, in either direction, and falling with it over 50 nm."""
-
-    @staticmethod
-    def kernel(pair):
-        return -1e-3 * pair.gap_rate * math.exp(-pair.gap / 5e-8)
-
-
-def test_a_force_that_is_the_same_everywhere_has_no_such_length():
-    assert decay_length(Even(), Fluid()) == math.inf
-
-
-def test_a_force_that_hangs_on_the_gaps_rate_has_one():
-    assert decay_length(Film(), Fluid()) == pytest.approx(5e-8, rel=0.1)

@@ -153,7 +153,7 @@ class Case:
         chosen = [self.pairs[name][0] for name in names or self.pairs]
         return fast_system(self.plain, chosen, self.fluid, **self.material)
 
-    def laws(self, *names, smoothing=1e-12):
+    def laws(self, *names, smoothing=plain_forces.SHARP):
         """The reference's laws of the same names; ℓ of the smooth gap of outlines [m]."""
         laws = [self.pairs[name][1] for name in names or self.pairs]
         pairs = plain_forces.PairLaw

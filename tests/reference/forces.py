@@ -88,11 +88,42 @@ class Drag:
         return total
 
 
+SHARP = (1e-12, 0.0, 0.0)
+
+
+def length_at(gap, smoothing):
+    """ℓ at a gap [m]."""
+    shortest, growth, end = smoothing
+    return shortest + growth * min(max(gap, 0.0), end)
+
+
+def measure_of(gap, smoothing):
+    """u(gap) = ∫ dg/ℓ(g) from 0."""
+    shortest, growth, end = smoothing
+    inner = min(gap, end)
+    if gap <= 0.0 or growth == 0.0:
+        return gap / shortest
+    return np.log(1.0 + growth * inner / shortest) / growth + (gap - inner) / length_at(
+        end, smoothing
+    )
+
+
+def gap_of(measure, smoothing):
+    """The gap [m] of that u."""
+    shortest, growth, end = smoothing
+    if measure <= 0.0 or growth == 0.0:
+        return measure * shortest
+    last = measure_of(end, smoothing)
+    inner = shortest / growth * (np.exp(growth * min(measure, last)) - 1.0)
+    return inner + max(measure - last, 0.0) * length_at(end, smoothing)
+
+
 class PairLaw:
     """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d.
 
-    At gaps from `reach` on the force is left out. `smoothing` ℓ [m]: of the soft minimum
-    g̃ = −ℓ ln Σ exp(−g_k/ℓ) over the gaps of all pairs, which is the gap of two outlines.
+    At gaps from `reach` on the force is left out. `smoothing`: (ℓ(0) [m], dℓ/dg, the gap from
+    which on ℓ stays [m]) of the soft minimum u(g̃) = −ln Σ exp(−u(g_k)), du/dg = 1/ℓ, over all pairs, which is the
+    gap of two outlines.
     """
 
     def loads(self, scene):
@@ -119,11 +150,13 @@ class PairLaw:
         """d = soft minimum of the gaps of all pairs k; each takes its share at its own points."""
         every = measure(scene, pairs_of(scene.bodies, i, j))
         gaps = -every.overlap
-        weights = np.exp((gaps.min() - gaps) / self.smoothing)
-        gap = gaps.min() - self.smoothing * np.log(weights.sum())
+        measures = np.array([measure_of(gap, self.smoothing) for gap in gaps])
+        weights = np.exp(measures.min() - measures)
+        gap = gap_of(measures.min() - np.log(weights.sum()), self.smoothing)
         repulsion = self.within_reach(gap, reduced(*radii))
         for k in np.flatnonzero(weights):
-            force = repulsion * weights[k] / weights.sum() * every.normal[k]
+            share = length_at(gap, self.smoothing) / length_at(gaps[k], self.smoothing)
+            force = repulsion * share * weights[k] / weights.sum() * every.normal[k]
             vertex_body, _, edge_body, _ = every.pair[k]
             add_force(total, scene, vertex_body, force, every.point[k])
             add_force(total, scene, edge_body, -force, every.point[k])
@@ -137,7 +170,7 @@ class VanDerWaals(PairLaw):
     d_min: float = 1e-9
     gap: str = "equivalent_spheres"
     reach: float = np.inf
-    smoothing: float = 1e-12
+    smoothing: tuple = SHARP
 
     def repulsion(self, d, reduced_radius):
         return -self.hamaker * reduced_radius / (6 * max(d, self.d_min) ** 2)
@@ -156,7 +189,7 @@ class DoubleLayer(PairLaw):
     permittivity: float = 78.5
     gap: str = "equivalent_spheres"
     reach: float = np.inf
-    smoothing: float = 1e-12
+    smoothing: tuple = SHARP
 
     def repulsion(self, d, reduced_radius):
         permittivity = VACUUM_PERMITTIVITY * self.permittivity

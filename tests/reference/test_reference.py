@@ -84,7 +84,10 @@ def test_elastic_force_is_minus_the_gradient_of_the_energy(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_surface_attraction_is_minus_the_gradient_of_its_potential(seed):
-    scene, law = scene_of(seed), VanDerWaals(1e-18, d_min=2e-6, gap="surface", smoothing=1e-8)
+    scene, law = (
+        scene_of(seed),
+        VanDerWaals(1e-18, d_min=2e-6, gap="surface", smoothing=(1e-8, 0.0, 0.0)),
+    )
 
     def potential(moved):
         """∫ of eq. 5 with its cut-off: F d up to d_min, 1/d beyond."""
