@@ -50,13 +50,14 @@ SLIP_ROWS = KEPT_SLIP + 1
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
-    RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, FRAMES,
-) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14  # fmt: skip
+    RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
+    FRAMES,
+) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s], and what all steps' errors have led to; its frames at the stages of an implicit
-step."""
+of velocity [m/s]; what all steps' errors, and those of switches, have led to; its frames at the
+stages of an implicit step."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
@@ -117,15 +118,17 @@ more than the displacements set aside for a list that found no room (0: none are
     REJECTED_RATIO,
     SETTLING,
     SETTLED_STEP,
+    ESTIMATE_SHARE,
     CLOCK_SIZE,
-) = range(18)
+) = range(19)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
 error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
 the step whose stages are still there (0: none are) and the time at which it began; the largest
 step that is expected to work at all; the error of the step just taken [m]; size and error over
 tolerance of the trial that was just rejected (0: none was); 1 from a switch until a step has been
-taken behind it; the size of the last such step."""
+taken behind it; the size of the last such step; the share of what the method estimates for its
+steps that counts in the stated error."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, COUNTS_SIZE = range(8)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
@@ -207,7 +210,7 @@ class Work(NamedTuple):
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
     ``slip`` (19, capacity): tangential displacements in the states, their rates there, and those
     set aside while the list is made anew.
-    ``bodies`` (n, 29): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    ``bodies`` (n, 31): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
     ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:
     factorised systems, then the load.  ``pivots`` (2, 3n): which rows have changed places.

@@ -13,6 +13,7 @@ from flocsim.arrays import (
     BEARABLE_STEP,
     CLOCK_SIZE,
     COUNTS_SIZE,
+    ESTIMATE_SHARE,
     LARGEST_STEP,
     MAX_STEPS,
     PAUSE_AT,
@@ -77,12 +78,14 @@ class Integrator(ABC):
     ``next_step(clock, step, ratio)`` is the size of the step after one with that ratio.
     ``replaces`` {hook: function} are other functions of the engine that it stands in for.
     ``tolerance`` [m] and ``first_step`` [s] are read by the driver; a fixed-step method has an
-    infinite tolerance.
+    infinite tolerance. ``estimate_share``: the share of the errors that it estimates for its steps
+    that counts in the stated error, far below 1 where the estimate is of a much lower order.
     """
 
     tolerance = math.inf
     first_step = 1e-6
     largest_step = math.inf
+    estimate_share = 1.0
 
     @staticmethod
     @abstractmethod
@@ -113,6 +116,7 @@ class Integrator(ABC):
         clock[STEP] = self.first_step
         clock[TOLERANCE] = self.tolerance
         clock[LARGEST_STEP] = self.largest_step
+        clock[ESTIMATE_SHARE] = self.estimate_share
         clock[PREVIOUS_STEP] = math.inf
         clock[BEARABLE_STEP] = math.inf
         clock[SETTLED_STEP] = math.inf

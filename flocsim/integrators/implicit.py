@@ -94,6 +94,8 @@ class Implicit(Integrator):
     Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), section IV.8.
     """
 
+    estimate_share = 0.5
+
     tolerance: float = quantity("m", above=0.0, default=1e-9)
     first_step: float = quantity("s", above=0.0, default=1e-6)
 

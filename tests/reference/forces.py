@@ -122,8 +122,8 @@ class PairLaw:
     """A repulsion F(d, r*) between every two bodies, by one of the two meanings of the gap d.
 
     At gaps from `reach` on the force is left out. `smoothing`: (ℓ(0) [m], dℓ/dg, the gap from
-    which on ℓ stays [m]) of the soft minimum u(g̃) = −ln Σ exp(−u(g_k)), du/dg = 1/ℓ, over all pairs, which is the
-    gap of two outlines.
+    which on ℓ stays [m]) of the soft minimum u(g̃) = −ln Σ exp(−u(g_k)), du/dg = 1/ℓ, over all
+    pairs, which is the gap of two outlines.
     """
 
     def loads(self, scene):

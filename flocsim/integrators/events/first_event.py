@@ -52,6 +52,14 @@ def resolution_of(work, clock):
     return max(resolution, ROUNDING * furthest_place(work, NEW))
 
 
+def depth_of(work, clock):
+    """How far a pair may be behind its switch without being told from one before it [m]."""
+    resolution = resolution_of(work, clock)
+    if deepest_overlap(work) > 0.0:
+        return resolution
+    return max(resolution, min(SHALLOWEST_TOUCH, clock[TOLERANCE]))
+
+
 def event_share(scene, work, row, which):
     """The share of the step at which one contact passes one of its kinks, by linear interpolation;
     2.0 where it does not, or is as good as there at either end."""
@@ -94,9 +102,7 @@ def switch_share(scene, work, observed, clock, step):
     Expects the geometry of all pairs in NEW.
     """
     if clock[TOLERANCE] < math.inf or awaits_touch(observed):
-        resolution = resolution_of(work, clock)
-        shallowest = min(SHALLOWEST_TOUCH, clock[TOLERANCE])
-        depth = resolution if deepest_overlap(work) > 0.0 else max(resolution, shallowest)
+        resolution, depth = resolution_of(work, clock), depth_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)
         if share > 1.0:
             share = law_event_share(scene, work, share)

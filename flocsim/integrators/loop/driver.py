@@ -31,10 +31,10 @@ from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, observe
-from flocsim.integrators.events.first_event import switch_share
+from flocsim.integrators.events.first_event import depth_of, switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, plan, reject
-from flocsim.integrators.rhs.stated_error import add_late_switches, carry_errors
+from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
 
@@ -80,7 +80,7 @@ def accept(scene, work, clock, counts, step, lists):
     if not lists:
         return SAME
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
-        add_late_switches(scene, work, step)
+        add_switch_errors(scene, work, step, depth_of(work, clock))
     hand_over(scene, work)
     return set_modes(scene, work)
 
