@@ -25,6 +25,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 WINDOWS = os.name == "nt"
 PROBE = "import pip, sys; sys.exit(sys.version_info < (3, 11))"
 UNFINISHED = "unfinished"
+MOST_WORKERS = 8  # many tests start ranks of their own
 
 
 def stop(code, text):
@@ -103,6 +104,12 @@ def demo():
     return code
 
 
+def all_cores():
+    """Arguments with which pytest spreads the whole suite over the cores of this machine."""
+    cores = min(os.cpu_count() or 1, MOST_WORKERS)
+    return ["-n", str(cores), "--dist", "worksteal"] if cores > 1 else []
+
+
 def main(arguments):
     """Do what the command line asks for and return the exit code."""
     command, rest = "".join(arguments[:1]), arguments[1:]
@@ -114,7 +121,7 @@ def main(arguments):
     if command == "demo":
         return demo()
     install("mpi", "test", "dev")
-    return call(tool("python"), "-m", "pytest", *rest) if command == "test" else 0
+    return call(tool("python"), "-m", "pytest", *(rest or all_cores())) if command == "test" else 0
 
 
 if __name__ == "__main__":

@@ -132,6 +132,15 @@ def test_pytest_gets_its_arguments_and_gives_the_exit_code(stage):
     assert code == 5 and commands[-1] == ".venv/bin/python -m pytest -k wall -x"
 
 
+@pytest.mark.parametrize(
+    ("cores", "arguments"),
+    [(None, ""), (1, ""), (2, " -n 2 --dist worksteal"), (64, " -n 8 --dist worksteal")],
+)
+def test_the_whole_suite_runs_on_all_cores(stage, monkeypatch, cores, arguments):
+    monkeypatch.setattr(stage.run_py.os, "cpu_count", lambda: cores)
+    assert stage.run("test")[0][-1] == f".venv/bin/python -m pytest{arguments}"
+
+
 def test_install_is_repeated_only_when_something_new_is_needed(stage):
     def installs(command):
         return [line for line in stage.run(command)[0] if "pip install" in line]

@@ -210,7 +210,7 @@ def test_the_numba_in_use_is_one_that_the_suite_has_passed_with():
 
     text = Path(flocsim.__file__).parents[1].joinpath("pyproject.toml").read_text("utf-8")
     (stated,) = (d for d in tomllib.loads(text)["project"]["dependencies"] if "numba" in d)
-    low, high = re.fullmatch(r"numba>=(\d+\.\d+),<(\d+\.\d+)", stated).groups()
-    number = [int(part) for part in numba.__version__.split(".")[:2]]
+    low, high = re.fullmatch(r"numba>=([\d.]+),<([\d.]+)", stated).groups()
+    number = [int(part) for part in numba.__version__.split(".")[:3]]
     assert [int(x) for x in low.split(".")] <= number < [int(x) for x in high.split(".")]
     assert sys.version_info >= (3, 11)
