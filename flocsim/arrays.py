@@ -154,7 +154,7 @@ class BodyView(NamedTuple):
 class PairView(NamedTuple):
     """Two bodies, as a CentreForce or SurfaceForce kernel sees them.
 
-    ``gap`` [m] is d_c − r_i − r_j for a CentreForce, the distance between the outlines for a
+    ``gap`` [m] is d_c − r_i − r_j for a CentreForce, the smooth distance between the outlines for a
     SurfaceForce; ``gap_rate`` [m/s] its rate of change; radii are equivalent radii.
     """
 

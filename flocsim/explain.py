@@ -32,7 +32,7 @@ SPEEDS = {"vx", "vy", "spin"}
 
 LAWLESS = (
     ("centre_force", "forces along lines of centres", "none is given"),
-    ("surface_force", "forces at closest points", "none is given, no closest pair is sought"),
+    ("surface_force", "forces between outlines", "none is given, no gap is sought"),
     ("slip_limit", "sliding", "no contact force limits its slip"),
     ("contact_event", "search for kinks of the contact law", "it has none with these parameters"),
 )
@@ -108,7 +108,7 @@ def about(system, force, implicit):
         derivative = "derivatives from differences of its kernel"
     else:
         centres = force.acts_on == "centres"
-        place = "along the line of centres" if centres else "at the closest points"
+        place = "along the line of centres" if centres else "between the outlines"
         parts = [f"{place}, {reach_words(system, force)}"]
         derivative = pair_derivative(system, force)
     return [*parts, derivative] if implicit else parts
@@ -179,7 +179,7 @@ def machinery_lines(system):
 
 def search_line(system, touching):
     if not touching:
-        return "out: contact search: no force acts at contacts or closest points"
+        return "out: contact search: no force acts at contacts or between outlines"
     far = [gap_between(a, b, "bounding_radius") for a, b in combinations(system.bodies, 2)]
     if not far:
         return "out: contact search: a single body has no partner"

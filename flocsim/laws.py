@@ -74,7 +74,7 @@ def centre_derivatives(scene, view):
 
 @hook
 def surface_force(scene, view):
-    """Repulsion at the closest points of a PairView [N], all surface forces together."""
+    """Repulsion between the outlines of a PairView [N], all surface forces together."""
     return scene.laws[SURFACE_FORCE](view, scene.parameters)
 
 

@@ -49,7 +49,7 @@ def test_where_forces_act_and_whence_their_derivatives():
     assert gravity.endswith("constant, nothing to differentiate")
     assert drag.endswith("derivative by velocity from differences of its kernel")
     assert "line of centres" in attraction and attraction.endswith("by the gap analytic")
-    assert "closest points" in film and film.endswith("by the gap's rate from differences")
+    assert "between the outlines" in film and film.endswith("by the gap's rate from differences")
     assert trap.endswith("derivative by place from differences of its kernel")
 
 
@@ -64,7 +64,7 @@ def test_a_force_out_of_range_is_named(distance, out):
 def test_laws_that_a_scene_has_not_are_said_to_be_out():
     names = {
         "centre_force": "forces along lines of centres",
-        "surface_force": "forces at closest points",
+        "surface_force": "forces between outlines",
         "position_derivatives": "derivative by the place",
         "velocity_derivatives": "derivative by the velocity",
     }

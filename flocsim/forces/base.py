@@ -52,7 +52,7 @@ class PairForce(Force):
 
     @property
     def acts_on(self) -> str:
-        """ "centres" (along the line of centres) or "surfaces" (at the closest points)."""
+        """ "centres" (along the line of centres) or "surfaces" (between the outlines)."""
         raise NotImplementedError("subclass CentreForce or SurfaceForce")
 
     @property
@@ -73,7 +73,7 @@ class CentreForce(PairForce):
 
 @attrs.frozen
 class SurfaceForce(PairForce):
-    """A PairForce at the closest points of the two outlines, of the gap between them."""
+    """A PairForce between the two outlines, of the smooth gap between them (surface_gap.py)."""
 
     @property
     def acts_on(self) -> str:

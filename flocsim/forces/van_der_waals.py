@@ -16,7 +16,7 @@ class VanDerWaals(PairForce):
 
     Parameters: ``hamaker`` H_A [J]; ``d_min`` [m], below which the diverging law is cut off;
     ``gap``: d = d_c − r_i − r_j ("equivalent_spheres", along the line of centres) or the distance
-    of the outlines ("surface", at the closest points).  Source: Tang et al. (2014), eq. 5.
+    of the outlines ("surface", at all nearly closest points).  Source: Tang et al. (2014), eq. 5.
     """
 
     hamaker: float = quantity("J", at_least=0.0, default=1e-18)

@@ -37,7 +37,7 @@ REPLICATES = {  # name: (dtype, units, long name)
     "t_end": ("f8", "s", "time of the decision"),
     "steps": ("i8", "1", "accepted integrator steps"),
     "rejected": ("i8", "1", "rejected integrator steps"),
-    "error": ("f8", "m", "sum of the estimated position errors"),
+    "error": ("f8", "m", "stated error of position at the end"),
     "failure": ("u1", "1", "reason of an undecided or failed outcome"),
     "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
     "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
