@@ -8,11 +8,11 @@ from tempfile import mkdtemp
 import numpy as np
 import pytest
 
-from flocsim import Body, SpheroPolygon, System
+from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
-from flocsim.forces import DoubleLayer, Gravity, StokesDrag
-from flocsim.integrators import Implicit, Status
+from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag
+from flocsim.integrators import DormandPrince54, Implicit, Status
 from flocsim.io.results.schema import BONDS, OUTCOMES
 
 STUDY = """\
@@ -98,3 +98,62 @@ def test_a_box_that_hovers_over_a_floor_comes_to_rest():
     assert np.abs(run.velocity[-1, 1, :2]).max() < 1e-9
     assert angle == pytest.approx(0.0, abs=1e-4)
     assert y - 7e-6 == pytest.approx(gap, abs=0.03 * layer.debye_length)
+
+
+def sliding_box(tolerance):
+    """The run of a box that slides on a floor with friction 0.3 until it stops."""
+    floor = SpheroPolygon([(-2e-4, 0), (2e-4, 0)], 1e-6)
+    box = SpheroPolygon([(-1e-5, -1e-6), (1e-5, -1e-6), (1e-5, 1e-6), (-1e-5, 1e-6)], 1e-6)
+    rest = 3e-6 - 2 * box.area * 9.81 / 40
+    bodies = [
+        Body(floor, fixed=True, surface_density=2.0),
+        Body(box, (0.0, rest), velocity=(1e-2, 0.0), surface_density=2.0),
+    ]
+    contact = Contact(k_t=10.0, friction=0.3)
+    return System(bodies, [Gravity(), contact], Implicit(tolerance)).run(0.01)
+
+
+def test_friction_converges_with_the_tolerance():
+    """It stops where v²/2µg says, but for what the springs give."""
+    way, given = 1e-4 / (2 * 0.3 * 9.81), 1e-10
+    runs = [sliding_box(tolerance) for tolerance in (1e-8, 1e-10, 1e-12)]
+    ends = [run.position[-1, 1, 0] for run in runs]
+    assert ends[-1] == pytest.approx(way, abs=given)
+    assert [abs(end - ends[-1]) <= run.error for end, run in zip(ends, runs, strict=True)][:2] == [
+        True, True,
+    ]  # fmt: skip
+    assert np.abs(runs[-1].velocity[-1, 1]).max() < 1e-9
+
+
+def test_a_contact_that_sticks_and_slides_is_decided():
+    """No step shrinks to nothing where friction is just as large as it can be."""
+    contact = {"contact": {"friction": 0.3}}
+    outcome, row = replicate(70, TYPE_III, 32, 0.062, forces=contact)
+    assert outcome in "ABCD"
+    assert row["steps"] + row["rejected"] < 10_000
+
+
+def test_the_stated_error_covers_a_lift_off():
+    """A doublet rolls apart while its contact opens and closes by less than an atom."""
+    rows = [
+        replicate(51, TYPE_III, 32, 0.654, integrator={"tolerance": tolerance})[1]
+        for tolerance in (1e-8, 1e-9, 1e-12)
+    ]
+    times = [row["t_end"] for row in rows]
+    drift = 1.2e-3
+    for row, time in zip(rows[:2], times[:2], strict=True):
+        assert drift * abs(time - times[-1]) <= row["error"]
+
+
+@pytest.mark.parametrize("method", [Implicit, DormandPrince54])
+def test_the_stated_error_covers_a_flight_without_drag(method):
+    """What a bounce does to a velocity goes on for ten seconds."""
+    floor = SpheroPolygon([(-2e-4, 0), (2e-4, 0)], 1e-6)
+    bodies = [
+        Body(floor, fixed=True, surface_density=2.0),
+        Body(Sphere(5e-6), (0.0, 7e-6), velocity=(0.0, -1e-2), surface_density=2.0),
+    ]
+    contact_time = np.pi / np.sqrt(20 / bodies[1].mass)
+    run = System(bodies, [Contact(damping_n=0.0)], method()).run(1e-4 + contact_time + 10.0)
+    error = abs(run.position[-1, 1, 1] - 6e-6 - 0.1)
+    assert 0.0 < error <= run.error < 1e4 * error

@@ -31,6 +31,7 @@ from flocsim.arrays import (
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
+    ContactView,
 )
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
@@ -54,6 +55,7 @@ from flocsim.laws import (
     centre_derivatives,
     centre_force,
     contact_derivatives,
+    contact_force,
     has,
     position_derivatives,
     surface_derivatives,
@@ -144,17 +146,34 @@ def add_turning(scene, work, row, normal, tangential):
         stiffness[STIFFNESS, 3 * b + ANGLE, 3 * b + ANGLE] -= torque_b
 
 
+def sliding_slopes(scene, work, row, normal, tangential):
+    """Derivatives of (normal, tangential) by the overlap of a contact that slides, ξ along."""
+    view = contact_view(scene, work, NOW, row)
+    by = 1e-3 * abs(view.overlap) + 1e-13
+    more = work.candidates[row, SLIDING] * limit_slope(scene, work, NOW, row) * by
+    deeper = ContactView(
+        view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate,
+        view.effective_mass, view.radius_i, view.radius_j,
+    )  # fmt: skip
+    more_normal, more_tangential = contact_force(scene, deeper)
+    return (more_normal - normal) / by, (more_tangential - tangential) / by
+
+
 def add_contact(scene, work, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    side = work.candidates[row, SLIDING]
-    for axis in range(4):
+    normal_slope, tangential_slope = found[2], found[3]
+    if work.candidates[row, SLIDING] != 0:
+        normal_slope, tangential_slope = sliding_slopes(scene, work, row, found[0], found[1])
+    add_product(work, STIFFNESS, a, b, along, along, normal_slope)
+    add_product(work, STIFFNESS, a, b, across, along, tangential_slope)
+    for axis in range(1, 4):
+        # Sliding, ξ goes with the overlap alone.
+        if axis == 2 and work.candidates[row, SLIDING] != 0:
+            continue
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
-        if axis == 2 and side != 0:
-            # Sliding, ξ goes with the overlap.
-            sign, by = side * limit_slope(scene, work, NOW, row), along
         which = STIFFNESS if axis % 2 == 0 else DAMPING
         add_product(work, which, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(work, which, a, b, across, by, sign * found[3 + 2 * axis])
