@@ -169,7 +169,7 @@ def verdict(folder, racers, before, references):
     for racer in racers:
         errors = racer.errors.read_text()
         if abs(racer.process.returncode) == signal.SIGTERM and not errors:
-            continue  # ended before it could promise anything: on a busy machine Python was starting
+            continue  # Python was still starting, and nothing had been promised
         if racer.process.returncode not in CODES:
             return f"{racer.name}: exit code {racer.process.returncode}: {errors[-300:]}"
         if "Traceback" in errors or "internal error" in errors:
