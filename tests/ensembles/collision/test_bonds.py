@@ -50,7 +50,7 @@ class Doublet:
         self.work.motion[NOW, :, :3], self.work.motion[NOW, :, 3:] = places, 0.0
         assert list_candidates(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
-        set_modes(self.work)
+        set_modes(self.scene, self.work)
 
     def move(self, vx=0.0, vy=0.0, spin=0.0):
         """Let the second body move so against the first."""

@@ -279,7 +279,7 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     work.motion[NOW, 1, 3] = spin * reach
     later = 2.0 * observed[numbers.REST_TIME]
     bonds.start_rest(work, observed, 0.0)
-    assert not bonds.has_rested(encounter.scene, work, observed, later, 0.0, -1.0, 1.0)
+    assert not bonds.has_rested(encounter.scene, work, observed, later, -1e-12, 0.0, -1.0, 1.0)
     # Without the swing it does.
     work.motion[NOW, :, 3:] = 0.0
-    assert bonds.has_rested(encounter.scene, work, observed, later, 0.0, -1.0, 1.0)
+    assert bonds.has_rested(encounter.scene, work, observed, later, -1e-12, 0.0, -1.0, 1.0)
