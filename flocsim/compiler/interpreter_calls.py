@@ -7,9 +7,10 @@ the process hangs with all of its threads, deaf to signals.
 
 import builtins
 import dis
+import functools
 import sys
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from flocsim.compiler.reads import reached, where
@@ -21,26 +22,30 @@ OBJECT_MODE = "objmode"
 
 def interpreter_call(function: types.FunctionType) -> tuple[str, int] | None:
     """(name, line) of the first call of Python in a function's own code; None without one."""
-    known = {**vars(builtins), **function.__globals__}
+    known = function.__globals__
     numba = sys.modules.get("numba")  # where it is not loaded, nothing of it can be called
     forbidden = [print, getattr(numba, OBJECT_MODE, print)]
-    for instruction, line in instructions(function.__code__):
-        name = instruction.argval
-        if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-            if any(known.get(name) is each for each in forbidden):
-                return name, line
-        elif instruction.opname in ("LOAD_ATTR", "LOAD_METHOD") and name == OBJECT_MODE:
+    for name, line, is_attribute in names_loaded(function.__code__):
+        value = known.get(name, getattr(builtins, name, None))
+        if name == OBJECT_MODE if is_attribute else any(value is each for each in forbidden):
             return name, line
     return None
 
 
-def instructions(code: types.CodeType) -> Iterator[tuple[dis.Instruction, int]]:
-    """(instruction, line) of a code and the codes in it."""
+@functools.lru_cache(maxsize=4096)
+def names_loaded(code: types.CodeType) -> tuple[tuple[str, int, bool], ...]:
+    """(name, line, whether of an attribute) of every global and attribute that a code, and the
+    codes in it, load; kept, for disassembly takes longer than a short run."""
+    found = []
     for each in dis.get_instructions(code):
-        yield each, (each.positions.lineno if each.positions else None) or code.co_firstlineno
+        is_attribute = each.opname in ("LOAD_ATTR", "LOAD_METHOD")
+        if is_attribute or each.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            line = (each.positions.lineno if each.positions else None) or code.co_firstlineno
+            found.append((each.argval, line, is_attribute))
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from instructions(constant)
+            found += names_loaded(constant)
+    return tuple(found)
 
 
 def refuse_interpreter(entry: Any, fillings: Mapping[Callable, Callable] | None = None) -> None:

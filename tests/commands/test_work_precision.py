@@ -26,9 +26,10 @@ def rows_of(text):
 
 
 def test_errors_fall_with_the_tolerance(few, capsys):
-    assert main(["work-precision", "small.toml", "--type", "III", "--vertices", "4"]) == 0
+    command = "work-precision small.toml --type III --vertices 4 --replicate 2"
+    assert main(command.split()) == 0
     text = capsys.readouterr().out
-    assert text.startswith("type III, N = 4, delta = 0, replicate 0: A after ")
+    assert text.startswith("type III, N = 4, delta = 0, replicate 2: A after ")
     rows = rows_of(text)
     assert float(rows["Implicit", "1e-08"][0]) < 1e-7
     assert float(rows["Implicit", "1e-10"][0]) < 1e-9
