@@ -9,7 +9,7 @@ Whatever a rank could not do, having no such file, rank 0 does itself.
 
 import os
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -119,13 +119,16 @@ class Review(Order):
 
     def work(self, study: Any, comm: Communicator) -> Answer:
         with self.place.opened() as file:
-            wrong = [
-                block for block, found in self.digests.items() if not file.is_whole(block, found)
-            ]
+            wrong = wrong_blocks(file, self.digests)
             sums: Sums = {}
             if self.counted[0] < self.counted[1]:
                 sums = counted_in(file, self.place.shape, self.counted, self.codes)
         return Answer(sums=sums, wrong=tuple(wrong))
+
+
+def wrong_blocks(file: RowFile, digests: Digests) -> list[int]:
+    """The blocks that do not stand in a file as they were written."""
+    return [block for block, found in digests.items() if not file.is_whole(block, found)]
 
 
 def is_called(comm: Communicator) -> Callable[[], bool]:
@@ -298,7 +301,7 @@ class Assembly:
         reread = self.blocks_to_read() if len(self.hosts) > 1 and together else {}
         for rank in range(1, ranks):
             part = parts[rank] if rank < len(parts) else (0, 0)
-            digests = {block: self.digests[block] for block in reread.get(rank, ())}
+            digests = self.written(reread.get(rank, ()))
             if digests or part != (0, 0):
                 codes = self.codes_of(part) if part != (0, 0) else {}
                 orders[rank] = Review(self.place, digests, part, codes)
@@ -308,10 +311,7 @@ class Assembly:
         def own() -> None:
             if reread:
                 with self.place.opened() as seen:
-                    wrong.update(
-                        block for block in reread[0]
-                        if not seen.is_whole(block, self.digests[block])
-                    )  # fmt: skip
+                    wrong.update(wrong_blocks(seen, self.written(reread[0])))
             sums.append(self.count_here(parts[0]))
 
         answers = self.ask(orders, own)
@@ -328,6 +328,10 @@ class Assembly:
         for each in sums:
             total = added(total, each)
         return total
+
+    def written(self, blocks: Iterable[int]) -> Digests:
+        """The digests of some blocks."""
+        return {block: self.digests[block] for block in blocks}
 
     def blocks_to_read(self):
         """{rank: blocks to read}, none of which it has written itself; from elsewhere, if it can
