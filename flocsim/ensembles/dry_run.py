@@ -54,7 +54,12 @@ def checked_words(config):
 def dry_run(config: Config, ranks: int) -> str:
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
-    flocs += f", spheroradius {1e6 * shapes.radius:.4g} um" if shapes.own is None else ""
+    if shapes.size == "own":
+        flocs += ", at the sizes and spheroradii that were measured"
+    elif shapes.own is None:
+        flocs += f", spheroradius {1e6 * shapes.radius:.4g} um"
+    if shapes.pairs_alike_in == "error":
+        flocs += ", the receiver with the N whose RE is nearest to that of the approaching floc"
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"
     count = len(scene.conditions) * len(shapes.vertices) * len(scene.delta)
     lines = [

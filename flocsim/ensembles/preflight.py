@@ -36,8 +36,8 @@ def check_study(config: Config) -> None:
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
     least = min(min(radii) for _, *radii in config.scene.conditions)
-    polygons = max(config.shapes.vertices) > 1 and config.shapes.own is None
-    if polygons and config.shapes.radius >= least:
+    resized = config.shapes.own is None and config.shapes.size == "scene"
+    if resized and max(config.shapes.vertices) > 1 and config.shapes.radius >= least:
         raise ConfigError(
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"

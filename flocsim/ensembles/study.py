@@ -20,6 +20,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import NOT_APPLICABLE
 
@@ -28,16 +29,17 @@ CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
 
 
 def flocs_of(config: Config) -> list[Floc]:
-    """The flocs that a config's study needs: none for spheres alone."""
-    polygons = any(n > 1 for n in config.shapes.vertices)
-    return load_flocs(config.shapes, config.seed) if polygons else []
+    """The flocs that a config's study needs: none for spheres alone, unless of measured sizes."""
+    needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
+    return load_flocs(config.shapes, config.seed) if needed else []
 
 
 @attrs.define(eq=False)
 class Study:
     """Every replicate of a config. All that is random follows from (seed, replicate).
 
-    ``flocs`` are grown or read unless given; ``zones`` has D_0 [m] of every collision type.
+    ``flocs`` are grown or read unless given; ``zones`` has D_0 [m] of every collision type (flocs
+    of measured sizes have their own).
     """
 
     config: Config
@@ -57,7 +59,11 @@ class Study:
             name: zone_distance(config.zone, config.forces, radius_i, radius_j)
             for name, radius_i, radius_j in config.scene.conditions
         }
-        self.floc_pool = FlocPool(self.flocs, config.shapes.radius, config.shapes.pool)
+        shapes = config.shapes
+        self.floc_pool = FlocPool(
+            self.flocs, shapes.radius, shapes.pool, shapes.size == "own",
+            shapes.pairs_alike_in == "error",
+        )  # fmt: skip
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -74,7 +80,7 @@ class Study:
         self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
     ) -> tuple[int, int]:
         """Places of the flocs of i and j that a replicate's random numbers choose."""
-        if vertices == 1:
+        if vertices == 1 and not self.floc_pool.own_size:
             return NO_FLOC, NO_FLOC
         _, radius_i, radius_j = self.config.scene.conditions[condition]
         return self.floc_pool.choose(numbers, radius_i, radius_j)
@@ -86,12 +92,20 @@ class Study:
         flocs = self.choose_flocs(condition, vertices, numbers)
         key = (name, vertices, *flocs)
         if key not in self.encounters:
+            counts = self.floc_pool.vertices_of(*flocs, vertices)
             shapes = [
-                self.floc_pool.shape(floc, vertices, radius)
-                for floc, radius in zip(flocs, radii, strict=True)
+                self.floc_pool.shape(floc, count, radius)
+                for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
-            self.encounters[key] = make_encounter(self.config, shapes, self.zones[name])
+            self.encounters[key] = make_encounter(self.config, shapes, self.zone(name, shapes))
         return self.encounters[key]
+
+    def zone(self, name: str, shapes: Sequence[Shape]) -> float:
+        """D_0 [m] of two shapes of a collision type."""
+        if not self.floc_pool.own_size:
+            return self.zones[name]
+        radii = (shape.equivalent_radius for shape in shapes)
+        return zone_distance(self.config.zone, self.config.forces, *radii)
 
     def driver(self, encounter: Encounter) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons."""

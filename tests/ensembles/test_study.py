@@ -5,10 +5,11 @@ import pytest
 
 from flocsim import run
 from flocsim.ensembles.collision.start import draws
+from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.io.results.schema import REPLICATES
-from tests.helpers.small_study import small_config, small_study
+from tests.helpers.small_study import small_config, small_study, write_star_library
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +82,48 @@ def test_spheres_alone_need_no_flocs(tmp_path):
 def test_no_zone_no_study(tmp_path):
     with pytest.raises(ZoneError):
         small_study(tmp_path, {"forces": {"double_layer": {"potential": "1 mV"}}})
+
+
+def star_study(tmp_path, **shapes):
+    """A study of the flocs of a library, three stars of 8, 16 and 24 um."""
+    if not (tmp_path / "stars.h5").exists():
+        write_star_library(tmp_path / "stars.h5", vertices=(4, 8))
+    given = {"source": "library", "file": "stars.h5", "vertices": [1, 4], "pool": 3}
+    return Study(small_config(tmp_path, {"shapes": given | shapes}))
+
+
+def test_measured_flocs_meet_at_their_own_size_and_in_their_own_zone(tmp_path):
+    study = star_study(tmp_path, size="own")
+    layer = study.zones["I"] - 39.43e-6
+    for vertices in (1, 4):
+        for replicate in range(20):
+            numbers = draws(1, replicate)
+            places = study.choose_flocs(0, vertices, numbers)
+            encounter = study.encounter(0, vertices, numbers)
+            sizes = [shape.equivalent_radius for shape in encounter.shapes]
+            assert sizes[0] < sizes[1]
+            assert encounter.zone_distance - sum(sizes) == pytest.approx(layer, rel=1e-9)
+            if vertices == 1:
+                assert sizes == pytest.approx([study.flocs[place].size for place in places])
+    row = study.run(0, 1, 0.0, 0)
+    assert (row["floc_i"], row["floc_j"]) == study.choose_flocs(0, 1, draws(1, 0))
+
+
+def test_pairs_alike_in_their_error_meet_with_different_vertices(tmp_path):
+    study = star_study(tmp_path, pairs_alike_in="error")
+    numbers = draws(1, 0)
+    first, second = study.choose_flocs(0, 4, numbers)
+    study.flocs[first].errors.update({4: 9.0, 8: 5.0})
+    study.flocs[second].errors.update({4: 5.5, 8: 2.0})
+    counts = [len(shape.vertices) for shape in study.encounter(0, 4, numbers).shapes]
+    assert counts == [8, 4]
+
+
+def test_how_flocs_are_read_is_part_of_a_studys_identity(tmp_path):
+    plain, own, alike = (
+        identity_of(star_study(tmp_path, **more))
+        for more in ({}, {"size": "own"}, {"pairs_alike_in": "error"})
+    )
+    assert plain != own and plain != alike
+    assert {"flocs.size"} <= own.keys() - plain.keys()
+    assert {"flocs.8"} <= alike.keys() - plain.keys()

@@ -1,5 +1,6 @@
 """The flocs of a study: grown by flocsim, read from a shape library, or of a class of the user's
-own; resized to the scene."""
+own; resized to the scene or as they
+were measured."""
 
 import math
 from collections.abc import Sequence
@@ -23,12 +24,16 @@ SYNTHETIC_RATIO = 16.0
 class Floc:
     """One floc at several numbers of vertices: ``shapes`` {N: Shape}, in a unit of its own.
 
-    ``own`` where the shape is the user's: it keeps its form at any size, its radius grows with it.
+    ``ratio`` is r_eq/r, ``errors`` {N: RE [%]} of the fits. ``size``: the measured r_eq [m], for
+    which the shapes are in metres; None where nothing was measured. ``own`` where the shape is the
+    user's: it keeps its form at any size, its radius grows with it.
     """
 
     name: str
     ratio: float
     shapes: dict[int, Shape]
+    errors: dict[int, float] = attrs.Factory(dict)
+    size: float | None = None
     own: bool = False
 
     def resized(self, vertices: int, equivalent_radius: float, radius: float) -> Shape:
@@ -43,12 +48,17 @@ def grow_floc(shapes, seed, index):
     """One synthetic floc, fitted at all the numbers of vertices that the config asks for."""
     mask = synthetic_floc((seed, index), shapes.primary_particles, shapes.fractal_dimension)
     radius = EQUIVALENT_PIXELS / SYNTHETIC_RATIO
-    fits = {n: fit_mask(mask, vertices=n, radius=radius).shape for n in shapes.vertices if n > 1}
-    return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, fits)
+    fits = {n: fit_mask(mask, vertices=n, radius=radius) for n in shapes.vertices if n > 1}
+    errors = {n: fit.relative_error for n, fit in fits.items()}
+    shapes_of_fits = {n: fit.shape for n, fit in fits.items()}
+    return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, shapes_of_fits, errors)
 
 
 def read_flocs(shapes: ShapesConfig) -> list[Floc]:
-    """The flocs of a shape library; ConfigError where it lacks a wanted number of vertices."""
+    """The flocs of a shape library; ConfigError where it lacks a wanted number of vertices.
+
+    Where pairs are alike in their error, at every number of vertices that the library has.
+    """
     from flocsim.io.shapes.library import read_library
 
     wanted = [n for n in shapes.vertices if n > 1]
@@ -62,8 +72,21 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
                 f"{', '.join(map(str, sorted(entry.fits)))}: fit again with `flocsim fit "
                 f"--vertices …`, or change shapes.vertices"
             )
-        ratio = entry.equivalent_radius / entry.spheroradius
-        flocs.append(Floc(entry.floc_id, ratio, {n: entry.fits[n].shape for n in wanted}))
+        kept = [n for n in entry.fits if n > 1] if shapes.pairs_alike_in == "error" else wanted
+        flocs.append(
+            Floc(
+                entry.floc_id,
+                entry.equivalent_radius / entry.spheroradius,
+                {n: entry.fits[n].shape for n in kept},
+                {n: entry.fits[n].relative_error for n in kept},
+                entry.equivalent_radius * entry.pixel_size,
+            )
+        )
+    if shapes.size == "own" and len({floc.size for floc in flocs}) < 2:
+        raise ConfigError(
+            f'shapes.size = "own" needs flocs of two sizes at least, but {shapes.file} holds '
+            f"{len(flocs)} of one size, which never meet: fit more flocs, or leave shapes.size out"
+        )
     return flocs
 
 
@@ -77,9 +100,9 @@ def load_flocs(shapes: ShapesConfig, seed: int) -> list[Floc]:
     return [grow_floc(shapes, seed, index) for index in range(shapes.pool)]
 
 
-def nearest_in_ratio(flocs, ratio, count):
-    """Places of the ``count`` flocs whose r_eq/r is nearest to a ratio, nearest first."""
-    order = sorted(range(len(flocs)), key=lambda k: (abs(math.log(flocs[k].ratio / ratio)), k))
+def nearest_in_ratio(values, wanted, count):
+    """Places of the ``count`` values nearest to a wanted one, by their ratio, nearest first."""
+    order = sorted(range(len(values)), key=lambda k: (abs(math.log(values[k] / wanted)), k))
     return order[:count]
 
 
@@ -88,28 +111,53 @@ class FlocPool:
     """The flocs that bodies are drawn from, resized to them when first asked for.
 
     ``flocs``: all of a study; ``radius``: the spheroradius of its bodies [m]; ``pool``: from how
-    many flocs of about its size a body is drawn.
+    many flocs of about its size a body is drawn. ``own_size``: nothing is resized, and of two flocs
+    the larger, which settles faster, is j. ``by_error``: see `vertices_of`.
     """
 
     flocs: list[Floc]
     radius: float
     pool: int
+    own_size: bool = False
+    by_error: bool = False
     made: dict[tuple, Shape] = attrs.Factory(dict)
 
     def choose(
         self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
     ) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers; two, where possible."""
+        unit = 1.0 if self.own_size else self.radius
+        sizes = [floc.size if self.own_size else floc.ratio for floc in self.flocs]
         pool_i, pool_j = (
-            nearest_in_ratio(self.flocs, radius / self.radius, self.pool)
-            for radius in (radius_i, radius_j)
+            nearest_in_ratio(sizes, radius / unit, self.pool) for radius in (radius_i, radius_j)
         )
         first = pool_i[int(numbers[2] * len(pool_i))]
         others = [k for k in pool_j if k != first] or pool_j
-        return first, others[int(numbers[3] * len(others))]
+        if not self.own_size:
+            return first, others[int(numbers[3] * len(others))]
+        # Two flocs of one size settle alike and never meet.
+        others = [k for k in others if sizes[k] != sizes[first]] or [
+            next(k for k in nearest_in_ratio(sizes, radius_j, None) if sizes[k] != sizes[first])
+        ]
+        second = others[int(numbers[3] * len(others))]
+        return (first, second) if sizes[first] < sizes[second] else (second, first)
+
+    def vertices_of(self, first: int, second: int, vertices: int) -> tuple[int, int]:
+        """Numbers of vertices of flocs i and j in a condition with N vertices.
+
+        N for both, or with ``by_error`` N for j and for i that of its fits whose RE is nearest to
+        that of j, the nearest N of several: pairs "with similar RE" (paper, section 2.5).
+        """
+        if not self.by_error or vertices == 1:
+            return vertices, vertices
+        wanted, errors = self.flocs[second].errors[vertices], self.flocs[first].errors
+        return min(errors, key=lambda n: (abs(errors[n] - wanted), abs(n - vertices))), vertices
 
     def shape(self, place: int, vertices: int, equivalent_radius: float) -> Shape:
-        """A floc with N vertices in a size; the equivalent sphere for N = 1."""
+        """A floc with N vertices in a size, or its own; the equivalent sphere for N = 1."""
+        if self.own_size:
+            floc = self.flocs[place]
+            return floc.shapes[vertices] if vertices > 1 else Sphere(floc.size)
         key = (place if vertices > 1 else None, vertices, equivalent_radius)
         if key not in self.made:
             self.made[key] = (

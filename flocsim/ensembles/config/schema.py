@@ -226,7 +226,11 @@ class ShapesConfig:
         help="N, numbers of vertices of the spheropolygons; 1 is the equivalent sphere",
     )
     radius: float = quantity(
-        "m", above=0.0, at_most=LARGEST_LENGTH, default=1e-6, help="spheroradius r"
+        "m",
+        above=0.0,
+        at_most=LARGEST_LENGTH,
+        default=1e-6,
+        help="spheroradius r of the flocs once they are resized",
     )
     pool: int = whole_field(
         1,
@@ -234,6 +238,23 @@ class ShapesConfig:
         default=10,
         help="number of flocs, nearest in size-to-spheroradius ratio, from which each replicate "
         "draws its two",
+    )
+    size: str = choice(
+        "scene",
+        "own",
+        default="scene",
+        help="scene: every floc is resized to the radius that its collision type asks for; own: it "
+        "keeps the size at which it was measured, its spheroradius with it, and is drawn from the "
+        "`pool` flocs nearest to that radius; the faster of the two approaches",
+        only_for="library",
+    )
+    pairs_alike_in: str = choice(
+        "vertices",
+        "error",
+        default="vertices",
+        help="vertices: both flocs have N vertices; error: the receiver has that number of "
+        "vertices, of those it was fitted with, whose relative error RE is nearest to that of the "
+        "approaching floc with N",
     )
     fractal_dimension: float = quantity(
         "",
@@ -260,6 +281,16 @@ class ShapesConfig:
         if self.source == "library" and self.file is None:
             raise ConfigError(
                 'source = "library" needs file, the shape library that `flocsim fit` wrote'
+            )
+        if self.size == "own" and self.source != "library":
+            raise ConfigError(
+                'size = "own" goes with source = "library", whose flocs were measured: leave size '
+                "out or change source"
+            )
+        if self.pairs_alike_in == "error" and self.own is not None:
+            raise ConfigError(
+                f'pairs_alike_in = "error" cannot be: {full_name(self.own)} was not fitted to a '
+                "floc; leave pairs_alike_in out"
             )
         if self.source == "synthetic" and self.file is not None:
             raise ConfigError(

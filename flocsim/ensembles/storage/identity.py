@@ -107,14 +107,18 @@ def type_facts(config):
 
 
 def floc_facts(study):
-    """A digest of all flocs at each number of vertices."""
+    """A digest of all flocs at each number of vertices, and of what else chooses among them."""
     facts = {}
-    for n in study.config.shapes.vertices:
-        if n > 1:
-            parts = [np.array([floc.ratio]) for floc in study.flocs]
-            shapes = [floc.shapes[n] for floc in study.flocs]
-            parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
-            facts[f"flocs.{n}"] = digest(np.concatenate(parts))
+    counts = {n for floc in study.flocs for n in floc.shapes}
+    for n in sorted(counts):
+        parts = [np.array([floc.ratio]) for floc in study.flocs]
+        shapes = [floc.shapes[n] for floc in study.flocs]
+        parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
+        if study.floc_pool.by_error:
+            parts.append(np.array([floc.errors[n] for floc in study.flocs]))
+        facts[f"flocs.{n}"] = digest(np.concatenate(parts))
+    if study.floc_pool.own_size:
+        facts["flocs.size"] = digest(np.array([floc.size for floc in study.flocs]))
     return facts | own_shape_facts(study)
 
 

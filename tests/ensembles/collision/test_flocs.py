@@ -7,7 +7,10 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError, FileError
+from flocsim.io.shapes.library import read_library
 from tests.helpers.small_study import grown, write_star_library
+
+ROD = SpheroPolygon([[-4e-6, 0.0], [4e-6, 0.0]], 1e-6)
 
 
 def test_synthetic_flocs_follow_from_the_seed():
@@ -61,11 +64,11 @@ def flocs_of(ratios):
 
 
 def test_the_nearest_in_ratio_come_first():
-    flocs = flocs_of([4.0, 16.0, 8.0, 16.0])
-    assert nearest_in_ratio(flocs, 16.0, 3) == [1, 3, 2]
+    values = [4.0, 16.0, 8.0, 16.0]
+    assert nearest_in_ratio(values, 16.0, 3) == [1, 3, 2]
     # As a ratio: 8 is as far from 16 as 32 is.
-    assert nearest_in_ratio(flocs_of([32.1, 8.0]), 16.0, 1) == [1]
-    assert nearest_in_ratio(flocs, 5.0, 100) == [0, 2, 1, 3]
+    assert nearest_in_ratio([32.1, 8.0], 16.0, 1) == [1]
+    assert nearest_in_ratio(values, 5.0, 100) == [0, 2, 1, 3]
 
 
 def test_the_two_bodies_are_two_flocs_where_there_are_two():
@@ -103,3 +106,66 @@ def test_the_sphere_is_the_same_whatever_the_floc():
     sphere = pool.shape(None, 1, 5e-6)
     assert isinstance(sphere, Sphere)
     assert pool.shape(7, 1, 5e-6) is sphere
+
+
+def test_flocs_keep_their_measured_size(library):
+    flocs = load_flocs(ShapesConfig(source="library", file=library, vertices=(1, 4), size="own"), 1)
+    pool = FlocPool(flocs, 1e-6, 3, own_size=True)
+    for place, entry in enumerate(read_library(library)):
+        size = entry.equivalent_radius * entry.pixel_size
+        assert pool.shape(place, 1, 1e-3).radius == pytest.approx(size, rel=1e-12)
+        kept = pool.shape(place, 4, 1e-3)
+        assert kept.equivalent_radius == entry.fits[4].shape.equivalent_radius
+        assert kept.radius == entry.fits[4].radius
+
+
+def measured(sizes):
+    """Flocs of these sizes [m], without shapes."""
+    return [Floc(str(size), 1.0, {}, size=size) for size in sizes]
+
+
+def test_of_two_measured_flocs_the_larger_comes_from_above():
+    pool = FlocPool(measured([3e-6, 5e-6, 4e-6, 20e-6]), 1e-6, 3, own_size=True)
+    numbers = np.random.default_rng(0).random((500, 4))
+    sizes = [[pool.flocs[k].size for k in pool.choose(each, 4e-6, 4e-6)] for each in numbers]
+    assert all(i < j < 20e-6 for i, j in sizes)
+    assert len({tuple(each) for each in sizes}) == 3
+
+
+def test_two_flocs_of_one_measured_size_are_no_pair():
+    pool = FlocPool(measured([3e-6, 3e-6, 9e-6]), 1e-6, 2, own_size=True)
+    assert {pool.choose([0.0, 0.0, n, n], 3e-6, 3e-6) for n in (0.1, 0.6, 0.9)} == {(0, 2), (1, 2)}
+
+
+def test_a_library_of_one_measured_size_is_refused(tmp_path):
+    write_star_library(tmp_path / "one.h5", vertices=(4,), ratios=(8.0,))
+    shapes = ShapesConfig(source="library", file=tmp_path / "one.h5", vertices=(4,), size="own")
+    with pytest.raises(ConfigError, match=r"needs flocs of two sizes at least, but .* holds 1 of"):
+        load_flocs(shapes, 1)
+
+
+def test_pairs_alike_in_their_error():
+    of_i, of_j = {4: 30.0, 8: 21.0, 16: 12.0, 64: 12.0}, {4: 20.0, 8: 12.0, 16: 5.0, 64: 50.0}
+    flocs = [Floc("i", 8.0, {}, of_i), Floc("j", 9.0, {}, of_j)]
+    pool = FlocPool(flocs, 1e-6, 1, by_error=True)
+    found = {n: pool.vertices_of(0, 1, n) for n in (1, 4, 8, 16, 64)}
+    # Of 16 and 64 vertices, which are equally wrong, the nearer to N; a sphere meets a sphere.
+    assert found == {1: (1, 1), 4: (8, 4), 8: (16, 8), 16: (16, 16), 64: (4, 64)}
+    assert FlocPool(flocs, 1e-6, 1).vertices_of(0, 1, 4) == (4, 4)
+
+
+def test_pairs_alike_in_their_error_may_have_any_fit_of_the_library(library):
+    shapes = ShapesConfig(source="library", file=library, vertices=(4,), pairs_alike_in="error")
+    assert all(list(floc.shapes) == list(floc.errors) == [4, 8] for floc in load_flocs(shapes, 1))
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({"size": "own"}, 'size = "own" goes with source = "library"'),
+        ({"own": ROD, "pairs_alike_in": "error"}, "was not fitted to a floc"),
+    ],
+)
+def test_what_cannot_be_read_so_is_refused(words, why):
+    with pytest.raises(ConfigError, match=why):
+        ShapesConfig(**words)
