@@ -196,7 +196,7 @@ def test_processes_end_with_their_parent(tmp_path):
         "from flocsim.commands.fit_processes import workers\n"
         "def where(number):\n"
         "    if number < 2:\n"
-        "        print(os.getpid(), flush=True)\n"
+        "        os.write(1, b'%d\\n' % os.getpid())  # at once, unlike print\n"
         "    time.sleep(600)\n"
         "with workers(2, lambda: None) as mapped:\n"
         "    list(mapped(where, range(2)))\n"
