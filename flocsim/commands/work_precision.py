@@ -5,12 +5,11 @@ from typing import Any
 
 import attrs
 
-from flocsim.commands.trajectory import add_replicate, select, with_one_count
+from flocsim.commands.trajectory import add_replicate, one_count_study, select
 from flocsim.ensembles.collision.encounter import end_distance, replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.io.results.schema import OUTCOMES
@@ -76,7 +75,7 @@ def row(system, duration, exact, name, setting, integrator):
 
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    study = Study(with_one_count(config, place[1]))
+    study = one_count_study(config, place[1])
     numbers = draws(config.seed, number)
     found = study.run(*place, number)
     encounter = study.encounter(*place[:2], numbers)
