@@ -89,7 +89,7 @@ def take_scene(args):
 
 def select(config: Config, args: Namespace) -> tuple[int, int, float]:
     """(place of the condition, N, share of δ_max) that the arguments choose."""
-    if not args.replicate >= 0:
+    if args.replicate is not None and not args.replicate >= 0:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
     if not 2 <= args.frames <= 50:
         raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")

@@ -155,16 +155,48 @@ def first_methods(config: Config) -> dict[str, Integrator]:
     return {name: config.integrator.method for name, _, _ in config.scene.conditions}
 
 
+def sampling_error(config: Config) -> float:
+    """The sampling error of a condition that the study will have: half an interval at Pr = ½."""
+    return sampling_half_width(expected_replicates(config.replicates, config.stop))
+
+
 def choose(study: Study, share: Share = run_alone) -> Choice:
     """The Choice for a Study that was made with `first_methods`; ``share`` runs its Jobs."""
     config = study.config
-    count = expected_replicates(config.replicates, config.stop)
-    half_width = sampling_half_width(count)
+    half_width = sampling_error(config)
     target = ALLOWED * half_width
     ladders = implicit_ladders(study, share, target)
     climb(study, ladders, share, target)
     explicit = explicit_ladders(study, ladders, share, target)
     climb(study, explicit, share, target)
+    methods, types = settled(config, ladders, explicit, target)
+    runs = [trials for each in [*ladders, *explicit] for trials in each.tried.values()]
+    runs += [each.exact for each in ladders]
+    cost = sum(each.cost for trials in runs for each in trials)
+    record = {
+        "of": key_of(study), "target": target, "half_width": half_width, "cost": cost,
+        "types": types,
+    }  # fmt: skip
+    return Choice(methods, json.loads(json.dumps(record)))
+
+
+def settled(
+    config: Config, ladders: Sequence[Ladder], explicit: Sequence[Ladder], target: float
+) -> tuple[dict[str, Integrator], list[dict]]:
+    """({type: Integrator}, what the record has of each) of what has been tried.
+
+    ``ladders`` of the implicit method, one for each type, and ``explicit`` ones of some.
+    """
+    blank = beliefs([each.seen() for each in ladders])
+    least = {
+        each.condition: each.mean_cost(adequate(belief, target) or RUNGS[-1])
+        for each, belief in zip(ladders, blank, strict=True)
+        if each.tried
+    }
+    # What is too stiff for explicit steps runs out of them: that would pass for flips.
+    explicit = [
+        each for each in explicit if min(map(each.cost, each.tried)) < least[each.condition]
+    ]
     known = beliefs([each.seen() for each in [*ladders, *explicit]])
     tail = zip(explicit, known[len(ladders) :], strict=True)
     others = {each.condition: (each, belief) for each, belief in tail}
@@ -178,14 +210,7 @@ def choose(study: Study, share: Share = run_alone) -> Choice:
             tried += tried_of(others[ladder.condition][0])
         methods[name], facts = described(taken, target)
         types.append({"name": name, **facts, "tried": tried})
-    runs = [trials for each in [*ladders, *explicit] for trials in each.tried.values()]
-    runs += [each.exact for each in ladders]
-    cost = sum(each.cost for trials in runs for each in trials)
-    record = {
-        "of": key_of(study), "target": target, "half_width": half_width, "cost": cost,
-        "types": types,
-    }  # fmt: skip
-    return Choice(methods, json.loads(json.dumps(record)))
+    return methods, types
 
 
 def implicit_ladders(study, share, target):

@@ -55,8 +55,8 @@ def pilot_size(config: Config) -> int:
     return found if found >= LEAST else 0
 
 
-def sample_of(config: Config) -> list[list[Task]]:
-    """The Tasks of a pilot, a list for each collision type.
+def sample_of(config: Config, size: int | None = None) -> list[list[Task]]:
+    """The Tasks of a pilot, or of ``size`` replicates of each type: a list for each type.
 
     The first few of a list are spread over all N and δ as evenly as all of them, and no two are the
     same replicate of the same condition.
@@ -66,6 +66,7 @@ def sample_of(config: Config) -> list[list[Task]]:
     stride = stride_through(len(cells))
     # After so many tasks a cell would meet the same indices again.
     period = math.lcm(len(cells), config.replicates)
+    size = pilot_size(config) if size is None else min(size, len(cells) * config.replicates)
     return [
         [
             Task(
@@ -73,7 +74,7 @@ def sample_of(config: Config) -> list[list[Task]]:
                 *cells[place * stride % len(cells)],
                 (place + place // period) % config.replicates,
             )
-            for place in range(pilot_size(config))
+            for place in range(size)
         ]
         for condition in range(len(config.scene.conditions))
     ]
