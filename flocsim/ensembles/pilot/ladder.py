@@ -32,7 +32,7 @@ REFERENCE = 1e-2
 CORE = 0.25
 """Smallest length of an equivalent sphere, which has no spheroradius, over r_eq."""
 
-WEIGHTS: dict[type, float] = {Implicit: 1.0, DormandPrince54: 0.55}
+WEIGHTS: dict[type, float] = {Implicit: 1.0, DormandPrince54: 0.5}
 """CPU time of one evaluation of the forces, all that is done besides included, over that of
 Implicit: `python -m benchmarks.speed.pilot_weights`."""
 
