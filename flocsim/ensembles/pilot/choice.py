@@ -47,8 +47,13 @@ from flocsim.integrators.base import Integrator
 ALLOWED = 0.2
 """Flips over the sampling error."""
 
-CONFIDENCE = 0.7
+CONFIDENCE = 0.75
 """With which the rate of flips of what is chosen stays below that."""
+
+USUAL = 0.6
+"""Cost of a good setting over that of the reference: where none is below, coarse steps are dear (a
+coarse step that is tried again and again, a pair that ends at the step budget), and finer ones are
+tried as well."""
 
 PROBE = 10
 """Replicates that show whether explicit steps are worth a try."""
@@ -125,6 +130,12 @@ class Ladder:
         made = at_rung(self.method, rung * self.length)
         return [Job(task, made, self.max_steps) for task in self.tasks]
 
+    def is_dear(self) -> bool:
+        """Whether even the cheapest rung that was run costs about as much as the reference."""
+        if not isinstance(self.method, Implicit):
+            return False
+        return min(map(self.cost, self.tried)) > USUAL * mean([each.cost for each in self.exact])
+
     def mean_cost(self, rung: float) -> float:
         """Evaluations of a replicate at a rung, from those that were run, by powers of it."""
         known = sorted((each, max(self.cost(each), 1.0)) for each in self.tried)
@@ -145,6 +156,16 @@ def mean(values):
 def adequate(belief: Belief, target: float) -> float | None:
     """The loosest rung whose flips are expected to stay below the target; None for none."""
     return next((rung for rung in RUNGS if belief.bound(rung, CONFIDENCE) <= target), None)
+
+
+def best_rung(ladder: Ladder, belief: Belief, target: float) -> float:
+    """The cheapest of the rungs that are good enough, of those up to the tightest that was run.
+
+    Mostly the loosest, but not where coarse steps fail so often that finer ones are cheaper.
+    """
+    good = adequate(belief, target) or RUNGS[-1]
+    known = [rung for rung in RUNGS if ladder.tried and min(ladder.tried) <= rung <= good]
+    return min(known or [good], key=lambda rung: ladder.mean_cost(rung) if known else 0.0)
 
 
 def first_methods(config: Config) -> dict[str, Integrator]:
@@ -189,7 +210,7 @@ def settled(
     """
     blank = beliefs([each.seen() for each in ladders])
     least = {
-        each.condition: each.mean_cost(adequate(belief, target) or RUNGS[-1])
+        each.condition: each.mean_cost(best_rung(each, belief, target))
         for each, belief in zip(ladders, blank, strict=True)
         if each.tried
     }
@@ -250,7 +271,7 @@ def climb(study, ladders, share, target):
         left = [
             each
             for each, good in zip(ladders, rungs, strict=True)
-            if each in left and (good is None or good < rung)
+            if each in left and (good is None or good < rung or each.is_dear())
         ]
 
 
@@ -264,7 +285,7 @@ def explicit_ladders(study, ladders, share, target):
     for ladder, belief in zip(ladders, known, strict=True):
         if not ladder.tried:
             continue
-        rung = adequate(belief, target) or RUNGS[-1]
+        rung = best_rung(ladder, belief, target)
         cost = ladder.mean_cost(rung)
         engines = len({n > 1 for n in config.shapes.vertices})
         if stable_cost(study, ladder) > STIFF * cost or SAVING * runs * cost < COMPILE * engines:
@@ -303,16 +324,16 @@ def probe_cost(ladder, rung):
 
 def cheaper(first, second, target):
     """Of two (Ladder, Belief) the one whose setting that is good enough costs less."""
-    if second is None or (rung := adequate(second[1], target)) is None:
+    if second is None or adequate(second[1], target) is None:
         return first
-    own = adequate(first[1], target) or RUNGS[-1]
-    return second if second[0].mean_cost(rung) < first[0].mean_cost(own) else first
+    costs = [each[0].mean_cost(best_rung(*each, target)) for each in (first, second)]
+    return second if costs[1] < costs[0] else first
 
 
 def described(taken, target):
     """(the Integrator of a type, its part of the record), from the (Ladder, Belief) it takes."""
     ladder, belief = taken
-    rung = adequate(belief, target) or RUNGS[-1]
+    rung = best_rung(ladder, belief, target)
     made = at_rung(ladder.method, rung * ladder.length)
     return made, {
         "method": name_of(made),

@@ -2,10 +2,12 @@
 
 An error of size e flips what comes within about e of another outcome, and motion amplifies errors
 by factors that scatter over many decades. So the rate of flips falls with a small power of the
-tolerance: at rung s (tolerance over the scene's length) it is q sᵝ. β is one for all types of a
-study, q belongs to a type; a reference at s₀ is off by itself, and adds q s₀ᵝ.
+tolerance, and levels off where the tolerance comes near the scene's length, as steps are then kept
+short by other things: at rung s (tolerance over that length) it is q g(s), with
+g(s) = sᵝ (1 + b)/(sᵝ + b), b = LEVEL to the power β, so that g(1) = 1. β is one for all types of a
+study, q belongs to a type; a reference at s₀ is off by itself, and adds q g(s₀).
 
-Flips seen are Poisson distributed around n q (sᵝ + s₀ᵝ). Before anything is seen q has a gamma
+Flips seen are Poisson distributed around n q (g(s) + g(s₀)). Before anything is seen q has a gamma
 distribution of mean FLIPS and shape SHAPE, β a normal one, of those that the scenes of
 benchmarks/accuracy/auto.py have. What is then known of a rate is a mixture of gamma distributions
 over β, whose quantiles are found by halving. Few flips thus leave a wide distribution, and none at
@@ -24,9 +26,18 @@ FLIPS = 0.025
 SHAPE = 1.0
 """Of the gamma distribution of q before any is seen: as wide as its mean."""
 
-EXPONENTS = np.linspace(0.16, 0.60, 23)
-EXPONENT, EXPONENT_SPREAD = 0.36, 0.08
+LEVEL = 0.1
+"""Rung at which the rate of flips begins to level off."""
+
+EXPONENTS = np.linspace(0.25, 0.85, 25)
+EXPONENT, EXPONENT_SPREAD = 0.5, 0.1
 """The exponents that are weighed, and their normal distribution before any flip is seen."""
+
+
+def falls(rung: float) -> np.ndarray:
+    """g of a rung for each of EXPONENTS: the rate of flips over that at rung 1."""
+    power, level = rung**EXPONENTS, LEVEL**EXPONENTS
+    return power * (1.0 + level) / (power + level)
 
 
 class Seen(NamedTuple):
@@ -48,13 +59,13 @@ class Belief(NamedTuple):
 
     def expected(self, rung: float) -> float:
         """Mean rate of flips at a rung."""
-        return float(np.sum(self.weights * self.shape / self.rates * rung**EXPONENTS))
+        return float(np.sum(self.weights * self.shape / self.rates * falls(rung)))
 
     def bound(self, rung: float, confidence: float) -> float:
         """What the rate of flips at a rung stays below with that probability."""
         from scipy.special import gammainc
 
-        scaled = self.rates / rung**EXPONENTS
+        scaled = self.rates / falls(rung)
         low, high = 0.0, 1.0
         while np.sum(self.weights * gammainc(self.shape, scaled * high)) < confidence:
             high *= 2.0
@@ -75,7 +86,7 @@ def beliefs(seen: Sequence[Sequence[Seen]]) -> list[Belief]:
     for each in seen:
         shape, rate = SHAPE, np.full(len(EXPONENTS), SHAPE / FLIPS)
         for rung, reference, runs, flips in each:
-            power = rung**EXPONENTS + reference**EXPONENTS
+            power = falls(rung) + falls(reference)
             shape, rate = shape + flips, rate + runs * power
             logs = logs + flips * np.log(power)
         logs = logs - shape * np.log(rate)

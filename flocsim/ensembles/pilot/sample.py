@@ -12,12 +12,12 @@ from flocsim.ensembles.config.schema import Config, StopConfig
 MOST = 900
 """Replicates of a pilot."""
 
-SHARE = 0.08
+SHARE = 0.1
 """Of what the study costs, for the whole pilot."""
 
-LADDER = 7.0
+LADDER = 6.0
 """What all settings that a pilot tries on a replicate cost, over what the study spends on one: a
-hundred times tighter a reference 4, the chosen setting 1, those before and beside it 2."""
+hundred times tighter a reference 3, the chosen setting 1, those before and beside it 2."""
 
 LEAST = 10
 """Replicates of a type: with fewer a pilot would see nothing, and is not run."""

@@ -42,7 +42,7 @@ def test_the_file_has_the_choice_and_its_rows_are_of_it(first):
     folder, found = first
     record = json.loads(found.run["accuracy"])
     [chosen] = record["types"]
-    assert (chosen["name"], chosen["method"], chosen["replicates"]) == ("III", "implicit", 10)
+    assert (chosen["name"], chosen["method"], chosen["replicates"]) == ("III", "implicit", 15)
     fixed = {"integrator": {"tolerance": chosen["tolerance"], "check_share": 0.0}}
     config = small_config(folder, SPHERES | fixed)
     run_to_file(config, SerialCommunicator(), folder / "fixed.h5", NEW)

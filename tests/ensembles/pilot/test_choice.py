@@ -15,7 +15,7 @@ from flocsim.ensembles.pilot.choice import (
     recorded_choice,
 )
 from flocsim.ensembles.pilot.ladder import RUNGS, WEIGHTS, Trial, scene_length
-from flocsim.ensembles.pilot.model import sampling_half_width
+from flocsim.ensembles.pilot.model import falls, sampling_half_width
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.study import Study
@@ -43,12 +43,14 @@ def chance(task):
 class MadeUp:
     """A Share: of type t ``rates[t]`` times a power of the rung flip; ``jobs`` are noted.
 
-    ``explicit``: cost of an explicit run over that of an implicit one; ``time`` [s] of all.
+    ``explicit``: cost of an explicit run over that of an implicit one; ``time`` [s] of all;
+    ``dear``: rungs above it cost twenty times as much.
     """
 
     rates: tuple = (0.02, 0.02)
     explicit: float = 10.0
     time: float = 1e-6
+    dear: float = 1.0
     jobs: list = attrs.Factory(list)
 
     def __call__(self, study, jobs):
@@ -58,8 +60,10 @@ class MadeUp:
     def trial(self, study, task, method, max_steps):
         """One made-up Trial: a replicate flips at all rungs from its own on."""
         rung = method.tolerance / scene_length(study.config, task.condition)
-        flips = chance(task) < self.rates[task.condition] * rung**0.36
+        flips = chance(task) < self.rates[task.condition] * float(falls(rung)[10])
         own = self.explicit if isinstance(method, DormandPrince54) else 1.0
+        if rung > 2.0 * self.dear:
+            own *= 20.0
         return Trial(int(flips), 0, own * 500.0 * rung**-0.13, self.time)
 
 
@@ -80,7 +84,7 @@ def test_what_is_chosen_is_the_loosest_that_is_expected_to_do(tmp_path):
         assert any(rung == pytest.approx(known) for known in RUNGS)
         assert 0.5 * target < each["expected"] < each["bound"] <= target
         # The truth, which the pilot does not know.
-        assert 0.02 * rung**0.36 < 1.2 * target
+        assert 0.02 * falls(rung)[10] < 1.2 * target
 
 
 def test_a_type_that_flips_more_gets_a_tighter_tolerance(tmp_path):
@@ -95,6 +99,13 @@ def test_more_replicates_want_a_tighter_tolerance(tmp_path):
         for study in (auto_study(tmp_path, replicates) for replicates in (300, 30_000))
     ]
     assert found[1] < 0.1 * found[0]
+
+
+def test_where_coarse_steps_are_dear_finer_ones_are_taken(tmp_path):
+    study = auto_study(tmp_path, 300)
+    usual, dear = (choose(study, MadeUp((1e-4, 1e-4), dear=d)) for d in (1.0, 1e-3))
+    assert min(rungs_of(study, usual)) > 0.09
+    assert rungs_of(study, dear) == pytest.approx([1e-3, 1e-3])
 
 
 def test_where_the_ladder_ends_it_is_said(tmp_path):
