@@ -53,6 +53,7 @@ INNER_ROWS = {
         ["cli"],
         ["dry_run", "runner", "report"],
         ["parallel"],
+        ["pilot"],
         ["estimates"],
         ["storage"],
         ["study"],

@@ -8,6 +8,7 @@ from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
+from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
@@ -17,7 +18,7 @@ from flocsim.io.results.schema import BONDS
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
-APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus")
+APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy")
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -72,6 +73,8 @@ def results_text(path, results, totals):
     try:
         facts = conditions(results) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+        if choice := stored(results.run, "accuracy"):
+            facts += [("accuracy", visible(line, "")) for line in choice_lines(choice)]
         facts += origin(results.run)
         notes = stored(results.run, "failed")
     except ValueError as error:

@@ -14,6 +14,7 @@ from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -88,7 +89,7 @@ def take_scene(args):
 
 def select(config: Config, args: Namespace) -> tuple[int, int, float]:
     """(place of the condition, N, share of δ_max) that the arguments choose."""
-    if not args.replicate >= 0:
+    if args.replicate is not None and not args.replicate >= 0:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
     if not 2 <= args.frames <= 50:
         raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
@@ -103,6 +104,11 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
 def with_one_count(config: Config, vertex_count: int) -> Config:
     """The config with one number of vertices: the flocs need no fits at the others."""
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
+
+
+def one_count_study(config: Config, vertex_count: int) -> Study:
+    """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
+    return Study(with_one_count(config, vertex_count), methods=final_methods(config))
 
 
 def outcome_line(config, place, replicate, row):
@@ -176,7 +182,7 @@ def run(args: Namespace) -> int:
     outputs = [Output(path, figure_rule(args.overwrite)) for path in drawn]
     motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
     check_outputs([*outputs, *motion], inputs_of(config, args.config))
-    study = Study(with_one_count(config, place[1]))
+    study = one_count_study(config, place[1])
     record = Record()
     row = study.run(*place, args.replicate, record)
     encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))

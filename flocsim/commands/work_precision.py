@@ -1,16 +1,20 @@
-"""`flocsim work-precision cfg.toml --replicate 17`: error against run time of one collision."""
+"""`flocsim work-precision cfg.toml`: flips against CPU time of a study, for every tolerance.
+
+With `--replicate 17`, error against run time of one collision (`flocsim.commands.ladder` is the
+other).
+"""
 
 from argparse import Namespace
 from typing import Any
 
 import attrs
 
-from flocsim.commands.trajectory import add_replicate, select, with_one_count
+from flocsim.commands import ladder
+from flocsim.commands.trajectory import add_replicate, one_count_study, select
 from flocsim.ensembles.collision.encounter import end_distance, replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.io.results.schema import OUTCOMES
@@ -32,12 +36,15 @@ HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'step
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "work-precision",
-        help="error against run time of the integrators on one replicate of a config",
-        description="Run one replicate by every integrator over six decades of tolerance, to the "
-        "time at which it is decided, and print how far its end is from the reference.",
+        help="flips and errors against CPU time, for the methods and tolerances of a config",
+        description="Run some replicates of a study by every method and tolerance that "
+        'accuracy = "auto" may choose, and print how many outcomes flip, how far d_c is off, and '
+        "what it takes. With --replicate: one replicate by every integrator over six decades of "
+        "tolerance, to the time at which it is decided, and how far its end is from the reference.",
     )
     add_replicate(parser)
-    parser.set_defaults(run=run, frames=2)
+    ladder.add_arguments(parser)
+    parser.set_defaults(run=run, frames=2, replicate=None)
     return parser
 
 
@@ -76,7 +83,7 @@ def row(system, duration, exact, name, setting, integrator):
 
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    study = Study(with_one_count(config, place[1]))
+    study = one_count_study(config, place[1])
     numbers = draws(config.seed, number)
     found = study.run(*place, number)
     encounter = study.encounter(*place[:2], numbers)
@@ -86,6 +93,9 @@ def replicate(config, place, number):
 
 def run(args: Namespace) -> int:
     """Run the methods, print the table; the exit code."""
+    if args.replicate is None:
+        return ladder.run(args)
+    ladder.refuse_arguments(args)
     config = load_config(args.config)
     place = select(config, args)
     check_study(config)

@@ -4,6 +4,7 @@ from math import inf
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.pilot.sample import pilot_size
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 
@@ -36,6 +37,8 @@ def checked_words(config):
     method, share = config.integrator.method, config.integrator.check_share
     exact = exact_method(method)
     count = count_checks(config.seed, config.replicates, share)
+    if config.integrator.is_chosen and count:
+        return checks_of(config, count, "a hundredth of the tolerance that the pilot chooses")
     if exact is None:
         return f"none, {config.integrator.label} has no tolerance or step to be made smaller"
     if not count:
@@ -45,9 +48,25 @@ def checked_words(config):
         if exact.tolerance < inf
         else f"a step of {exact.first_step:g} s"
     )
+    return checks_of(config, count, how)
+
+
+def checks_of(config, count, how):
     return (
         f"{count} of the {config.replicates} replicates of each condition "
         f"({100.0 * count / config.replicates:.2g} %), at {how}"
+    )
+
+
+def chosen_words(config):
+    """How a pilot chooses the method; "" where the config names one."""
+    if not config.integrator.is_chosen:
+        return ""
+    size = pilot_size(config)
+    return 'accuracy = "auto", ' + (
+        f"a pilot of {size} replicates of each type chooses method and tolerance"
+        if size
+        else "too few replicates for a pilot: as in studies at large"
     )
 
 
@@ -68,7 +87,7 @@ def dry_run(config: Config, ranks: int) -> str:
         f"  vertices {list(shapes.vertices)}, delta {list(scene.delta)} of the {scene.delta_max} "
         f"delta_max, receiver {scene.receiver}",
         f"  flocs: {flocs}",
-        f"  integrator: {config.integrator.label}, {accuracy}",
+        f"  integrator: {chosen_words(config) or f'{config.integrator.label}, {accuracy}'}",
         f"  run again: {checked_words(config)}",
         "collisions:",
         *condition_lines(config),

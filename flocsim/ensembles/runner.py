@@ -7,7 +7,7 @@ others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks 
 import contextlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +21,38 @@ from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
 from flocsim.ensembles.parallel.assembly import assemble, assist
-from flocsim.ensembles.parallel.communicator import Communicator, SerialCommunicator
+from flocsim.ensembles.parallel.communicator import (
+    Communicator,
+    SerialCommunicator,
+    StopRequested,
+)
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
+from flocsim.ensembles.pilot.choice import (
+    Choice,
+    choice_lines,
+    choose,
+    first_methods,
+    recorded_choice,
+)
+from flocsim.ensembles.pilot.ladder import Job, trial
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
-from flocsim.ensembles.storage.identity import arithmetic_digest, short
-from flocsim.ensembles.storage.resume import Beginning, begin, claim
+from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
+from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.interruption import STOPPED
+from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
 from flocsim.io.results.file import read_results
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results
-from flocsim.io.terminal import Progress
+from flocsim.io.terminal import Progress, tell
 
 
 @attrs.define
@@ -80,7 +92,7 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
         if comm.rank > 0:
             return follow(joint.study, comm).results
         store = RowStore(MemoryJournal(), joint.study.conditions)
-        start = Beginning(store, joint.identity, cpus_now=joint.cpus)
+        start = Beginning(store, joint.identity, cpus_now=joint.cpus, accuracy=joint.accuracy)
         return lead(joint.study, start, comm, Progress(joint.study.size, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
@@ -103,10 +115,14 @@ def run_to_file(
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
-        joint = join(config, comm)
+        records = recorded_choices(journal) if config.integrator.is_chosen else ()
+        joint = join(config, comm, records, quiet)
         progress = Progress(joint.study.size, quiet)
         with sharing_errors(comm):
-            start = begin(joint.study, joint.identity, output, mode, journal, joint.cpus, overwrite)
+            start = begin(
+                joint.study, joint.identity, output, mode, journal, joint.cpus, overwrite,
+                joint.accuracy,
+            )  # fmt: skip
         resources.enter_context(start.resources)
         for remark in [*remarks, *start.remarks]:
             progress.warn(remark)
@@ -123,22 +139,30 @@ def run_to_file(
 
 @attrs.frozen
 class Joint:
-    """What all ranks have agreed on; ``cpus`` on rank 0 alone: the kinds of CPU of all ranks."""
+    """What all ranks have agreed on; ``cpus`` on rank 0 alone: the kinds of CPU of all ranks.
+
+    ``accuracy``: the record of a pilot's choice, where there was one.
+    """
 
     study: Study
     identity: dict
     cpus: list[dict]
+    accuracy: dict = attrs.Factory(dict)
 
 
-def join(config: Config, comm: Communicator) -> Joint:
+def join(
+    config: Config, comm: Communicator, records: Sequence[dict] = (), quiet: bool = True
+) -> Joint:
     """Make the Study on every rank, and see that all would compute the same rows.
 
-    Rank 0 grows or reads the flocs for all. Where any rank would compute something else, or has
-    other versions, none goes on: UsageError on rank 0, RankZeroFailed on the others.
+    Rank 0 grows or reads the flocs for all. Where a pilot chooses the methods, all ranks run it,
+    unless one of the ``records`` that rank 0 has is of this study. Where any rank would compute
+    something else, or has other versions, none goes on: UsageError on rank 0, RankZeroFailed on the
+    others.
     """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
-    study = Study(config, flocs=hear(comm, flocs))
+    study = Study(config, flocs=hear(comm, flocs), methods=first_methods(config))
     own, line = own_facts(study, comm)
     leader = hear(comm, own)
     if own is not None:
@@ -149,7 +173,47 @@ def join(config: Config, comm: Communicator) -> Joint:
         if unlike:
             more = f" ({len(unlike)} ranks differ)" if len(unlike) > 1 else ""
             raise UsageError(unlike[0] + more)
-    return Joint(study, leader.identity, distinct([kind for _, kind in answers or []]))
+    cpus = distinct([kind for _, kind in answers or []])
+    if not config.integrator.is_chosen:
+        return Joint(study, leader.identity, cpus)
+    choice = chosen(study, comm, records, quiet)
+    study = Study(config, flocs=study.flocs, methods=choice.methods)
+    return Joint(study, identity_of(study), cpus, choice.record)
+
+
+def chosen(study: Study, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:
+    """The Choice of a study's methods, on every rank: of a record, or of a pilot that all run."""
+    if comm.rank > 0:
+        while not isinstance(jobs := hear(comm, None), Choice):
+            share_jobs(study, comm, jobs)
+        return jobs
+    with sharing_errors(comm):
+        choice = recorded_choice(study, records)
+        if choice is None:
+            choice = choose(study, lambda study, jobs: share_jobs(study, comm, jobs, True))
+        if not quiet:
+            for line in choice_lines(choice.record):
+                tell(line)
+    return comm.broadcast(choice)
+
+
+def share_jobs(study: Study, comm: Communicator, jobs: Sequence[Job], leads: bool = False) -> list:
+    """The Trials of a pilot's jobs, of which every rank runs its share; all of them on rank 0.
+
+    Rank 0 ``leads``: the others have the jobs from it, and no Trials. StopRequested there where a
+    signal has come.
+    """
+    if leads:
+        comm.broadcast(list(jobs))
+    trials = []
+    for job in jobs[comm.rank :: comm.size]:
+        if comm.rank == 0 and stop_requested():
+            raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
+        trials.append(trial(study, job))
+    shares = comm.gather(trials)
+    if shares is None:
+        return []
+    return [shares[place % comm.size][place // comm.size] for place in range(len(jobs))]
 
 
 def own_facts(study: Study, comm: Communicator) -> tuple[Facts | None, str]:
@@ -329,6 +393,8 @@ def facts(study, start, notes, ended, ranks):
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
+    if start.accuracy:
+        found["accuracy"] = storable(json.dumps(start.accuracy, sort_keys=True))
     return found | {
         "overrides": storable(json.dumps(config.overrides)),
         "identity": storable(json.dumps(identity, sort_keys=True)),

@@ -20,12 +20,26 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
+from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import NOT_APPLICABLE
 
 CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
 """Column of a second run → the same of the first."""
+
+Kind = tuple[int, int]
+"""Place of a collision type, and N: they stand for all that runs the same compiled code."""
+
+
+def methods_of(config: Config) -> dict[str, Integrator]:
+    """{collision type: the config's Integrator}; UsageError where a pilot has to choose."""
+    if config.integrator.is_chosen:
+        raise UsageError(
+            'integrator.accuracy = "auto" needs the choice of a pilot: give Study the methods of '
+            "flocsim.ensembles.pilot.choice.final_methods, or the config a name and a tolerance"
+        )
+    return {name: config.integrator.method for name, _, _ in config.scene.conditions}
 
 
 def flocs_of(config: Config) -> list[Floc]:
@@ -39,22 +53,27 @@ class Study:
     """Every replicate of a config. All that is random follows from (seed, replicate).
 
     ``flocs`` are grown or read unless given; ``zones`` has D_0 [m] of every collision type (flocs
-    of measured sizes have their own).
+    of measured sizes have their own); ``methods`` the Integrator of every type, which a pilot has
+    to choose where the config says accuracy = "auto" (flocsim.ensembles.pilot; UsageError without),
+    and is the config's otherwise.
     """
 
     config: Config
     flocs: list[Floc] = attrs.field(
         default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
     )
+    methods: dict[str, Integrator] = attrs.field(
+        default=attrs.Factory(lambda self: methods_of(self.config), takes_self=True)
+    )
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
-    drivers: dict[bool, Callable] = attrs.field(init=False, factory=dict)
-    exact: Integrator | None = attrs.field(init=False)
+    drivers: dict[tuple[bool, type], Callable] = attrs.field(init=False, factory=dict)
+    exact: dict[str, Integrator | None] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         config = self.config
-        self.exact = exact_method(config.integrator.method)
+        self.exact = {name: exact_method(method) for name, method in self.methods.items()}
         self.zones = {
             name: zone_distance(config.zone, config.forces, radius_i, radius_j)
             for name, radius_i, radius_j in config.scene.conditions
@@ -97,7 +116,9 @@ class Study:
                 self.floc_pool.shape(floc, count, radius)
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
-            self.encounters[key] = make_encounter(self.config, shapes, self.zone(name, shapes))
+            self.encounters[key] = make_encounter(
+                self.config, shapes, self.zone(name, shapes), self.methods[name]
+            )
         return self.encounters[key]
 
     def zone(self, name: str, shapes: Sequence[Shape]) -> float:
@@ -107,11 +128,17 @@ class Study:
         radii = (shape.equivalent_radius for shape in shapes)
         return zone_distance(self.config.zone, self.config.forces, *radii)
 
-    def driver(self, encounter: Encounter) -> Callable:
-        """The compiled driver of an encounter: one for spheres, one for polygons."""
-        kind = encounter.system.spheres_only
+    def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
+        """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
+
+        ``method``: another one than the encounter's.
+        """
+        system = encounter.system
+        method = method or system.integrator
+        kind = system.spheres_only, type(method)
         if kind not in self.drivers:
-            self.drivers[kind] = encounter.system.compose(observer=OBSERVER)
+            made = attrs.evolve(system, integrator=method)
+            self.drivers[kind] = made.compose(observer=OBSERVER)
         return self.drivers[kind]
 
     @property
@@ -146,21 +173,18 @@ class Study:
         floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
         row |= {"floc_i": floc_i, "floc_j": floc_j}
         row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
-        if record is not None or not self.is_checked(replicate):
+        exact = self.exact[self.config.scene.conditions[condition][0]]
+        checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
+        if record is not None or exact is None or not checked:
             return row
-        found = self.run_again(encounter, angles, share, halted)
+        found = self.run_again(encounter, angles, share, exact, halted)
         return None if found is None else row | found
 
-    def is_checked(self, replicate: int) -> bool:
-        """Whether a replicate is run again, more exactly."""
-        share = self.config.integrator.check_share
-        return self.exact is not None and is_checked(self.config.seed, replicate, share)
-
     def run_again(
-        self, encounter: Encounter, angles: Sequence[float], share: float,
+        self, encounter: Encounter, angles: Sequence[float], share: float, exact: Integrator,
         halted: Callable[[], bool] | None,
     ) -> dict | None:  # fmt: skip
-        """What a replicate's row holds of its second run; None where it was given up.
+        """What a replicate's row holds of its second, more exact run; None where it was given up.
 
         An exception costs no more than this: the second run has failed, the first is as it was.
         """
@@ -168,7 +192,7 @@ class Study:
         driver = self.driver(encounter)
         try:
             row = run_encounter(
-                encounter, driver, angles, share, steps, halted=halted, integrator=self.exact
+                encounter, driver, angles, share, steps, halted=halted, integrator=exact
             )
         except MemoryError:
             raise
@@ -177,14 +201,17 @@ class Study:
         return None if row is None else {name: row[column] for name, column in CHECKED.items()}
 
     @property
-    def kinds(self) -> list[int]:
-        """Numbers of vertices that stand for the kinds of compiled code that the study needs."""
-        vertices = self.config.shapes.vertices
-        return sorted({n > 1: n for n in vertices}.values())
+    def kinds(self) -> list[Kind]:
+        """What stands for the kinds of compiled code that the study needs."""
+        vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
+        first: dict[type, int] = {}
+        for place, (name, _, _) in enumerate(self.config.scene.conditions):
+            first.setdefault(type(self.methods[name]), place)
+        return [(place, n) for place in first.values() for n in vertices]
 
-    def compile(self, kinds: Iterable[int]) -> dict[int, dict | None]:
-        """Compile, or load from the disk, what these numbers of vertices need, by running it.
+    def compile(self, kinds: Iterable[Kind]) -> dict[Kind, dict | None]:
+        """Compile, or load from the disk, what these kinds need, by running it.
 
-        {N: row of the first replicate of the first condition of that N}.
+        {kind: row of the first replicate at the first displacement}.
         """
-        return {n: self.run(0, n, self.config.scene.delta[0], 0) for n in kinds}
+        return {kind: self.run(*kind, self.config.scene.delta[0], 0) for kind in kinds}

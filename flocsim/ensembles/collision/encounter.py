@@ -126,13 +126,19 @@ class Encounter:
         )  # fmt: skip
 
 
-def make_encounter(config: Config, shapes: Sequence[Shape], zone: float) -> Encounter:
-    """The Encounter of two shapes under a config; ``zone`` is D_0 [m]."""
+def make_encounter(
+    config: Config, shapes: Sequence[Shape], zone: float, integrator: Integrator | None = None
+) -> Encounter:
+    """The Encounter of two shapes under a config; ``zone`` is D_0 [m].
+
+    ``integrator``: instead of the config's, where a pilot has chosen it.
+    """
     bodies = [
         Body(shape, fixed=(config.scene.receiver == "fixed" and place == 0), **config.body_options)
         for place, shape in enumerate(shapes)
     ]
-    system = System(bodies, config.forces, config.integrator.method, fluid=config.fluid)
+    method = integrator or config.integrator.method
+    system = System(bodies, config.forces, method, fluid=config.fluid)
     return Encounter(system, config.scene, zone)
 
 

@@ -12,6 +12,7 @@ from flocsim.ensembles.config.problems import Misfit, Problems, dotted, misfit, 
 from flocsim.ensembles.config.schema import (
     ALTERNATIVES,
     FORCES,
+    INSTEAD_OF,
     STUDY_KEYS,
     TABLES,
     TOP_KEYS,
@@ -107,6 +108,11 @@ class Reader:
         for key in [key for each in others for key in each]:
             text = f"excludes {first[0]}, which is given too: remove one of them"
             self.problems.note((name, key), text)
+        for key, against in INSTEAD_OF.get(name, {}).items():
+            # A class of the user's own may have parameters of these names.
+            for other in sorted(against & table.keys()) if key in table and not others else ():
+                text = f"excludes {key}, which is given too: remove one of them"
+                self.problems.note((name, other), text)
         source = table.get("source", "synthetic")
         for key in [key for key in table if key in keys and "class" not in table]:
             needed = keys[key].metadata.get("only_for")

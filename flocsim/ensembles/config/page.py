@@ -27,7 +27,8 @@ takes, its default and its meaning. (This page is made from the schema by
   number, and there is no `nan` and no `inf`. All errors are told at once, with file and line.
 - **Presets** lie under the file: every value that the file gives replaces the preset's. Keys that
   exclude each other (`types` and `pairs`; `surface_density` and `density` with `depth`; `root`,
-  `distance` and `centre`; `source` and `class`; `name` and `class`) replace each other too.
+  `distance` and `centre`; `source` and `class`; `name` with `tolerance` or `step`, `class` and
+  `accuracy`) replace each other too.
   `forces.contact = false` leaves out a force that the preset has.
 - Without a preset, `[bodies]` needs a mass, and only the forces that have a table act, be the
   table empty.

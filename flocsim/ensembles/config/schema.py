@@ -4,12 +4,13 @@ To add a key, add an attribute here, and nothing else: its name is the key, its 
 it takes (flocsim.fields, and ``read_by`` of values.py for what those cannot say). The loader reads
 it, its messages name it, `--set` sets it, and `python -m flocsim.ensembles.config.page` writes it
 into docs/config.md. A new table is a class here and an attribute of Config. Keys that exclude each
-other stand in ALTERNATIVES, what is checked between tables in ``contradictions``. Metadata of this
-schema alone: ``shown`` is the default where it depends on other keys, ``only_for`` the one source
-of flocs that a key goes with; ``beside_class`` marks keys that stay where a class is named.
+other stand in ALTERNATIVES and INSTEAD_OF, what is checked between tables in ``contradictions``.
+Metadata of this schema alone: ``shown`` is the default where it depends on other keys, ``only_for``
+the one source of flocs that a key goes with; ``beside_class`` marks keys that stay where a class is
+named.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -378,6 +379,14 @@ class IntegratorConfig:
         shown='"implicit"',
         help="the method: see `flocsim.integrators`",
     )
+    accuracy: str | None = choice(
+        "auto",
+        default=None,
+        help="instead of a `name` and a `tolerance`: a pilot tries methods and tolerances on up to "
+        "900 replicates before the first, and takes for every collision type the cheapest whose "
+        "flips it expects to stay below a fifth of the sampling error that so many `replicates` "
+        "leave; the results file holds what was taken and why",
+    )
     tolerance: float = quantity(
         "m", above=0.0, default=1e-9, help="largest error of a step, what it leads to included"
     )
@@ -418,7 +427,13 @@ class IntegratorConfig:
         return self.name or full_name(self.own)
 
     @property
+    def is_chosen(self) -> bool:
+        """Whether a pilot chooses the method of every collision type (flocsim.ensembles.pilot)."""
+        return self.accuracy is not None
+
+    @property
     def method(self) -> Integrator:
+        """The method; where a pilot is to choose it, one that stands in for what it chooses."""
         if self.own is not None:
             return self.own
         made = METHODS[self.name or "implicit"]
@@ -508,9 +523,23 @@ ALTERNATIVES: dict[str, tuple[set[str], ...]] = {
     "shapes": ({"source"}, {"class"}),
     "bodies": ({"surface_density"}, {"density", "depth"}),
     "zone": ({"root"}, {"distance"}, {"centre"}),
-    "integrator": ({"name"}, {"class"}),
+    "integrator": ({"name"}, {"class"}, {"accuracy"}),
 }
 """Table → sets of keys that exclude each other: one of them replaces the others from below."""
+
+INSTEAD_OF = {"integrator": {"accuracy": {"tolerance", "step"}}}
+"""Table → key → further keys that it excludes, and that go with one another."""
+
+
+def excluded_by(table: str, given: Collection[str]) -> set[str]:
+    """The keys of a table that do not go with the given ones."""
+    alternatives = ALTERNATIVES.get(table, ())
+    chosen = [keys for keys in alternatives if keys & set(given)]
+    found = set().union(*(keys for keys in alternatives if chosen and keys not in chosen))
+    for key, others in INSTEAD_OF.get(table, {}).items():
+        found |= others if key in given else set()
+        found |= {key} if others & set(given) else set()
+    return found
 
 
 def contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[tuple[tuple[str, ...], str]]:

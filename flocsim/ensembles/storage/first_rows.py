@@ -11,29 +11,29 @@ import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.study import Study
+from flocsim.ensembles.study import Kind, Study
 
-Rows = dict[int, bytes]
-"""{N: the row of the first replicate of the first condition of that N}."""
+Rows = dict[Kind, bytes]
+"""{kind: the row of its first replicate at the first displacement}."""
 
 
-def packed(rows: Mapping[int, dict | None]) -> Rows:
+def packed(rows: Mapping[Kind, dict | None]) -> Rows:
     """The rows of Study.compile as bytes."""
     return {
-        n: np.array(tuple(row[name] for name in COLUMNS), ROW).tobytes()
-        for n, row in rows.items() if row is not None
+        kind: np.array(tuple(row[name] for name in COLUMNS), ROW).tobytes()
+        for kind, row in rows.items() if row is not None
     }  # fmt: skip
 
 
 def stored_rows(study: Study, store: RowStore) -> Rows:
     """The same rows as a journal or an older results file has them, where it does."""
     scene, found = study.config.scene, {}
-    for n in study.kinds:
-        condition = Condition(scene.conditions[0][0], n, scene.delta[0])
+    for kind in study.kinds:
+        condition = Condition(scene.conditions[kind[0]][0], kind[1], scene.delta[0])
         place = store.conditions.index(condition)
         if any(first == 0 < stop for first, stop in store.intervals(place)):
             values = (store.read(place, name, 0, 1)[0] for name in COLUMNS)
-            found[n] = np.array(tuple(values), ROW).tobytes()
+            found[kind] = np.array(tuple(values), ROW).tobytes()
     return found
 
 
@@ -49,15 +49,16 @@ def difference(study: Study, ranks: Sequence[Rows], arithmetic: Sequence[str], s
                 f"rank {rank} rounds sin, exp and the like otherwise than rank 0 (another kind of "
                 "processor, another C library or numpy): give the job machines of one kind"
             )
-    for n in study.kinds:
-        which = f"replicate 0 of type {scene.conditions[0][0]}, N = {n}, delta {scene.delta[0]:g}"
+    for kind in study.kinds:
+        name, n = scene.conditions[kind[0]][0], kind[1]
+        which = f"replicate 0 of type {name}, N = {n}, delta {scene.delta[0]:g}"
         for rank, rows in enumerate(ranks):
-            if rows.get(n) != ranks[0].get(n):
+            if rows.get(kind) != ranks[0].get(kind):
                 return (
                     f"{which} comes out otherwise on rank {rank} than on rank 0: give the job "
                     "machines of one kind, or leave out what is random in a force of your own"
                 )
-        if n in stored and stored[n] != ranks[0].get(n):
+        if kind in stored and stored[kind] != ranks[0].get(kind):
             return (
                 f"{which} comes out otherwise here than it is in the file: go on where the run was "
                 "begun, or begin anew by --restart"

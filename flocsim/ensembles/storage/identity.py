@@ -11,6 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import attrs
@@ -53,21 +54,31 @@ def identity_of(study: Study) -> dict:
     if config.shapes.own is not None:
         facts |= settings("shapes", config.shapes.own)
         facts["shapes.class"] = config.shapes.label
+    facts |= method_facts(study)
+    facts["integrator.max_steps"] = config.integrator.max_steps
+    facts["integrator.check_share"] = config.integrator.check_share
+    for name, force in zip(config.force_names, config.forces, strict=True):
+        facts[f"forces.{name}"] = type(force).__qualname__
+        facts |= settings(f"forces.{name}", force)
+    facts |= type_facts(config) | floc_facts(study) | kernel_facts(study)
+    return json.loads(json.dumps(facts))
+
+
+def method_facts(study):
+    """The method, or what a pilot has chosen for each type."""
+    config = study.config
+    if config.integrator.is_chosen:
+        chosen = {f"types.{name}.integrator": repr(each) for name, each in study.methods.items()}
+        return {"integrator.accuracy": config.integrator.accuracy} | chosen
     method = config.integrator.method
-    facts |= settings("integrator", method)
+    facts = settings("integrator", method)
     # A class of the user's own may have these as properties, whose code no kernel reaches.
     for name in ("tolerance", "first_step", "largest_step"):
         facts[f"integrator.{name}"] = plain(getattr(method, name))
     starts = [*method.fresh_clock(), *method.fresh_counts(config.integrator.max_steps)]
     facts["start.the integrator"] = digest(np.array(starts, float))
     facts["integrator.name"] = config.integrator.label
-    facts["integrator.max_steps"] = config.integrator.max_steps
-    facts["integrator.check_share"] = config.integrator.check_share
-    for name, force in zip(config.force_names, config.forces, strict=True):
-        facts[f"forces.{name}"] = type(force).__qualname__
-        facts |= settings(f"forces.{name}", force)
-    facts |= type_facts(config) | floc_facts(study) | kernel_facts(config)
-    return json.loads(json.dumps(facts))
+    return facts
 
 
 def settings(table, values):
@@ -154,13 +165,17 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 """Angles [rad] at which a shape is placed for the identity."""
 
 
-def kernel_facts(config):
-    """Fingerprints of the code that is compiled for spheres and for polygons."""
+def kernel_facts(study):
+    """Fingerprints of the code that is compiled for spheres and for polygons, by every method."""
+    config = study.config
     _, pair = next(sphere_pairs(config))
     facts = {}
-    for shapes in kinds(config, pair.shapes):
-        system = placed_system(config, pair.system, shapes)
+    methods = {type(each): each for each in study.methods.values()}.values()
+    for shapes, method in product(kinds(config, pair.shapes), methods):
+        system = placed_system(config, attrs.evolve(pair.system, integrator=method), shapes)
         name = "spheres" if system.spheres_only else "polygons"
+        if config.integrator.is_chosen:
+            name += f" by {type(method).__name__}"
         laws = sorted(system.pieces.laws.items())
         codes = [fingerprint(advance, system.fillings(OBSERVER))]
         codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]

@@ -66,6 +66,7 @@ class Beginning:
     ``unasked`` says what rows the journal has of other conditions, and ``farthest`` how far it has
     them of these (those beyond the end of a run with the same rule left out): they are not to go
     with it. ``at_least``: replicates that each condition has in the results file already.
+    ``accuracy``: the record of a pilot's choice, where there was one.
     """
 
     store: RowStore
@@ -77,6 +78,7 @@ class Beginning:
     unasked: list[Condition] = attrs.Factory(list)
     farthest: int = 0
     at_least: int = 0
+    accuracy: dict = attrs.Factory(dict)
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     flocs: int = 0
@@ -158,15 +160,17 @@ def begin(
     journal: Journal,
     cpus: Sequence[dict] = (),
     overwrite: bool = False,
+    accuracy: dict | None = None,
 ) -> Beginning:
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
-    ``journal``: as `claim` gave it. Raises UsageError where what lies there is of another config,
-    of other shapes or other physics, has rows that this study would drop, or is anything but
-    results of this study to be extended; with ``overwrite`` that is set aside.
+    ``journal``: as `claim` gave it; ``accuracy``: the record of a pilot's choice. Raises UsageError
+    where what lies there is of another config, of other shapes or other physics, has rows that this
+    study would drop, or is anything but results of this study to be extended; with ``overwrite``
+    that is set aside.
     """
     start = Beginning(RowStore(journal, study.conditions), identity, cpus_now=list(cpus))
-    start.rule, start.flocs = rule_of(study), len(study.flocs)
+    start.rule, start.flocs, start.accuracy = rule_of(study), len(study.flocs), accuracy or {}
     start.resources.callback(journal.release)
     try:
         take_journal(start)
@@ -175,12 +179,19 @@ def begin(
         session = {
             "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
             "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": start.rule,
+            "accuracy": start.accuracy,
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
         start.resources.close()
         raise
     return start
+
+
+def recorded_choices(journal: Journal) -> list[dict]:
+    """The records of pilots' choices that the sessions of a journal have."""
+    found = [each.description for each in journal.records if each.kind == SESSION]
+    return [each["accuracy"] for each in found if is_session(each) and each.get("accuracy")]
 
 
 def check_free(output: str | Path) -> None:

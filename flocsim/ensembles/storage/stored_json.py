@@ -10,6 +10,16 @@ CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm
 SESSION = {"identity": {}, "short": str, "layout": str, "date": str, "command": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
+TRIED = {"method": str, "tolerance": float, "flips": int, "cost": float}
+CHOSEN = {
+    "name": str, "method": str, "tolerance": float, "replicates": int, "reference": float,
+    "expected": float, "bound": float, "tried": [TRIED],
+}  # fmt: skip
+CHOICE = {
+    "of": str, "target": float, "half_width": float, "cost": float, "types": [CHOSEN],
+}  # fmt: skip
+"""What a pilot has chosen, as `flocsim.ensembles.pilot.choice.Choice` says."""
+
 FORMS: dict[str, tuple[Any, Any]] = {
     # name in the group ``run``: (pattern, what it is where there is none)
     "identity": ({}, {}),
@@ -17,6 +27,7 @@ FORMS: dict[str, tuple[Any, Any]] = {
     "history": ([{}], []),
     "cpus": ([CPU], []),
     "overrides": ({}, {}),
+    "accuracy": (CHOICE, {}),
 }
 
 
@@ -36,4 +47,9 @@ def stored(run: Mapping[str, Any], name: str) -> Any:
 
 def is_session(description: dict) -> bool:
     """Whether a record's description, whoever wrote it, can be that of a session."""
-    return matches(description, SESSION) and matches(description.get("cpus", []), [CPU])
+    accuracy = description.get("accuracy", {})
+    return (
+        matches(description, SESSION)
+        and matches(description.get("cpus", []), [CPU])
+        and (accuracy == {} or matches(accuracy, CHOICE))
+    )

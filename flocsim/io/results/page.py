@@ -78,7 +78,10 @@ RUN = """\
 ## run
 
 Scalars. `config` (the file's text), `overrides` (JSON: what the command line laid over it),
-`seed`, `preset`; `identity` (JSON: all that the rows follow from, which a resumed run compares);
+`seed`, `preset`; `accuracy` (JSON, with `accuracy = "auto"` alone: what the pilot has chosen for
+each type and why: method, tolerance, its replicates, flips and cost at all that was tried, the rate
+of flips that is expected); `identity` (JSON: all that the rows follow from, which a resumed run
+compares);
 `kernel_fingerprint`; versions of flocsim, Python, numpy, numba and h5py; `platform`, `processor`,
 `hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `history` (JSON: date and
 command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];

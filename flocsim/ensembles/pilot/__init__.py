@@ -1,0 +1,9 @@
+"""What a few replicates, run before all others, tell of a study.
+
+sample: which replicates a pilot runs; ladder: the settings that it tries, one replicate at a
+setting and what it costs; model: how many outcomes flip at a tolerance, from those that were seen
+to; choice: `integrator.accuracy = "auto"`, the cheapest setting that is accurate enough. All of it
+is a function of config and seed: nothing here looks at a clock.
+
+May import study and what lies below it, and `storage.identity`, which says what a choice is of.
+"""

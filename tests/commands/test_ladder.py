@@ -1,0 +1,83 @@
+"""`flocsim work-precision` of a whole study: flips, errors of d_c and CPU time at every rung."""
+
+import numpy as np
+import pytest
+
+from flocsim.__main__ import main
+from flocsim.commands import ladder
+from flocsim.ensembles.pilot.choice import first_methods
+from flocsim.ensembles.pilot.ladder import Job
+from flocsim.ensembles.pilot.sample import sample_of
+from flocsim.ensembles.study import Study
+from flocsim.integrators import Implicit
+from tests.helpers.small_study import small_config, small_study, write_small
+
+
+@pytest.fixture
+def implicit_alone(monkeypatch, tmp_path):
+    """The small config; only the method that is compiled already, at two rungs."""
+    write_small(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ladder, "DormandPrince54", Implicit)
+    monkeypatch.setattr(ladder, "DECADES", (1.0, 1e-2))
+    return tmp_path
+
+
+def test_the_table_and_the_picture(implicit_alone, capsys):
+    words = "work-precision small.toml --vertices 4 --count 6 -o a.png"
+    assert main(words.split()) == 0
+    text = capsys.readouterr().out
+    assert "type I, 6 replicates" in text and "type III, 6 replicates" in text
+    rows = [line.split() for line in text.splitlines() if line.startswith("Implicit")]
+    assert len(rows) == 8
+    for loose, tight in zip(rows[::2], rows[1::2], strict=True):
+        assert (loose[1], tight[1]) == ("1e-06", "1e-08")
+        errors = [float(row[row.index("m") + 6]) for row in (loose, tight)]
+        assert errors[1] < errors[0] < 1e-4
+    assert "with 3 replicates the sampling error is 37 %" in text
+    assert "I: implicit, tolerance = " in text
+    assert (implicit_alone / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--count 0", "--count must be at least 1, found 0"),
+        ("--replicate 1 --count 3", "--count is for the whole study"),
+        ("--replicate 1 -o a.png", "--output is for the whole study"),
+        ("-o a.gif", "a.gif: a figure's name must end in one of .png, .pdf, .svg"),
+        ("--delta 0.3", "--delta must be one of 0.0, 1.0, found 0.3"),
+    ],
+)
+def test_what_is_wrong_is_one_line(implicit_alone, capsys, words, said):
+    assert main(["work-precision", "small.toml", *words.split()]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+def test_the_distance_between_two_steps_is_a_cubics():
+    times = np.array([0.0, 1.0, 3.0])
+    values, rates = times**3 - times, 3.0 * times**2 - 1.0
+    for instant in (0.0, 0.4, 1.0, 2.2, 3.0):
+        found = ladder.distance_at((times, values, rates), instant)
+        assert found == pytest.approx(instant**3 - instant, abs=1e-12)
+
+
+def test_what_is_measured_ends_as_in_the_study(tmp_path):
+    study = small_study(tmp_path)
+    row = study.run(1, 4, 0.0, 1)
+    task = (1, 4, 0.0, 1)
+    job = Job(task, study.config.integrator.method, study.config.integrator.max_steps)
+    trial, motion = ladder.measured(study, job)
+    assert (trial.outcome, trial.inside, trial.time) == (
+        row["outcome"], row["inside"], row["t_end"],
+    )  # fmt: skip
+    assert motion[1][-1] == pytest.approx(row["d_c_last"], rel=1e-9)
+
+
+def test_a_sample_of_any_size(tmp_path):
+    config = small_config(tmp_path, {"shapes": {"vertices": [1]}})
+    assert [len(tasks) for tasks in sample_of(config, 4)] == [4, 4]
+    # Three replicates at two displacements are all there are.
+    assert [len(set(tasks)) for tasks in sample_of(config, 100)] == [6, 6]
+    assert Study(config, methods=first_methods(config)).size == 12
