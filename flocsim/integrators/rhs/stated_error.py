@@ -9,8 +9,10 @@ parting g too late, at the speed v, leaves out (or adds) the contact's force for
 A contact that may be open, because it overlaps by no more than its gap may be wrong by, leaves the
 force in doubt for all of the step.
 
-Motion itself carries errors on and mixes them up. OF_SWITCHES, and a method's ``estimate_share``
-of what it estimates for its steps, were found on random runs that make a nudge grow less than
+These sums know nothing of what contacts take up, nor that errors cancel. A method that has the
+forces' derivatives carries the error on as a vector, too (radau/carried_error.py), and the smaller
+of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of what it estimates
+for its steps, were found on random runs that make a nudge grow less than
 tenfold (benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over
 one way or the other, is told by a nudged companion alone.
 """
@@ -45,6 +47,7 @@ from flocsim.arrays import (
     STEP_SPEED,
     SWITCH_PLACE,
     SWITCH_SPEED,
+    TOLERANCE,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
@@ -60,8 +63,11 @@ from flocsim.laws import contact_force
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
 
-OF_VECTOR = 2.0
-"""By how much the error may be larger than the vector of it that is carried along."""
+OF_VECTOR = 4.0
+"""By how much the error may be larger than the vector of it that is carried along, …"""
+
+LEAST = 0.01
+"""… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
 
 DOUBT = 2.0
 """A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
@@ -102,7 +108,8 @@ def carry_errors(scene, work, clock, step):
         stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * errors[body, SWITCH_PLACE]
         largest = max(largest, stated)
-    clock[ERROR] = min(largest, OF_VECTOR * carry_vector(scene, work, step))
+    vector = max(carry_vector(scene, work, step), LEAST * clock[TOLERANCE])
+    clock[ERROR] = min(largest, OF_VECTOR * vector)
 
 
 def shorten(scene, work, body, first, most):
