@@ -236,7 +236,7 @@ class System:
         nudge (default: amplification.NUDGE of a radius); inf where the companion ends early.
         """
 
-        def companion(bodies):
+        def companion(bodies: list[Body]) -> np.ndarray | None:
             run = attrs.evolve(self, bodies=bodies).begin(until, max_steps=max_steps, jit=jit)
             ended = run.to_end() == Status.FINISHED
             return run.work.motion[NOW, :, :3] if ended else None
