@@ -36,9 +36,10 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
-START, CHANGE, DEVIATION, MOTION_ROWS = range(STATES, STATES + 4)
+START, CHANGE, DEVIATION, CARRIED, MOTION_ROWS = range(STATES, STATES + 5)
 """Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
-change of velocities that Newton's method makes; by how much NEW is likely to be wrong."""
+change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
+such errors, carried on with the motion, have become."""
 
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
@@ -130,9 +131,10 @@ tolerance of the trial that was just rejected (0: none was); 1 from a switch unt
 taken behind it; the size of the last such step; the share of what the method estimates for its
 steps that counts in the stated error."""
 
-STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, COUNTS_SIZE = range(8)
+STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, COUNTS_SIZE = range(9)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
-which to pause, the observer's last code, events located."""
+which to pause, the observer's last code, events located, steps in a row by which no time has
+gone by."""
 
 
 class BodyView(NamedTuple):
@@ -206,7 +208,8 @@ class Scene(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (12, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION.
+    ``motion`` (13, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION,
+    CARRIED.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
     ``slip`` (19, capacity): tangential displacements in the states, their rates there, and those
     set aside while the list is made anew.

@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import TOLERANCE, Scene, work_of
+from flocsim.arrays import NOW, TOLERANCE, Scene, work_of
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
@@ -20,6 +20,7 @@ from flocsim.forces.smoothing import smoothing_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
+from flocsim.integrators.amplification import MOST_AMPLIFIED, amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
@@ -36,9 +37,11 @@ class Trajectory:
 
     ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
     at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
-    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], the
-    sum of the steps' estimated errors, a cautious bound unless the motion is chaotic (nan where the
-    method estimates none); ``wall_time`` [s].
+    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], what
+    the errors of steps and of switches have led to by the end (nan where the method estimates
+    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a nudge (None
+    where that was not asked for): above MOST_AMPLIFIED, 10, the error is no promise, and
+    ``error_text`` says so.
     """
 
     t: np.ndarray
@@ -50,15 +53,33 @@ class Trajectory:
     evaluations: int
     error: float
     wall_time: float
+    amplification: float | None = None
+
+    @property
+    def error_text(self) -> str:
+        """What can be said of the error at the end, in words."""
+        if not np.isfinite(self.error):
+            return "the method states no error"
+        stated = f"stated error {self.error:.2g} m"
+        if self.amplification is None:
+            return stated
+        if self.amplification > MOST_AMPLIFIED:
+            return (
+                f"{stated}, which is no promise: the motion amplifies a nudge "
+                f"{self.amplification:.2g} times"
+            )
+        return f"{stated}; the motion amplifies a nudge {self.amplification:.2g} times"
 
     @classmethod
-    def of(cls, run: Run, status: Status, wall_time: float) -> "Trajectory":
+    def of(
+        cls, run: Run, status: Status, wall_time: float, amplification: float | None = None
+    ) -> "Trajectory":
         """What a Run has come to."""
         times, position, velocity = run.motion()
         adaptive = np.isfinite(run.clock[TOLERANCE])
         return cls(
             times, position, velocity, status, run.steps, run.rejected, run.evaluations,
-            run.error if adaptive else float("nan"), wall_time,
+            run.error if adaptive else float("nan"), wall_time, amplification,
         )  # fmt: skip
 
 
@@ -186,18 +207,41 @@ class System:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
 
     def run(
-        self, until: float, *, max_steps: int = 1_000_000, record: bool = True, jit: bool = True
-    ) -> Trajectory:
+        self, until: float, *, max_steps: int = 1_000_000, record: bool = True,
+        amplification: bool = False, jit: bool = True,
+    ) -> Trajectory:  # fmt: skip
         """Move the bodies until a time [s] and return the Trajectory.
 
         A run that ends early says why in ``Trajectory.status``; it raises no exception.
+        ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
         """
         check_limits(until, max_steps)
         self.check_overlaps()
         began = time.perf_counter()
         run = self.begin(until, max_steps=max_steps, record=record, jit=jit)
         status = run.to_end()
-        return Trajectory.of(run, status, time.perf_counter() - began)
+        growth = None
+        if amplification:
+            growth = self.amplification(run.time, run.work.motion[NOW, :, :3], max_steps, jit=jit)
+        return Trajectory.of(run, status, time.perf_counter() - began, growth)
+
+    def amplification(
+        self, until: float, end: np.ndarray, max_steps: int = 1_000_000, *,
+        nudge: float | None = None, jit: bool = True,
+    ) -> float:  # fmt: skip
+        """By how much the motion up to a time [s] amplifies a nudge of its start [m].
+
+        The distance of any outline point at ``end`` (n, 3), where the bodies come to, from where it
+        is in a companion whose moving bodies start ``nudge`` further in fixed directions, over the
+        nudge (default: amplification.NUDGE of a radius); inf where the companion ends early.
+        """
+
+        def companion(bodies: list[Body]) -> np.ndarray | None:
+            run = attrs.evolve(self, bodies=bodies).begin(until, max_steps=max_steps, jit=jit)
+            ended = run.to_end() == Status.FINISHED
+            return run.work.motion[NOW, :, :3] if ended else None
+
+        return amplification_of(self.bodies, end, companion, nudge)
 
     def begin(
         self,

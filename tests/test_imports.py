@@ -47,7 +47,7 @@ INNER_ROWS = {
         ["loop", "radau"],
         ["events"],
         ["rhs"],
-        ["base"],
+        ["amplification", "base"],
     ],
     "ensembles": [
         ["cli"],

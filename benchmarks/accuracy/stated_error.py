@@ -1,6 +1,6 @@
 """Whether the stated error covers the true one, on random runs of every family.
 
-    python -m benchmarks.accuracy.stated_error [--runs 2000] [--families departing free_flight …]
+    python -m benchmarks.accuracy.stated_error [--runs 2000] [--processes 2] [--families …]
 
 A run at the default tolerance is held against the same at 1e-13 m, and a companion of that, nudged
 by 1e-11 m, says by how much the motion amplifies a difference; runs that amplify it more than ten
@@ -8,7 +8,8 @@ times, for which no sum of errors can speak, are counted and left out.
 """
 
 import math
-from functools import cache
+import multiprocessing
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,17 +18,23 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim import Body, System
-from flocsim.ensembles.collision.encounter import end_distance, replicate_system
+from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Status
+from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance
 
 EXACT, NUDGE = 1e-13, 1e-11
 """Tolerance [m] of what counts as exact, and how far its companion starts from it [m]."""
 
-MOST_AMPLIFIED = 10.0
+UNTOUCHED = 1e-18
+"""Runs that differ by less [m] differ by rounding: nothing has met."""
+
+MOST_TRIED = 100
+"""How many runs are looked at, at most, for each that counts."""
+
 VERTICES = (8, 16, 32, 64)
 MOST_STEPS = 100_000
 COLLOID = {"double_layer": {"debye_length": 30e-9, "potential": 0.03}}
@@ -102,12 +109,13 @@ def several_bodies(rng, number):
             shape, tuple(place), float(rng.uniform(0.0, 6.0)), tuple(velocity),
             float(rng.normal() * 1e3), surface_density=2.0,
         ))  # fmt: skip
-    return System(bodies, [Gravity(), StokesDrag(), Contact()], Implicit()), 2e-3
+    system = System(bodies, [Gravity(), StokesDrag(), Contact()], Implicit())
+    return system, float(rng.uniform(4e-4, 1e-3))
 
 
 def free_flight(rng, number):
-    """Two flocs that bounce once or more in nothing, and fly on."""
-    height, speed = 4e-5, float(rng.uniform(0.01, 0.2))
+    """Two flocs that bounce once or more in nothing, and fly on for a few of their sizes."""
+    height, speed = 4e-5, float(rng.uniform(0.01, 0.1))
     bodies = [
         Body(random_shape(rng), (side * height, float(rng.normal() * 5e-6)),
              float(rng.uniform(0.0, 6.0)), (-side * speed, 0.0), float(rng.normal() * 1e3),
@@ -115,21 +123,14 @@ def free_flight(rng, number):
         for side in (-1.0, 1.0)
     ]  # fmt: skip
     damping = float(rng.choice([0.0, 1e5]))
-    return System(bodies, [Contact(damping_n=damping)], Implicit()), 20.0 * height / speed
+    return System(bodies, [Contact(damping_n=damping)], Implicit()), float(
+        rng.uniform(1.0, 4.0)
+    ) * height / speed
 
 
 FAMILIES = {each.__name__: each for each in (
     departing, rolling, friction, surface_forces, several_bodies, free_flight,
 )}  # fmt: skip
-
-
-def nudged(system, rng):
-    """The system with every body moved by a random NUDGE."""
-    bodies = []
-    for body in system.bodies:
-        x, y = np.array(body.position) + NUDGE * rng.normal(size=2)
-        bodies.append(attrs.evolve(body, position=(float(x), float(y))))
-    return attrs.evolve(system, bodies=bodies)
 
 
 def ended(system, until):
@@ -138,22 +139,42 @@ def ended(system, until):
     return found if found.status == Status.FINISHED else None
 
 
-def judge(family, number, tolerance):
+def judge(family, tolerance, number):
     """(true error, stated error [m], amplification) of one run, or why there is none."""
-    rng = np.random.default_rng([number, 11])
-    drawn = FAMILIES[family](rng, number)
+    drawn = FAMILIES[family](np.random.default_rng([number, 11]), number)
     if drawn is None:
         return "another outcome"
     system, until = drawn
     exact = attrs.evolve(system, integrator=Implicit(EXACT))
-    runs = [attrs.evolve(system, integrator=Implicit(tolerance)), exact, nudged(exact, rng)]
-    ends = [ended(each, until) for each in runs]
-    if None in ends:
+    found, best = ended(attrs.evolve(system, integrator=Implicit(tolerance)), until), None
+    if found is None or (best := ended(exact, until)) is None:
         return "did not end"
-    found, best, other = (end.position[-1] for end in ends)
-    sizes = system.bodies
-    growth = end_distance(sizes, other, best) / NUDGE
-    return end_distance(sizes, found, best), ends[0].error, growth
+    there = best.position[-1]
+    true = end_distance(system.bodies, found.position[-1], there)
+    if true < UNTOUCHED:
+        return "nothing met"
+    growth = exact.amplification(until, there, MOST_STEPS, nudge=NUDGE)
+    return true, found.error, growth
+
+
+def judged(family, tolerance, runs, processes):
+    """(runs that count as (true/stated, number, true, stated, amplification), amplified, not
+    ended): the first of them by number, for any number of processes."""
+    shares, left, failed = [], 0, 0
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(processes) as pool:
+        results = pool.imap(partial(judge, family, tolerance), range(MOST_TRIED * runs))
+        for number, found in enumerate(results):
+            if isinstance(found, str):
+                failed += found == "did not end"
+            elif not found[2] < MOST_AMPLIFIED:
+                left += 1
+            else:
+                shares.append((found[0] / found[1], number, *found))
+            if len(shares) == runs:
+                break
+        pool.terminate()
+    return shares, left, failed
 
 
 def main():
@@ -162,6 +183,7 @@ def main():
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--tolerance", type=float, default=1e-9)
     parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
+    parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--worst", type=int, default=0, help="list so many of the worst runs")
     arguments = parser.parse_args()
     runs = 20 if arguments.quick else arguments.runs
@@ -170,16 +192,8 @@ def main():
                "99th percentile", "largest")  # fmt: skip
     table = Table(f"True error over stated error at {arguments.tolerance:g} m", columns)
     for family in arguments.families:
-        shares, left, failed, number = [], 0, 0, 0
-        while len(shares) < runs and number < 20 * runs:
-            found = judge(family, number, arguments.tolerance)
-            number += 1
-            if isinstance(found, str):
-                failed += found == "did not end"
-            elif not found[2] < MOST_AMPLIFIED:
-                left += 1
-            else:
-                shares.append((found[0] / found[1], number - 1, *found))
+        found = judged(family, arguments.tolerance, runs, arguments.processes)
+        shares, left, failed = found
         values = np.array([each[0] for each in shares])
         table.add(
             family, len(shares), left, failed, 100.0 * np.mean(values <= 1.0),

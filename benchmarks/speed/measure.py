@@ -9,8 +9,8 @@ from flocsim.arrays import (
     NOW,
     work_of,
 )
-from flocsim.ensembles.collision.encounter import end_distance
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Status
 from flocsim.run import Run
 

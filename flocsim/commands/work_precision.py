@@ -11,12 +11,13 @@ import attrs
 
 from flocsim.commands import ladder
 from flocsim.commands.trajectory import add_replicate, one_count_study, select
-from flocsim.ensembles.collision.encounter import end_distance, replicate_system
+from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import FlocsimError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.integrators.amplification import end_distance
 from flocsim.io.results.schema import OUTCOMES
 
 TIGHTEST = 1e-13

@@ -22,6 +22,7 @@ from flocsim.hooks import skin_factor
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.collocation import collocate
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
@@ -29,6 +30,7 @@ from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.integrators.rhs.stated_error import carry_vector
 from flocsim.integrators.rhs.views import inertia
 
 ORDER_OF_ESTIMATE = 4.0
@@ -123,5 +125,5 @@ class Implicit(Integrator):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Dense output by the stages' cubic, and longer lists."""
-        return {interpolate: collocate, skin_factor: wide_skin}
+        """Dense output by the stages' cubic, longer lists, and the error as a vector."""
+        return {interpolate: collocate, skin_factor: wide_skin, carry_vector: carry_error}

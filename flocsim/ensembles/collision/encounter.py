@@ -155,17 +155,6 @@ def replicate_system(
     return attrs.evolve(system, bodies=bodies, integrator=integrator or system.integrator)
 
 
-def end_distance(bodies: Sequence[Body], position: np.ndarray, exact: np.ndarray) -> float:
-    """The furthest [m] that any point of an outline is from where it ought to be.
-
-    ``position`` and ``exact`` (n, 3): x, y [m] and angle [rad] of the bodies at the end of two
-    runs. Largest |Δx| + R |Δθ| of a body, R its largest centroid-to-outline distance.
-    """
-    sizes = np.array([body.shape.bounding_radius for body in bodies])
-    shift = np.hypot(*(position[:, :2] - exact[:, :2]).T)
-    return float(np.max(shift + sizes * np.abs(position[:, 2] - exact[:, 2])))
-
-
 class Record:
     """Asks run_encounter to keep every step of a replicate."""
 

@@ -21,6 +21,7 @@ from flocsim.arrays import (
     RECORDED,
     REJECTED,
     STEPS,
+    STILL,
     TIME,
     TOLERANCE,
     UNTIL,
@@ -33,7 +34,7 @@ from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, observe
 from flocsim.integrators.events.first_event import depth_of, switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
-from flocsim.integrators.loop.step_size import choose_step, plan, reject
+from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
@@ -45,6 +46,9 @@ FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED,
 
 MOST_TRIALS = 12
 """Steps tried to end at one switch."""
+
+MOST_STILL = 100
+"""Steps in a row that move nothing: more than pairs that switch one behind the other."""
 
 
 def too_deep(scene, work):
@@ -76,13 +80,19 @@ def accept(scene, work, clock, counts, step, lists):
     clock[TIME] += step
     counts[STEPS] += 1
     if clock[TOLERANCE] < math.inf:
-        carry_errors(work, clock, step)
+        carry_errors(scene, work, clock, step)
     if not lists:
         return SAME
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
         add_switch_errors(scene, work, step, depth_of(work, clock))
     hand_over(scene, work)
     return set_modes(scene, work)
+
+
+def stands_still(clock, counts, step):
+    """Count the accepted steps in a row that are as good as none; whether they are too many."""
+    counts[STILL] = 0 if moves(clock, step) else counts[STILL] + 1
+    return counts[STILL] > MOST_STILL
 
 
 def record_row(work, clock, counts, record):
@@ -147,7 +157,7 @@ def advance(scene, work, observed, clock, counts, record):
             return status
         if lists and trials == 0 and not keep_lists(scene, work):
             return NO_ROOM
-        step = min(choose_step(scene, work, clock, lists), limit)
+        step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
         if scene.surface_reach > 0.0:
             flag_near(scene, work, NOW, step)
         ratio = attempt(scene, work, clock, step)
@@ -170,4 +180,6 @@ def advance(scene, work, observed, clock, counts, record):
         status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:
             return status
+        if stands_still(clock, counts, step):
+            return STALLED
     return FINISHED

@@ -72,6 +72,10 @@ def adaptive_factor(clock, step, ratio, order):
 SMALLEST_STEP = 1e-14
 """A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
 
+LEAST_ADVANCE = 2.3e-16
+"""A step of this share of the time takes it to another number at least: what switches within that
+switches together."""
+
 IMMINENT = 0.05
 """A switch within this share of the step is run up to by a step of its own."""
 
@@ -110,6 +114,20 @@ def choose_step(scene, work, clock, lists):
     return min(step, left)
 
 
+def room_for_time(clock, step):
+    """The step, or the least one behind which the time is another number."""
+    if clock[TOLERANCE] == math.inf:
+        return step
+    return max(step, min(LEAST_ADVANCE * clock[TIME], clock[UNTIL] - clock[TIME]))
+
+
+def moves(clock, step):
+    """Whether anything can have moved in a step, which ended at the time now."""
+    if clock[TOLERANCE] == math.inf:
+        return clock[TIME] - step < clock[TIME]
+    return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
+
+
 def reject(clock, counts, step, ratio, too_far):
     """Choose a smaller step; False where there is none."""
     counts[REJECTED] += 1
@@ -121,7 +139,7 @@ def reject(clock, counts, step, ratio, too_far):
     clock[REJECTED_RATIO] = ratio
     if ratio < 0.0:
         clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
-    return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
+    return moves(clock, step)
 
 
 def plan(clock, step, ratio, was_cut, switched):

@@ -9,8 +9,10 @@ parting g too late, at the speed v, leaves out (or adds) the contact's force for
 A contact that may be open, because it overlaps by no more than its gap may be wrong by, leaves the
 force in doubt for all of the step.
 
-Motion itself carries errors on and mixes them up. OF_SWITCHES, and a method's ``estimate_share``
-of what it estimates for its steps, were found on random runs that make a nudge grow less than
+These sums know nothing of what contacts take up, nor that errors cancel. A method that has the
+forces' derivatives carries the error on as a vector, too (radau/carried_error.py), and the smaller
+of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of what it estimates
+for its steps, were found on random runs that make a nudge grow less than
 tenfold (benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over
 one way or the other, is told by a nudged companion alone.
 """
@@ -21,9 +23,11 @@ from flocsim.arrays import (
     ANGLE,
     BOUNDING_RADIUS,
     CANDIDATES,
+    CARRIED,
     CLOSED,
     DEVIATION,
     EDGE_ARM_N,
+    EDGE_ARM_T,
     EDGE_BODY,
     ERROR,
     ERROR_PLACE,
@@ -37,21 +41,33 @@ from flocsim.arrays import (
     NORMAL_Y,
     NOW,
     RELAXATION,
+    SPIN,
     STEP_ERROR,
     STEP_PLACE,
     STEP_SPEED,
     SWITCH_PLACE,
     SWITCH_SPEED,
+    TOLERANCE,
     VERTEX_ARM_N,
+    VERTEX_ARM_T,
     VERTEX_BODY,
+    VX,
+    VY,
     X,
     Y,
 )
+from flocsim.hooks import hook
 from flocsim.integrators.rhs.views import contact_view, normal_rate
 from flocsim.laws import contact_force
 
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
+
+OF_VECTOR = 6.0
+"""By how much the error may be larger than the vector of it that is carried along, …"""
+
+LEAST = 0.01
+"""… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
 
 DOUBT = 2.0
 """A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
@@ -69,7 +85,14 @@ def carried(work, body, place, speed, step):
     errors[body, speed] *= left
 
 
-def carry_errors(work, clock, step):
+@hook
+def carry_vector(scene, work, step):
+    """Carry the error as a vector, too, where the method has the forces' derivatives; how large it
+    is in the place of an outline [m]."""
+    return math.inf
+
+
+def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
     known, errors = False, work.bodies
     for body in range(work.bodies.shape[0]):
@@ -85,7 +108,32 @@ def carry_errors(work, clock, step):
         stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * errors[body, SWITCH_PLACE]
         largest = max(largest, stated)
-    clock[ERROR] = largest
+    vector = max(carry_vector(scene, work, step), LEAST * clock[TOLERANCE])
+    clock[ERROR] = min(largest, OF_VECTOR * vector)
+
+
+def shorten(scene, work, body, first, most):
+    """Shorten a body's carried error of place, or of velocity, to what it can be; its size."""
+    e = work.motion
+    size = math.hypot(e[CARRIED, body, first], e[CARRIED, body, first + 1])
+    size += scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, first + 2])
+    if size <= most:
+        return size
+    for axis in range(first, first + 3):
+        e[CARRIED, body, axis] *= most / size
+    return most
+
+
+def bound_carried(scene, work):
+    """Keep every body's vector within the sum of its parts, which a mode that switches again and
+    again would make it leave; the largest one of place [m]."""
+    largest, errors = 0.0, work.bodies
+    for body in range(work.bodies.shape[0]):
+        place = errors[body, ERROR_PLACE] + OF_SWITCHES * errors[body, SWITCH_PLACE]
+        speed = errors[body, ERROR_SPEED] + OF_SWITCHES * errors[body, SWITCH_SPEED]
+        shorten(scene, work, body, VX, speed)
+        largest = max(largest, shorten(scene, work, body, X, place))
+    return largest
 
 
 def add_impulse(scene, work, body, impulse):
@@ -96,34 +144,71 @@ def add_impulse(scene, work, body, impulse):
         work.bodies[body, SWITCH_SPEED] += impulse * share
 
 
-def gap_deviation(work, row):
-    """By how much the gap of a pair is likely to be wrong at the end of the step [m]."""
+def kick(scene, work, body, x, y, turn):
+    """Add an impulse [N s, N s, N m s] to a body's carried error."""
+    if scene.bodies[body, FREE] == 1.0:
+        e, inertia = work.motion, scene.bodies
+        e[CARRIED, body, VX] += x / inertia[body, MASS]
+        e[CARRIED, body, VY] += y / inertia[body, MASS]
+        e[CARRIED, body, SPIN] += turn / inertia[body, INERTIA]
+
+
+def kick_pair(scene, work, row, normal, tangential):
+    """Add the impulses of a contact [N s] to the carried errors of its bodies."""
+    g = work.geometry
+    nx, ny = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
+    turn = g[NOW, row, VERTEX_ARM_N] * normal + g[NOW, row, VERTEX_ARM_T] * tangential
+    back = g[NOW, row, EDGE_ARM_N] * normal + g[NOW, row, EDGE_ARM_T] * tangential
+    kick(scene, work, work.candidates[row, VERTEX_BODY], x, y, turn)
+    kick(scene, work, work.candidates[row, EDGE_BODY], -x, -y, -back)
+
+
+def gap_error(work, row, kind):
+    """The error of a pair's gap, of the motion's error of that kind: CARRIED, DEVIATION [m]."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     e, g = work.motion, work.geometry
-    gap = g[NOW, row, NORMAL_X] * (e[DEVIATION, a, X] - e[DEVIATION, b, X])
-    gap += g[NOW, row, NORMAL_Y] * (e[DEVIATION, a, Y] - e[DEVIATION, b, Y])
-    gap += g[NOW, row, VERTEX_ARM_N] * e[DEVIATION, a, ANGLE]
-    return gap - g[NOW, row, EDGE_ARM_N] * e[DEVIATION, b, ANGLE]
+    gap = g[NOW, row, NORMAL_X] * (e[kind, a, X] - e[kind, b, X])
+    gap += g[NOW, row, NORMAL_Y] * (e[kind, a, Y] - e[kind, b, Y])
+    gap += g[NOW, row, VERTEX_ARM_N] * e[kind, a, ANGLE]
+    return gap - g[NOW, row, EDGE_ARM_N] * e[kind, b, ANGLE]
 
 
-def doubtful_time(scene, work, row, step, depth):
+def has_switched(work, row):
+    """Whether a pair touches, or no longer does, other than it is flagged."""
+    closed = 1 if work.geometry[NOW, row, GAP] < 0.0 else 0
+    return closed != work.candidates[row, CLOSED]
+
+
+def doubtful_time(work, row, step, depth):
     """For how much of a step it is in doubt whether a pair touched [s]."""
     gap = work.geometry[NOW, row, GAP]
-    closed = 1 if gap < 0.0 else 0
-    if closed != work.candidates[row, CLOSED]:
+    if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
         return min(abs(gap) / speed, step) if speed > 0.0 else step
-    doubt = max(depth, DOUBT * abs(gap_deviation(work, row)))
-    return step if closed == 1 and -gap < doubt else 0.0
+    doubt = max(depth, DOUBT * abs(gap_error(work, row, DEVIATION)))
+    return step if -doubt < gap < 0.0 else 0.0
+
+
+def signed_time(work, row, step, depth):
+    """The same, above 0 where the force has acted for too long, as the carried error has it."""
+    gap, wrong = work.geometry[NOW, row, GAP], gap_error(work, row, CARRIED)
+    if has_switched(work, row):
+        rate = normal_rate(work, NOW, row)
+        late = (gap - wrong) / rate if rate != 0.0 else 0.0
+        late = min(max(late, -step), step)
+        return -late if gap < 0.0 else late
+    return step if -max(depth, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
 
 
 def add_switch_errors(scene, work, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
-        late = doubtful_time(scene, work, row, step, depth)
-        if late > 0.0:
+        late, signed = doubtful_time(work, row, step, depth), signed_time(work, row, step, depth)
+        if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = late * math.hypot(normal, tangential)
             add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse)
             add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse)
+            kick_pair(scene, work, row, signed * normal, signed * tangential)

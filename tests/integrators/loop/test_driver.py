@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, System
+from flocsim.arrays import NOW, TIME
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from tests.helpers.methods import by_adaptive, by_method
@@ -101,6 +102,48 @@ def test_a_jumping_force_cannot_hold_up_an_adaptive_run(integrator):
     found = system.run(1e-3, max_steps=5000, jit=False)
     assert found.status in (Status.FINISHED, Status.STALLED)
     assert np.abs(found.position[:, 0, 0]).max() < 2e-6
+
+
+@attrs.frozen
+class Creeping(DormandPrince54):
+    """A method whose steps are accepted, and far too short for time to go by."""
+
+    @staticmethod
+    def next_step(clock, step, ratio):
+        return 1e-9 * step
+
+
+def test_accepted_steps_by_which_no_time_goes_by_end_the_run():
+    body = Body(Sphere(5e-6), velocity=(1e-3, 0.0), surface_density=2.0)
+    found = System([body], [StokesDrag()], Creeping(1e-9)).run(1e-3, jit=False)
+    assert found.status is Status.STALLED
+    assert 100 < found.steps < 120
+    # Each of them takes the time to another number all the same.
+    assert np.diff(found.t).min() > 0.0
+
+
+def test_a_fixed_step_that_is_lost_in_the_time_ends_the_run():
+    """Behind 1 s, 1e-17 s are nothing."""
+    system = System([Body(Sphere(5e-6), surface_density=2.0)], [], VelocityVerlet(1e-17))
+    run = system.begin(2.0, jit=False)
+    run.clock[TIME] = 1.0
+    assert run.to_end() is Status.STALLED
+    assert run.steps < 120
+
+
+@by_adaptive
+def test_pairs_that_switch_within_rounding_of_the_time_switch_together(integrator):
+    """Two bodies that hit a third at once, after 1 s: rounding alone tells which comes first."""
+    shape, speed = Sphere(5e-6), 0.01
+    bodies = [Body(shape, surface_density=2.0)]
+    for side in (-1.0, 1.0):
+        start = side * (1.05e-5 + speed * 1e-5 * (1.0 + 1e-12 * side))
+        bodies.append(Body(shape, (start, 0.0), velocity=(-side * speed, 0.0), surface_density=2.0))
+    run = System(bodies, [ELASTIC], integrator).begin(1.0 + 1e-4, jit=False)
+    run.clock[TIME] = 1.0
+    assert run.to_end() is Status.FINISHED
+    assert run.steps + run.rejected < 1000
+    assert run.work.motion[NOW, 1:, 3] == pytest.approx([-speed, speed], rel=1e-3)
 
 
 def test_every_status_says_what_happened_in_one_line():

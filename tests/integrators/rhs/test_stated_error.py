@@ -1,0 +1,112 @@
+"""The stated error: what a vector of errors becomes, and that sums and vectors cover the truth."""
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim import Body, Sphere, System
+from flocsim.arrays import CARRIED, DAMPING, ERROR_PLACE, ERROR_SPEED, MASS, SWITCH_PLACE, work_of
+from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
+from flocsim.integrators import Implicit
+from flocsim.integrators.amplification import end_distance
+from flocsim.integrators.radau.carried_error import carry_error
+from flocsim.integrators.rhs import stated_error
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+
+RATE = 2e3
+"""Of the trial forces [1/s]."""
+
+
+@attrs.frozen
+class Linear(BodyForce):
+    """F_x = ``sign`` m RATE² x: an error of place turns around, or grows."""
+
+    sign: float = -1.0
+
+    @staticmethod
+    def kernel(body, sign):
+        return sign * body.mass * RATE * RATE * body.x, 0.0, 0.0
+
+
+def at_start(forces):
+    """(scene, work) of one sphere off the middle, its derivatives assembled."""
+    system = System([Body(Sphere(5e-6), (1e-5, 0.0), surface_density=2.0)], forces)
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    assemble_jacobian(scene, work, 0.0, 1.0)
+    return scene, work
+
+
+def carried(forces, place, speed, until, steps):
+    """(x, vx) of an error that starts as such, carried on with no error of the steps' own."""
+    scene, work = at_start(forces)
+    # No sum stands in the way.
+    work.bodies[0, ERROR_PLACE] = work.bodies[0, ERROR_SPEED] = 1.0
+    work.motion[CARRIED, 0, [0, 3]] = place, speed
+    for _ in range(steps):
+        carry_error(scene, work, until / steps)
+    return work.motion[CARRIED, 0, [0, 3]]
+
+
+@pytest.mark.parametrize(("steps", "precision"), [(5, 0.1), (50, 2e-3)])
+def test_an_error_goes_on_as_the_motion_does(steps, precision):
+    until = 1.0 / RATE
+    turned = np.array([np.cos(1.0), -RATE * np.sin(1.0)])
+    grown = np.array([np.cosh(1.0), RATE * np.sinh(1.0)])
+    for sign, right in ((-1.0, turned), (1.0, grown)):
+        found = carried([Linear(sign)], 1e-9, 0.0, until, steps)
+        assert found == pytest.approx(1e-9 * right, rel=precision)
+
+
+def test_drag_uses_up_an_error_of_velocity():
+    scene, work = at_start([StokesDrag()])
+    tau = scene.bodies[0, MASS] / work.jacobian[DAMPING, 0, 0]
+    place, speed = carried([StokesDrag()], 0.0, 1e-6, 30.0 * tau, 300)
+    assert place == pytest.approx(1e-6 * tau, rel=1e-3)
+    assert abs(speed) < 1e-12
+
+
+def test_a_vector_is_kept_within_the_sums():
+    """The sums of this body's errors are nought, and so is what is carried on."""
+    scene, work = at_start([StokesDrag()])
+    work.motion[CARRIED, 0] = 1e-3
+    assert carry_error(scene, work, 1e-5) == 0.0
+    assert not work.motion[CARRIED].any()
+
+
+def head_on(damping):
+    """Two spheres that meet a little off the middle, and their run until well behind that."""
+    bodies = [
+        Body(Sphere(5e-6), (0.0, 0.0), velocity=(0.05, 0.0), surface_density=2.0),
+        Body(Sphere(5e-6), (1.2e-5, 2e-6), velocity=(-0.05, 0.0), surface_density=2.0),
+    ]
+    return System(bodies, [Contact(damping_n=damping), StokesDrag()]), 6e-5
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e5])
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-9])
+def test_the_stated_error_of_a_bounce_is_above_the_true_one_and_not_far(damping, tolerance):
+    system, until = head_on(damping)
+    run, exact = (
+        attrs.evolve(system, integrator=Implicit(each)).run(until, record=False, jit=False)
+        for each in (tolerance, 1e-13)
+    )
+    true = end_distance(system.bodies, run.position[-1], exact.position[-1])
+    assert 0.0 < true <= run.error < 3e3 * true
+
+
+def test_what_a_contact_takes_up_is_no_longer_stated():
+    """A ball falls on a fixed one and lies there: the sums alone go on for ever."""
+    bodies = [
+        Body(Sphere(5e-6), fixed=True, surface_density=2.0),
+        Body(Sphere(5e-6), (0.0, 1.01e-5), velocity=(0.0, -1e-2), surface_density=2.0),
+    ]
+    system = System(bodies, [Gravity(), Contact()], Implicit(1e-9))
+    run = system.begin(2e-4, jit=False)
+    run.to_end()
+    exact = attrs.evolve(system, integrator=Implicit(1e-13)).run(2e-4, jit=False)
+    states = run.work.bodies
+    sums = system.integrator.estimate_share * states[:, ERROR_PLACE]
+    sums += stated_error.OF_SWITCHES * states[:, SWITCH_PLACE]
+    true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
+    assert true <= run.error < 0.1 * sums.max()
