@@ -18,11 +18,11 @@ from flocsim.arrays import (
     X,
 )
 from flocsim.fields import quantity
-from flocsim.hooks import skin_factor
+from flocsim.hooks import end_within, skin_factor
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
-from flocsim.integrators.radau.collocation import collocate
+from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
@@ -123,5 +123,5 @@ class Implicit(Integrator):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Dense output by the stages' cubic, and longer lists."""
-        return {interpolate: collocate, skin_factor: wide_skin}
+        """Dense output, and ends of steps, by the stages' cubic; longer lists."""
+        return {interpolate: collocate, end_within: end_on_the_cubic, skin_factor: wide_skin}
