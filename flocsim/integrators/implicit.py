@@ -18,12 +18,12 @@ from flocsim.arrays import (
     X,
 )
 from flocsim.fields import quantity
-from flocsim.hooks import skin_factor
+from flocsim.hooks import end_within, skin_factor
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
 from flocsim.integrators.radau.carried_error import carry_error
-from flocsim.integrators.radau.collocation import collocate
+from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
@@ -125,5 +125,11 @@ class Implicit(Integrator):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Dense output by the stages' cubic, longer lists, and the error as a vector."""
-        return {interpolate: collocate, skin_factor: wide_skin, carry_vector: carry_error}
+        """Dense output, and ends of steps, by the stages' cubic; longer lists; the error as a
+        vector."""
+        return {
+            interpolate: collocate,
+            end_within: end_on_the_cubic,
+            skin_factor: wide_skin,
+            carry_vector: carry_error,
+        }

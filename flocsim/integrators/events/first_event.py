@@ -11,7 +11,7 @@ import math
 from flocsim.arrays import CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.hooks import awaits_touch
-from flocsim.integrators.events.crossings import first_switch
+from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
 from flocsim.integrators.rhs.friction import beyond
@@ -87,12 +87,20 @@ def law_event_share(scene, work, share):
 def friction_share(scene, work, share, step, resolution):
     """The share of the step at which the first contact begins or ends to slide, or the given one
     before; what is beyond that by less than the resolution [m] at the end of the step is left."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 1:
+            distance, at = beyond(scene, work, row, step)
+            if distance > resolution:
+                share = min(share, at)
+    return share
+
+
+def law_share(scene, work, clock, step):
+    """The share of the step at which the first closed contact passes a kink of its law, or begins
+    or ends to slide; above 1 where none does. Expects the geometry of all pairs in NEW."""
+    share = law_event_share(scene, work, NEVER)
     if has(scene, SLIP_LIMIT):
-        for row in range(work.tally[CANDIDATES]):
-            if work.candidates[row, CLOSED] == 1:
-                distance, at = beyond(scene, work, row, step)
-                if distance > resolution:
-                    share = min(share, at)
+        share = friction_share(scene, work, share, step, resolution_of(work, clock))
     return share
 
 
@@ -104,8 +112,5 @@ def switch_share(scene, work, observed, clock, step):
     if clock[TOLERANCE] < math.inf or awaits_touch(observed):
         resolution, depth = resolution_of(work, clock), depth_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)
-        if share > 1.0:
-            share = law_event_share(scene, work, share)
-            share = friction_share(scene, work, share, step, resolution)
-        return share
+        return share if share <= 1.0 else law_share(scene, work, clock, step)
     return math.inf

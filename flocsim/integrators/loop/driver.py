@@ -31,10 +31,11 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
-from flocsim.hooks import attempt, observe
-from flocsim.integrators.events.first_event import depth_of, switch_share
+from flocsim.hooks import attempt, end_within, observe
+from flocsim.integrators.events.first_event import depth_of, law_share, switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
+from flocsim.integrators.rhs.friction import hold_slides
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CONTACT_FORCE, has
@@ -134,6 +135,18 @@ def went_too_far(scene, work, clock):
     return scene.surface_reach > 0.0 and clock[TOLERANCE] < math.inf and overlooked(scene, work)
 
 
+def ends_early(scene, work, clock, step, ratio, share):
+    """End a step at a share of it, where a pair touches or parts; False where it has to be taken
+    anew: its motion is not known well enough in between, or a law has a kink in it as well."""
+    if law_share(scene, work, clock, step) < 1.0 or not moves(clock, share * step):
+        return False
+    if not end_within(scene, work, step, ratio, share):
+        return False
+    locate_contacts(scene, work, NEW)
+    hold_slides(scene, work, NEW)
+    return True
+
+
 def look(scene, work, observed, clock, counts, record, lists):
     """Record and watch the state that has been accepted: a Status, or 0 to go on."""
     if record.shape[0] > 0:
@@ -171,9 +184,12 @@ def advance(scene, work, observed, clock, counts, record):
             continue
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
-            limit, trials = share * step, trials + 1
-            counts[LOCATED] += 1
-            continue
+            trials += 1
+            if not ends_early(scene, work, clock, step, ratio, share):
+                limit = share * step
+                counts[LOCATED] += 1
+                continue
+            step *= share
         switched = accept(scene, work, clock, counts, step, lists)
         plan(clock, step, ratio, trials > 0, switched)
         limit, trials = math.inf, 0
