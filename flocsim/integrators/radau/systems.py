@@ -33,18 +33,26 @@ from flocsim.integrators.radau.tableau import (
 from flocsim.integrators.rhs.views import inertia
 
 
+def magnitude(value):
+    """|re| + |im|, which tells pivots apart as well as the modulus does, without its root."""
+    return abs(value.real) + abs(value.imag)
+
+
 def factorise(system, pivots, which):
-    """Factorise a matrix with row pivoting (pivots (2, m)); False where it is singular."""
+    """Factorise a matrix with row pivoting (pivots (2, m)); False where it is singular.
+
+    In the places of the pivots are their reciprocals: complex division takes long.
+    """
     size = system.shape[1]
     for pivot in range(size):
         best = pivot
-        largest = abs(system[which, best, pivot])
+        largest = magnitude(system[which, best, pivot])
         for row in range(pivot + 1, size):
-            entry = abs(system[which, row, pivot])
+            entry = magnitude(system[which, row, pivot])
             if entry > largest:
                 best = row
                 largest = entry
-        if not abs(system[which, best, pivot]) > 0.0:
+        if not largest > 0.0:
             return False
         pivots[which, pivot] = best
         if best != pivot:
@@ -54,6 +62,7 @@ def factorise(system, pivots, which):
                 system[which, best, column] = kept
         # Subtract the pivot's row from all below it, and keep the shares in their places.
         reciprocal = 1.0 / system[which, pivot, pivot]
+        system[which, pivot, pivot] = reciprocal
         for row in range(pivot + 1, size):
             if system[which, row, pivot] != 0.0:
                 share = system[which, row, pivot] * reciprocal
@@ -77,7 +86,7 @@ def solve(system, pivots, which):
     for row in range(size - 1, -1, -1):
         for column in range(row + 1, size):
             system[which, row, size] -= system[which, row, column] * system[which, column, size]
-        system[which, row, size] /= system[which, row, row]
+        system[which, row, size] *= system[which, row, row]
 
 
 def write_matrix(scene, work, which, step):

@@ -86,7 +86,7 @@ def carried(work, body, place, speed, step):
 
 
 @hook
-def carry_vector(scene, work, step):
+def carry_vector(scene, work, clock, step):
     """Carry the error as a vector, too, where the method has the forces' derivatives; how large it
     is in the place of an outline [m]."""
     return math.inf
@@ -108,7 +108,7 @@ def carry_errors(scene, work, clock, step):
         stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * errors[body, SWITCH_PLACE]
         largest = max(largest, stated)
-    vector = max(carry_vector(scene, work, step), LEAST * clock[TOLERANCE])
+    vector = max(carry_vector(scene, work, clock, step), LEAST * clock[TOLERANCE])
     clock[ERROR] = min(largest, OF_VECTOR * vector)
 
 
