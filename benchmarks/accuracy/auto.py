@@ -19,6 +19,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
+from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.choice import (
     ALLOWED,
@@ -97,12 +98,20 @@ def measure(study, choice, condition, arguments):
     return {each: (flips[each], cpu[each] / len(tasks)) for each in flips}, len(tasks)
 
 
+def make_ready(study):
+    """What a study needs at any setting, and shares with its pilot: compiled code, and shapes."""
+    for kind in study.kinds:
+        study.run(*kind, study.config.scene.delta[0], 0)
+    for task in (task for tasks in sample_of(study.config) for task in tasks):
+        numbers = draws(study.config.seed, task.replicate)
+        study.encounter(task.condition, task.vertices, numbers)
+
+
 def judge(name, text, arguments, table):
     """Run one study and add its lines to the table."""
     config = config_of(text, arguments)
     study = Study(config, methods=first_methods(config))
-    for kind in study.kinds:  # compiled, or loaded, before the pilot is timed
-        study.run(*kind, config.scene.delta[0], 0)
+    make_ready(study)
     began = time.process_time()
     choice = choose(study)
     pilot = time.process_time() - began
@@ -138,14 +147,16 @@ def rates(arguments):
     config = config_of(text, arguments)
     config = attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(64,)))
     study = Study(config, methods=first_methods(config))
-    for kind in study.kinds:
-        study.run(*kind, config.scene.delta[0], 0)
+    make_ready(study)
     began = time.process_time()
     choice = choose(study)
     pilot = time.process_time() - began
-    study = Study(config, flocs=study.flocs, methods=choice.methods)
+    study = study.by_methods(choice.methods)
     study.compile(study.kinds)
     places, count = study.places, min(arguments.sample, config.replicates)
+    for replicate in range(count):
+        for condition, vertices, _ in places:
+            study.encounter(condition, vertices, draws(config.seed, replicate))
     began = time.process_time()
     for replicate in range(count):
         for place in places:

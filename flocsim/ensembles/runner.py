@@ -177,7 +177,7 @@ def join(
     if not config.integrator.is_chosen:
         return Joint(study, leader.identity, cpus)
     choice = chosen(study, comm, records, quiet)
-    study = Study(config, flocs=study.flocs, methods=choice.methods)
+    study = study.by_methods(choice.methods)
     return Joint(study, identity_of(study), cpus, choice.record)
 
 

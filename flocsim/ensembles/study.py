@@ -84,6 +84,12 @@ class Study:
             shapes.pairs_alike_in == "error",
         )  # fmt: skip
 
+    def by_methods(self, methods: dict[str, Integrator]) -> "Study":
+        """The same study by other methods; the shapes that have been made are shared."""
+        other = Study(self.config, flocs=self.flocs, methods=methods)
+        other.floc_pool = self.floc_pool
+        return other
+
     @property
     def shape(self) -> tuple[int, int, int, int]:
         """(types, vertices, delta, replicates): how many there are of each."""
