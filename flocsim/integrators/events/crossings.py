@@ -62,17 +62,24 @@ def look_at(scene, work, step, share, row):
     return margin(work, TRIAL, row)
 
 
-def lowest_share(scene, work, step, row):
-    """Where in the step the margin is least, if that lies inside it and is low; else NEVER."""
-    low, high = 0.0, 1.0
+def may_dip(work, step, row):
+    """Whether the margin may be negative inside the step though it is not at its ends."""
     rate_low = step * margin_rate(work, NOW, row)
     rate_high = step * margin_rate(work, NEW, row)
     if not rate_low < 0.0 < rate_high:
-        return NEVER
-    at_start, at_end = margin(work, NOW, row), margin(work, NEW, row)
+        return False
     # Straight lines from both ends bound what a convex margin can fall to.
-    if at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0:
+    at_start, at_end = margin(work, NOW, row), margin(work, NEW, row)
+    return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
+
+
+def lowest_share(scene, work, step, row):
+    """Where in the step the margin is least, if that lies inside it and is low; else NEVER."""
+    if not may_dip(work, step, row):
         return NEVER
+    low, high = 0.0, 1.0
+    rate_low = step * margin_rate(work, NOW, row)
+    rate_high = step * margin_rate(work, NEW, row)
     share = 0.5
     for _ in range(8):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
@@ -145,6 +152,15 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
     if look_at(scene, work, step, high, row) >= -limit:
         return earliest
     return crossing(scene, work, step, row, high, resolution)
+
+
+def may_switch(scene, work, step, resolution, depth):
+    """Whether a pair may switch in a step before its end, as seen from both ends of it."""
+    for row in range(work.tally[CANDIDATES]):
+        limit = unnoticed(scene, work, step, row, resolution, depth)
+        if margin(work, NEW, row) < -limit or may_dip(work, step, row):
+            return True
+    return False
 
 
 def first_switch(scene, work, step, resolution, depth):

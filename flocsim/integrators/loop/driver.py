@@ -32,7 +32,13 @@ from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, end_within, observe
-from flocsim.integrators.events.first_event import depth_of, law_share, switch_share
+from flocsim.integrators.events.crossings import may_switch
+from flocsim.integrators.events.first_event import (
+    depth_of,
+    law_share,
+    resolution_of,
+    switch_share,
+)
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
 from flocsim.integrators.rhs.friction import hold_slides
@@ -144,7 +150,9 @@ def ends_early(scene, work, clock, step, ratio, share):
         return False
     locate_contacts(scene, work, NEW)
     hold_slides(scene, work, NEW)
-    return True
+    # A long step may have run through a body: what came first is seen from a nearer end alone.
+    resolution, depth = resolution_of(work, clock), depth_of(work, clock)
+    return not may_switch(scene, work, share * step, resolution, depth)
 
 
 def look(scene, work, observed, clock, counts, record, lists):

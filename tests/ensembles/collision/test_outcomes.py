@@ -15,11 +15,12 @@ from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
 from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
+from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
-from tests.helpers.small_study import small_study
+from tests.helpers.small_study import small_config, small_study
 
 
 @pytest.fixture(scope="module")
@@ -283,3 +284,13 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     # Without the swing it does.
     work.motion[NOW, :, 3:] = 0.0
     assert bonds.has_rested(encounter.scene, work, observed, later, -1e-12, 0.0, -1.0, 1.0)
+
+
+def test_a_step_through_a_body_ends_at_the_first_touch(tmp_path):
+    """Long steps of free fall end beyond several features at once, of which the one that is found
+    first is not the one that was touched first."""
+    shapes = {"vertices": [8], "pool": 10}
+    study = Study(small_config(tmp_path, {"seed": 77, "replicates": 2000, "shapes": shapes}))
+    for share, replicate in ((0.158, 152), (0.07, 307), (0.752, 422)):
+        row = study.run(0, 8, share, replicate)
+        assert OUTCOMES[row["outcome"]] in "ABCD", FAILURES[row["failure"]]
