@@ -1,5 +1,6 @@
 """What a study would do, without doing it: what it is made of, and what a pilot says it takes."""
 
+import math
 import time
 from collections import Counter
 from math import inf
@@ -142,7 +143,7 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
     return [
         *lines,
         *forecast_lines(config, found, ranks, compiled),
-        *(f"without {words_of(each)}" for each in find(study, found.runs, go_on)),
+        *(f"without {words_of(each, found.runs)}" for each in find(study, found.runs, go_on)),
         "nothing is left out that the config does not leave out",
     ]
 
@@ -154,12 +155,13 @@ def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float)
     conditions = (
         len(config.scene.conditions) * len(config.shapes.vertices) * len(config.scene.delta)
     )
-    again = [run for run in found.runs if run.second == run.second]
+    again = [run for run in found.runs if math.isfinite(run.second)]
+    flips = sum(run.flipped for run in again)
     hours, size = found.hours, found.size
     most = f" at {found.replicates} replicates" if found.replicates < config.replicates else ""
     return [
         f"ran {len(found.runs)} replicates of {found.conditions} of the {conditions} conditions, "
-        f"{len(again)} of them again; they ended {words}",
+        f"{len(again)} of them again ({flips} outcomes flipped); they ended {words}",
         f"core-hours{most}: {hours.value:.2g} ({hours.low:.2g} to {hours.high:.2g}), "
         f"{100.0 * found.again:.0f} % of them for second runs; on {ranks} rank(s) "
         f"{duration(3600.0 * hours.value / ranks)} ({duration(3600.0 * hours.low / ranks)} to "

@@ -24,7 +24,10 @@ def spheres(folder, **over):
 
 def test_the_pilot_says_what_the_study_takes_and_what_matters(tmp_path, brief):
     text = dry_run.dry_run(spheres(tmp_path), 2)
-    assert "ran 12 replicates of 4 of the 4 conditions, 4 of them again; they ended 12 A" in text
+    assert (
+        "ran 12 replicates of 4 of the 4 conditions, 4 of them again (0 outcomes flipped); they "
+        "ended 12 A"
+    ) in text
     [hours] = re.findall(
         r"core-hours: (\S+) \((\S+) to (\S+)\), \d+ % of them for second runs; on 2 rank", text
     )

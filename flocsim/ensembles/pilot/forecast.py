@@ -53,7 +53,7 @@ START = 2.0
 """CPU time [s] that a run takes before its first replicate and after its last one, compiling left
 out: what it reads, compares with other ranks, and writes."""
 
-RUN_BYTES = 14_000
+RUN_BYTES = 9_000
 """Bytes of the group ``run`` beside the config's text: versions, identity, processors."""
 
 FLOC_BYTES = 300
@@ -62,7 +62,8 @@ FLOC_BYTES = 300
 
 class Timed(NamedTuple):
     """One replicate of a pilot: what came out, CPU times [s] of its run, of a second one (NaN:
-    none), and of what was made for its two flocs before (0: it was there)."""
+    none), and of what was made for its two flocs before (0: it was there); whether the second run
+    ended otherwise."""
 
     task: Task
     outcome: int
@@ -70,6 +71,7 @@ class Timed(NamedTuple):
     first: float
     second: float
     setup: float
+    flipped: bool = False
 
 
 class Estimate(NamedTuple):
@@ -117,6 +119,7 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
     known, clock = len(study.encounters), time.process_time
     outcome, inside, second, setup = FAILED, NOT_APPLICABLE, math.nan, 0.0
+    flipped = False
     began = clock()
     try:
         encounter, driver, angles = prepared(study, task)
@@ -130,13 +133,14 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
         exact = study.exact[study.config.scene.conditions[task.condition][0]]
         if again and exact is not None:
             began = clock()
-            study.run_again(encounter, angles, task.delta, exact, None)
+            found = study.run_again(encounter, angles, task.delta, exact, None) or {}
             second = clock() - began
+            flipped = (found["checked_outcome"], found["checked_inside"]) != (outcome, inside)
     except MemoryError:
         raise
     except Exception:  # of a force of the user's own: this replicate has failed
         first = clock() - began
-    return Timed(task, outcome, inside, first, second, setup)
+    return Timed(task, outcome, inside, first, second, setup, flipped)
 
 
 def time_replicates(

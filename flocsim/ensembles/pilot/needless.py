@@ -4,6 +4,7 @@ The replicates of a pilot are run again without the part, from the same start an
 zone. Nothing is left out of the study: what is found is said, and what it would save.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -28,8 +29,8 @@ from flocsim.system import System
 SECONDS = 4.0
 """CPU time of all that is run without a part."""
 
-ENOUGH = 4
-"""Outcomes changed after which a part is known to matter."""
+ENOUGH = 8
+"""Outcomes changed after which no more are run."""
 
 LEAST = 6
 """Replicates run without a part, however long they take."""
@@ -174,18 +175,29 @@ def one_without(study, encounter, drivers, run):
     return time.process_time() - began, outcome, inside
 
 
-def words_of(finding: Finding) -> str:
-    """A Finding for people, in one line."""
-    name, changed, runs = finding.name, finding.changed, finding.runs
+def words_of(finding: Finding, runs: Sequence[Timed]) -> str:
+    """A Finding for people, in one line.
+
+    What changes no more outcomes than a tighter tolerance does in the ``runs`` of the pilot that
+    were run again (95 % intervals overlap), may have changed none.
+    """
+    name, changed, count = finding.name, finding.changed, finding.runs
     if finding.why:
         return f"{name}: stays, {finding.why}"
     saved = 100.0 * (1.0 - finding.time)
-    if changed:
-        return f"{name}: matters, without it {changed} of {runs} outcomes change"
-    most = 100.0 * float(wilson(0, runs)[1])
-    cost = f"save {saved:.0f} %" if saved >= 1.0 else "save nothing"
-    agrees = " (Overdamped agrees)" if name == INERTIA else ""
-    return (
-        f"{name}: never changed an outcome of {runs} replicates{agrees} (rate below {most:.2g} %); "
-        f"leaving it out would {cost} of the time"
-    )
+    cost = f"leaving it out would save {f'{saved:.0f} %' if saved >= 1.0 else 'none'} of the time"
+    low, most = (float(end) for end in wilson(changed, count))
+    if not changed:
+        agrees = " (Overdamped agrees)" if name == INERTIA else ""
+        return (
+            f"{name}: never changed an outcome of {count} replicates{agrees} (rate below "
+            f"{100.0 * most:.2g} %); {cost}"
+        )
+    again = [run for run in runs if math.isfinite(run.second)]
+    flips = sum(run.flipped for run in again)
+    if again and low <= float(wilson(flips, len(again))[1]):
+        return (
+            f"{name}: {changed} of {count} outcomes change, which may be numerical (of "
+            f"{len(again)} run again more exactly {flips} do); {cost}"
+        )
+    return f"{name}: matters, without it {changed} of {count} outcomes change"

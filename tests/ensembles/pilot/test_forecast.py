@@ -16,6 +16,7 @@ from flocsim.ensembles.pilot.forecast import (
     in_turn,
     pairs_made,
     time_replicates,
+    timed,
 )
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.study import Study
@@ -70,6 +71,16 @@ def test_replicates_are_run_in_turn_until_the_time_is_up(tmp_path):
     for run in runs[:4]:
         row = study.run(*run.task[:3], run.task.replicate)
         assert (run.outcome, run.inside) == (row["outcome"], row["inside"])
+
+
+def test_a_second_run_that_ends_otherwise_is_a_flip(tmp_path, monkeypatch):
+    study = small_study(tmp_path, SPHERES)
+    task = in_turn(study.config)[0]
+    assert not timed(study, task, True).flipped
+    other = {"checked_outcome": 3, "checked_inside": 0}
+    monkeypatch.setattr(Study, "run_again", lambda *arguments: other)
+    assert timed(study, task, True).flipped
+    assert not timed(study, task, False).flipped
 
 
 def test_no_second_runs_where_the_study_has_none(tmp_path):
