@@ -316,6 +316,10 @@ def judged(scene: Scene, exact: Integrator) -> Verdict:
         return Verdict(*about, error, stated, RIGHT)
     if error <= stated:
         return Verdict(*about, error, stated, STATED)
+    if error <= stated + reference.error:
+        own = f"of which {reference.error:.2g} m may be the reference's own"
+        why = f"no good reference: off by {error:.3g} m, {own}"
+        return Verdict(*about, error, stated, WRONG, f"{why}{remark(scene, reference, exact)}")
     times = f"{error / stated:.3g} times its stated error" if stated > 0.0 else "and states none"
     why = f"off by {error:.2g} m, {times}{remark(scene, reference, exact)}"
     return Verdict(*about, error, stated, WRONG, why)

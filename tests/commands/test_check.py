@@ -90,6 +90,8 @@ def test_an_error_beyond_the_tolerance_must_be_within_what_is_stated(folder, mon
     monkeypatch.setattr(check, "allowed", lambda scene: 0.0)
     verdict = judge()
     assert verdict.kind == check.STATED and 0.0 < verdict.error <= verdict.stated
+    monkeypatch.setattr(check.Run, "error", property(lambda run: 0.9 * verdict.error))
+    assert judge().why.startswith("no good reference: off by ")
     monkeypatch.setattr(check.Run, "error", property(lambda run: 0.1 * verdict.error))
     beyond = judge()
     assert (beyond.kind, beyond.error) == (check.WRONG, verdict.error)
