@@ -46,12 +46,16 @@ EVERY = 3
 
 RESAMPLES = 400
 
-CLOCK = 0.08
+CLOCK = 0.1
 """Share by which the same work takes more or less time, from one hour to the next."""
 
-START = 2.0
+START = 0.8
 """CPU time [s] that a run takes before its first replicate and after its last one, compiling left
 out: what it reads, compares with other ranks, and writes."""
+
+EACH = 2.5e-4
+"""CPU time [s] of all that is done with a replicate besides running it: handed out, kept, counted
+(`python -m benchmarks.accuracy.dry_run`, spheres)."""
 
 RUN_BYTES = 9_000
 """Bytes of the group ``run`` beside the config's text: versions, identity, processors."""
@@ -175,6 +179,19 @@ def pairs_made(study: Study, ranks: int) -> float:
     return total
 
 
+def setting_up(study: Study, runs: Sequence[Timed], ranks: int) -> float:
+    """CPU time [s] of making all pairs of flocs ready, on all ranks together.
+
+    As seen, and the others as the later half of those that were: the first ones bring every floc
+    to its size.
+    """
+    seen = [run.setup for run in runs if run.setup > 0.0]
+    if not seen:
+        return 0.0
+    others = max(pairs_made(study, ranks) - len(seen), 0.0)
+    return sum(seen) + others * float(np.mean(seen[len(seen) // 2 :]))
+
+
 class Spent(NamedTuple):
     """Two CPU times [s] of each replicate of a type: ``first`` (n,), ``second`` (n,), NaN where
     it was not run again."""
@@ -226,12 +243,8 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     count = expected_replicates(config.replicates, config.stop)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     checks = cells * count_checks(config.seed, count, config.integrator.check_share)
-    setups = [run.setup for run in runs if run.setup > 0.0]
-    fixed = (
-        START * ranks
-        + before
-        + (pairs_made(study, ranks) * float(np.mean(setups)) if setups else 0.0)
-    )
+    fixed = START * ranks + before + setting_up(study, runs, ranks)
+    fixed += EACH * cells * count * len(config.scene.conditions)
     groups = []
     for place in range(len(config.scene.conditions)):
         mine = [run for run in runs if run.task.condition == place]

@@ -10,11 +10,13 @@ from flocsim.ensembles.pilot.forecast import (
     CLOCK,
     LEAST,
     Spent,
+    Timed,
     estimated,
     file_size,
     forecast_of,
     in_turn,
     pairs_made,
+    setting_up,
     time_replicates,
     timed,
 )
@@ -95,6 +97,14 @@ def test_every_rank_makes_its_own_pairs(tmp_path):
     # Spheres are one pair for each type, and of two flocs there are two orders.
     assert pairs_made(study, 1) == 2 * (1 + 2)
     assert pairs_made(study, 3) == 3 * 2 * (1 + 2)
+
+
+def test_pairs_that_were_not_seen_are_made_like_the_later_ones(tmp_path):
+    study = small_study(tmp_path, {"replicates": 40, "shapes": {"vertices": [1, 4]}})
+    blank = Timed(in_turn(study.config)[0], 0, 1, 1.0, math.nan, 0.0)
+    runs = [blank._replace(setup=setup) for setup in (9.0, 0.0, 7.0, 1.0, 0.0, 3.0)]
+    assert setting_up(study, runs, 1) == pytest.approx(20.0 + (6 - 4) * 2.0)
+    assert setting_up(study, [blank], 1) == 0.0
 
 
 def test_the_size_is_that_of_the_file(tmp_path):
