@@ -58,6 +58,7 @@ INNER_ROWS = {
         ["storage"],
         ["study"],
         ["preflight"],
+        ["impact"],
         ["collision"],
         ["config", "chunks"],
     ],

@@ -52,7 +52,7 @@ def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, 
 def test_the_path_of_a_new_user(tmp_path):
     for words in (
         ["init", "study.toml"],
-        ["ensemble", "study.toml", "--dry-run"],
+        ["ensemble", "study.toml", "--dry-run", "--no-pilot"],
         ["trajectory", "study.toml", "--vertices", "1", "-o", "strip.png"],
     ):
         done = run_command(tmp_path, *words, module="flocsim")
@@ -73,7 +73,7 @@ def test_flocsim_ensemble_is_the_ensemble_command(tmp_path):
     assert len(done.stdout.splitlines()) == 2
 
 
-@pytest.mark.parametrize("words", [["--dry-run"], ["--output", "a.h5"]])
+@pytest.mark.parametrize("words", [["--dry-run", "--no-pilot"], ["--output", "a.h5"]])
 def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     write_small(tmp_path, vertices="[1]")
     job = subprocess.Popen(
@@ -111,7 +111,11 @@ def in_shell(folder, line, **more):
     [
         ("FLOCSIM info r.h5 >&-", 74, "flocsim: standard output could not be written: it is"),
         ("FLOCSIM info r.h5 >/dev/full", 74, "flocsim: standard output could not be written: No"),
-        ("FLOCSIM ensemble small.toml --dry-run >/dev/full", 74, "flocsim: standard output could"),
+        (
+            "FLOCSIM ensemble small.toml --dry-run --no-pilot >/dev/full",
+            74,
+            "flocsim: standard output could",
+        ),
         ("FLOCSIM info r.h5 2>&-", 0, ""),
         ("FLOCSIM info no.h5 >&- 2>&-", 74, ""),
         ("FLOCSIM info no.h5 <&- >&-", 74, "flocsim: no.h5 could not be read"),

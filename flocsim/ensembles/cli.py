@@ -60,7 +60,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--overwrite)",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.add_argument("--dry-run", action="store_true", help="say what would be run, and stop")
+    parser.add_argument(
+        "--dry-run", action="store_true",
+        help="say what would be run, and what a pilot of some seconds tells of its core-hours, its "
+        "file and the forces that matter; then stop",
+    )  # fmt: skip
+    parser.add_argument(
+        "--no-pilot", action="store_true", help="with --dry-run: at once, without the pilot"
+    )
     parser.add_argument("--quiet", action="store_true", help="print errors only")
     return parser
 
@@ -206,7 +213,8 @@ def run_rank(comm, arguments):
         from flocsim.ensembles.dry_run import dry_run
 
         if comm.rank == 0:
-            tell(dry_run(config, comm.size))
+            ranks = max(comm.size, arguments.jobs)
+            tell(dry_run(config, ranks, not arguments.no_pilot))
         return 0
     return study(config, comm, arguments)
 
@@ -250,6 +258,8 @@ def what_is_wrong(arguments, comm):
         return f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}"
     if arguments.jobs < 1:
         return f"--jobs must be at least 1, found {arguments.jobs}"
+    if arguments.no_pilot and not arguments.dry_run:
+        return "--no-pilot is for --dry-run: leave it out"
     if arguments.jobs > 1 and comm.size > 1 and not arguments.dry_run:
         return "--jobs is for runs without an MPI launcher: leave out one of the two"
     return ""

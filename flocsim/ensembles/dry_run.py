@@ -1,12 +1,33 @@
-"""What a study would do, without doing it."""
+"""What a study would do, without doing it: what it is made of, and what a pilot says it takes."""
 
+import math
+import time
+from collections import Counter
 from math import inf
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.pilot.sample import pilot_size
+from flocsim.ensembles.parallel.communicator import StopRequested
+from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
+from flocsim.ensembles.pilot.forecast import (
+    Forecast,
+    forecast_of,
+    in_turn,
+    time_replicates,
+    timed,
+)
+from flocsim.ensembles.pilot.needless import find, words_of
+from flocsim.ensembles.pilot.sample import LADDER, pilot_size
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
+from flocsim.ensembles.study import Study, flocs_of
+from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
+from flocsim.interruption import INTERRUPTION, stop_requested
+from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.terminal import duration
+
+MOST_CHOOSING = 60.0
+"""Seconds that a dry run spends on what accuracy = "auto" chooses; a longer pilot is left out."""
 
 
 def condition_lines(config):
@@ -70,7 +91,112 @@ def chosen_words(config):
     )
 
 
-def dry_run(config: Config, ranks: int) -> str:
+def go_on():
+    """StopRequested where a signal has come."""
+    if stop_requested():
+        raise StopRequested(f"stopped by {INTERRUPTION.name}: nothing was run")
+
+
+def chosen_study(study, tasks):
+    """(the Study by the methods that it will have, lines on how they were chosen, CPU time [s] of
+    the choice in the run)."""
+    config, types = study.config, len(study.config.scene.conditions)
+    first = [timed(study, task, False).first for task in tasks[: 2 * types]]
+    choosing = LADDER * pilot_size(config) * types * sum(first) / len(first)
+    if choosing > MOST_CHOOSING:
+        return study, [
+            f'accuracy = "auto" tries settings for some {duration(choosing)}, and does so in the '
+            f"run alone: what follows is at {config.integrator.method}"
+        ], choosing  # fmt: skip
+
+    def share(study, jobs):
+        return [trial for job in jobs for trial in (go_on(), *run_alone(study, [job]))[1:]]
+
+    began = time.process_time()
+    choice = choose(study, share)
+    made = Study(config, flocs=study.flocs, methods=choice.methods)
+    return made, choice_lines(choice.record), time.process_time() - began
+
+
+def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[str], float]:
+    """(Study, its Forecast for so many ranks, lines on a choice of its methods, seconds that
+    compiling or loading took), from a pilot that is run here."""
+    began = time.process_time()
+    study = Study(config, flocs_of(config), first_methods(config))
+    grown = time.process_time() - began
+    compiled = -time.monotonic()
+    study.compile(study.kinds)
+    compiled += time.monotonic()
+    tasks, lines, spent = in_turn(config), [], 0.0
+    if config.integrator.is_chosen:
+        study, lines, spent = chosen_study(study, tasks)
+        compiled -= time.monotonic()
+        study.compile(study.kinds)
+        compiled += time.monotonic()
+    found = forecast_of(study, time_replicates(study, tasks, go_on), ranks, grown + spent)
+    return study, found, lines, compiled
+
+
+def pilot_lines(config: Config, ranks: int) -> list[str]:
+    """What a pilot of the study says: what it takes, and what of its physics changed no outcome."""
+    study, found, lines, compiled = forecast_study(config, ranks)
+    return [
+        *lines,
+        *forecast_lines(config, found, ranks, compiled),
+        *(f"without {words_of(each, found.runs)}" for each in find(study, found.runs, go_on)),
+        "nothing is left out that the config does not leave out",
+    ]
+
+
+def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float) -> list[str]:
+    """A Forecast for people."""
+    ended = Counter(OUTCOMES[run.outcome] for run in found.runs)
+    words = ", ".join(f"{ended[name]} {name}" for name in OUTCOMES if ended[name])
+    conditions = (
+        len(config.scene.conditions) * len(config.shapes.vertices) * len(config.scene.delta)
+    )
+    again = [run for run in found.runs if math.isfinite(run.second)]
+    flips = sum(run.flipped for run in again)
+    hours, size = found.hours, found.size
+    most = f" at {found.replicates} replicates" if found.replicates < config.replicates else ""
+    return [
+        f"ran {len(found.runs)} replicates of {found.conditions} of the {conditions} conditions, "
+        f"{len(again)} of them again ({flips} outcomes flipped); they ended {words}",
+        f"core-hours{most}: {hours.value:.2g} ({hours.low:.2g} to {hours.high:.2g}), "
+        f"{100.0 * found.again:.0f} % of them for second runs; on {ranks} rank(s) "
+        f"{duration(3600.0 * hours.value / ranks)} ({duration(3600.0 * hours.low / ranks)} to "
+        f"{duration(3600.0 * hours.high / ranks)})",
+        f"  besides compiling, once for each machine: took or loaded in {compiled:.0f} s here",
+        f"results file{most}: {megabytes(size.value)} ({megabytes(size.low)} to "
+        f"{megabytes(size.high)}), {size.value / (conditions * found.replicates):.0f} B for each "
+        "replicate; its journal takes as much beside it until the study is done",
+    ]
+
+
+def megabytes(size):
+    """Bytes for people: 812 kB, 26 MB, 3.1 GB."""
+    for unit, factor in (("kB", 1e3), ("MB", 1e6)):
+        if size < 999.5 * factor:
+            return f"{size / factor:.3g} {unit}"
+    return f"{size / 1e9:.3g} GB"
+
+
+def piloted(config, ranks):
+    """The lines of the pilot; why there are none, in one line, where it cannot be run."""
+    try:
+        return pilot_lines(config, ranks)
+    except (StopRequested, MemoryError):
+        raise
+    except FlocsimError as error:
+        return [f"none could be run: {error}"]
+    except Exception as error:  # of a class of the user's own
+        words = " ".join(str(error).split())
+        return [f"none could be run: {type(error).__name__}: {words}"]
+
+
+def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
+    """All that is known of a study before it is run; with a ``pilot``, what some of its replicates
+    say as well."""
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
     if shapes.size == "own":
@@ -102,6 +228,7 @@ def dry_run(config: Config, ranks: int) -> str:
             for name, pair in sphere_pairs(config)
             for line in scale_lines(pair.system)
         ),
-        "nothing was run (--dry-run)",
+        *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
+        "nothing was run but the pilot (--dry-run)" if pilot else "nothing was run (--dry-run)",
     ]
     return "\n".join(lines)

@@ -8,9 +8,10 @@ import numpy as np
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
-from flocsim.ensembles.collision.flocs import read_flocs
+from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.impact import too_deep
 from flocsim.errors import ConfigError
 from flocsim.forces import ContactForce
 from flocsim.geometry.shapes.shape import Shape
@@ -29,7 +30,8 @@ def sphere_pairs(config: Config) -> Iterator[tuple[str, Encounter]]:
 
 
 def check_study(config: Config) -> None:
-    """Raise the FlocsimError that the study would meet: zone, method, settling, sizes, library."""
+    """Raise the FlocsimError that the study would meet: zone, method, settling, sizes, library,
+    impacts."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
             "a collision needs a contact force, found none among "
@@ -53,8 +55,8 @@ def check_study(config: Config) -> None:
             f"{config.integrator.label} has no parameter `tolerance` or `step` that could be made "
             "smaller for a second run: give it one, or leave check_share out"
         )
-    if config.shapes.source == "library":
-        read_flocs(config.shapes)
+    flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
+    check_impacts(config, flocs)
 
 
 def check_compilable(system: System) -> None:
@@ -73,6 +75,21 @@ def check_approach(config, name, pair):
             f"reaches the receiving body i (below) at {fall_i:.4g} mm/s: give scene.pairs as "
             "[smaller radius, larger radius], or set scene.receiver = 'fixed'"
         )
+
+
+def check_impacts(config: Config, flocs: Sequence[Floc]) -> None:
+    """ConfigError where bodies meet so fast that they leave the contact law: of the worst pair."""
+    found = []
+    for name, pair in sphere_pairs(config):
+        for shapes in kinds(config, pair.shapes):
+            radii = [shape.radius for shape in shapes]
+            what = "the spheres" if shapes is pair.shapes else "the outlines, their spheroradii"
+            if flocs and config.shapes.size == "own" and shapes is not pair.shapes:
+                measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
+                radii = [float(np.median(measured))] * 2
+            found.append(too_deep(name, pair, radii, what))
+    if wrong := [each for each in found if each is not None]:
+        raise ConfigError(max(wrong)[1])
 
 
 def inputs_of(config: Config, path: str) -> list[str]:

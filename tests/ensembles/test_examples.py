@@ -28,7 +28,7 @@ def examples(tmp_path):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_loads_and_describes_itself(path, examples):
     check_study(load_config(examples / path.name))
-    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
+    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run", "--no-pilot")
     assert (done.returncode, done.stderr) == (0, "")
     assert "nothing was run" in done.stdout
 

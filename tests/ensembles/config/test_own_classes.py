@@ -341,7 +341,9 @@ def test_a_shape_of_ones_own(tmp_path, own_module):
 
 
 def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
-    config = load_text(tmp_path, SHAPES.format("own:Rod", "length = 6\nvertices = [1, 2]"))
+    config = load_text(
+        tmp_path, SHAPES.format("own:Rod", "length = 6\nradius = 1\nvertices = [1, 2]")
+    )
     check_study(config)
     study = Study(config)
     [floc] = study.flocs
@@ -349,7 +351,7 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
     for condition, (_, *radii) in enumerate(config.scene.conditions):
         pair = study.encounter(condition, 2, [0.1, 0.2, 0.3, 0.4])
         assert [shape.equivalent_radius for shape in pair.shapes] == pytest.approx(radii)
-        assert [s.length / s.radius for s in pair.shapes] == pytest.approx([6e6, 6e6])
+        assert [s.length / s.radius for s in pair.shapes] == pytest.approx([6.0, 6.0])
         spheres = study.encounter(condition, 1, [0.1, 0.2, 0.3, 0.4])
         assert all(isinstance(shape, Sphere) for shape in spheres.shapes)
 

@@ -1,0 +1,103 @@
+"""Whether `--dry-run` tells the truth: core-hours and file size against the studies themselves.
+
+    python -m benchmarks.accuracy.dry_run [--quick] [--replicates-of 1.0] [--studies …]
+
+Each study is forecast, then run to its end in the same process, its code being compiled by then.
+CPU time, as another job on the machine would stretch the clock on the wall. Goal: within a factor
+1.5 on all of them; how many lie inside the interval is printed.
+"""
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from benchmarks.reporting import ROOT, Table, parser_of, print_heading
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.dry_run import forecast_study
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import run_to_file
+
+EXAMPLES = ROOT / "examples"
+GOAL = 1.5
+
+STUDIES = {
+    "quickstart": (EXAMPLES / "quickstart.toml", 120),
+    "tang2014, auto": (
+        'preset = "tang2014"\n[scene]\ntypes = ["I", "II", "III"]\ndelta = [0.0, 0.25, 0.5, 0.75, '
+        '1.0]\n[shapes]\nvertices = [1, 4, 16, 64]\n[integrator]\naccuracy = "auto"\n',
+        60,
+    ),
+    "si": (
+        'preset = "si"\n[scene]\ntypes = ["I", "III"]\ndelta = [0.0, 0.4, 0.8]\n[shapes]\n'
+        "vertices = [8, 32]\npool = 6\n",
+        100,
+    ),
+    "own force": (EXAMPLES / "own_force.toml", 500),
+    "spheres": (
+        'preset = "tang2014"\n[scene]\ntypes = ["I", "II", "III"]\ndelta = [0.0, 0.25, 0.5, 0.75, '
+        "1.0]\n[shapes]\nvertices = [1]\n",
+        600,
+    ),
+}
+"""Name → (config or its text, replicates)."""
+
+
+def config_of(source, folder, replicates):
+    """The Config of a study, its results in the folder."""
+    path = source
+    if isinstance(source, str):
+        path = Path(folder) / "study.toml"
+        path.write_text(source, "utf-8")
+    output = {"file": str(Path(folder) / "results.h5")}
+    return load_config(path, {"replicates": replicates, "output": output})
+
+
+def judge(name, factor, table):
+    """Forecast a study, run it, and add a line; by how much the forecast is off at most."""
+    source, replicates = STUDIES[name]
+    with TemporaryDirectory() as folder:
+        config = config_of(source, folder, max(round(factor * replicates), 12))
+        began = time.process_time()
+        study, found, _, _ = forecast_study(config, 1)
+        pilot = time.process_time() - began
+        began = time.process_time()
+        run_to_file(config, SerialCommunicator(), config.output.file, "new")
+        truth = time.process_time() - began
+        size = Path(config.output.file).stat().st_size
+    hours = 3600.0 * found.hours.value
+    ratio, of_size = hours / truth, found.size.value / size
+    inside = all(
+        each.low <= value <= each.high
+        for each, value in ((found.hours, truth / 3600.0), (found.size, size))
+    )
+    table.add(
+        name, study.size, len(found.runs), pilot, hours,
+        f"{3600.0 * found.hours.low:.3g} to {3600.0 * found.hours.high:.3g}", truth, ratio,
+        found.size.value / 1e3, size / 1e3, of_size, "yes" if inside else "no",
+    )  # fmt: skip
+    return max(ratio, 1.0 / ratio), max(of_size, 1.0 / of_size), inside
+
+
+def main():
+    """Print the table, and what is the furthest off."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--replicates-of", type=float, default=1.0, metavar="F",
+                        help="so many times the replicates of each study")  # fmt: skip
+    parser.add_argument("--studies", nargs="+", choices=STUDIES, default=list(STUDIES))
+    arguments = parser.parse_args()
+    print_heading()
+    columns = ("study", "replicates", "of them in the pilot", "pilot [s]", "forecast [s]",
+               "95 %", "truth [s]", "ratio", "file, forecast [kB]", "truth [kB]", "ratio ",
+               "both inside")  # fmt: skip
+    table = Table("--dry-run against the study itself, CPU time of one core", columns)
+    factor = arguments.replicates_of * (0.25 if arguments.quick else 1.0)
+    found = [judge(name, factor, table) for name in arguments.studies]
+    table.print(arguments.markdown)
+    hours, size = max(each[0] for each in found), max(each[1] for each in found)
+    inside = sum(each[2] for each in found)
+    print(f"off by at most {hours:.2f} times (goal {GOAL}) in time and {size:.2f} in size; "
+          f"{inside} of {len(found)} inside both intervals")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

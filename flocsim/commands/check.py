@@ -1,0 +1,415 @@
+"""`flocsim check study.toml`: whether a study's own scene is computed right, at its extremes.
+
+Some replicates of the study are run at the ends of its sizes, its numbers of vertices, its contact
+stiffness and its tolerance, each combination by itself, and held against runs at a hundred times
+tighter a tolerance than the tightest. Nothing is written.
+"""
+
+import itertools
+import math
+import time
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import NOW
+from flocsim.ensembles.collision.checking import TIGHTER, exact_method
+from flocsim.ensembles.collision.encounter import Encounter, replicate_row
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.start import draws, orientations
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.ensembles.config.quantities import read_quantity
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.pilot.choice import first_methods
+from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.study import Study, flocs_of
+from flocsim.errors import ConfigError, FlocsimError, UsageError
+from flocsim.forces import Contact
+from flocsim.integrators import Implicit
+from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance, nudge_of, nudged
+from flocsim.integrators.base import Integrator
+from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.terminal import tell
+from flocsim.run import Run
+
+COUNT = 2
+"""Replicates of each combination of ends, where nothing else is asked for."""
+
+DECADE = 10.0
+"""Ends of the stiffness, over and under that of the config, where none are stated."""
+
+TIGHTEST = 1e-14
+"""Tolerance [m] of references at the least: beyond lies rounding."""
+
+MORE_STEPS = 20
+"""Times the step budget of the config for a reference."""
+
+CLOSE = 1e-2
+"""Error over the smaller r_eq that is right of methods that have no tolerance and state no
+error."""
+
+RIGHT, STATED, WRONG = "right", "within its stated error", "failed"
+
+HEADER = (
+    f"{'type':<12}{'N':>5}{'k_n [N/m]':>11}{'setting':>11}{'delta':>7}{'repl.':>6}{'steps':>8}"
+    f"{'CPU [ms]':>10}{'error [m]':>11}{'stated [m]':>12}  verdict"
+)
+
+
+class Case(NamedTuple):
+    """One run: place of the type, N, stiffness [N/m] (NaN: the config's law), method, share of
+    δ_max, replicate."""
+
+    condition: int
+    vertices: int
+    stiffness: float
+    method: Integrator
+    delta: float
+    replicate: int
+
+
+class Verdict(NamedTuple):
+    """What came of a Case: steps, CPU time [s], error and stated error [m] (NaN: none), RIGHT,
+    STATED or WRONG, and why it is wrong."""
+
+    steps: int
+    time: float
+    error: float
+    stated: float
+    kind: str
+    why: str = ""
+
+
+def add_parser(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "check",
+        help="run a study's scene at the ends of its sizes, stiffness and tolerance",
+        description="Run some replicates of a study at the ends of its sizes, numbers of vertices, "
+        "contact stiffness and tolerance, hold them against a much tighter tolerance, and print "
+        "what came of each. Exit code 0 where all are right or within their stated error, 1 where "
+        "any is not.",
+    )
+    add = parser.add_argument
+    add("config", help="config file (TOML)")
+    add("--stiffness", nargs=2, metavar=("LOW", "HIGH"),
+        help="ends of forces.contact.k_n, e.g. '1 N/m' '1e3 N/m' (default: a decade under and over "
+        "that of the config)")  # fmt: skip
+    add("--size", nargs=2, metavar=("LOW", "HIGH"),
+        help="ends of the approaching body's radius, e.g. '1 um' '50 um', in pairs as "
+        "unequal as the config's first (default: its smallest and its largest pair)")  # fmt: skip
+    add("--tolerance", nargs=2, metavar=("LOW", "HIGH"),
+        help="ends of the tolerance, e.g. '1e-11 m' '1e-7 m' (default: the study's and that of its "
+        'second runs; with accuracy = "auto": all that may be chosen)')  # fmt: skip
+    add("--count", type=int, default=COUNT, metavar="K",
+        help=f"replicates of each combination (default: {COUNT})")  # fmt: skip
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's, as in flocsim ensemble; may be "
+        "repeated")  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def ends(option: str, given: list[str] | None, unit: str) -> tuple[float, float] | None:
+    """Two values of an option, the smaller one first; None where it is not given."""
+    if given is None:
+        return None
+    try:
+        low, high = (as_number(word, unit) for word in given)
+    except (ValueError, ConfigError) as error:
+        raise UsageError(f"{option}: {error}") from None
+    if not 0.0 < low < high < math.inf:
+        raise UsageError(f"{option} must be two values above 0, LOW and HIGH, found {low:g} "
+                         f"and {high:g}")  # fmt: skip
+    return low, high
+
+
+def as_number(word, unit):
+    """A number in SI units, or a quantity such as "2 um"."""
+    try:
+        return float(word)
+    except ValueError:
+        return read_quantity(word, unit)
+
+
+def sized(config: Config, sizes: tuple[float, float] | None) -> Config:
+    """The config with its smallest and its largest pair alone, or with pairs of these sizes [m]."""
+    scene = config.scene
+    if sizes is not None:
+        _, radius_i, radius_j = scene.conditions[0]
+        ratio = radius_i / radius_j
+        pairs = tuple((float(f"{ratio * size:.3g}"), size) for size in sizes)
+        return attrs.evolve(config, scene=attrs.evolve(scene, pairs=pairs))
+    order = sorted(range(len(scene.conditions)), key=lambda k: sum(scene.conditions[k][1:]))
+    kept = sorted({order[0], order[-1]})
+    if scene.pairs:
+        made = attrs.evolve(scene, pairs=tuple(scene.pairs[place] for place in kept))
+    else:
+        names = [name for name, _, _ in scene.conditions]
+        made = attrs.evolve(scene, types=tuple(names[place] for place in kept))
+    return attrs.evolve(config, scene=made)
+
+
+def law_of(config: Config) -> Contact | None:
+    """The contact law that has a k_n; None where there is none."""
+    return next((force for force in config.forces if isinstance(force, Contact)), None)
+
+
+def stiff(config: Config, stiffness: float) -> Config:
+    """The config with another k_n [N/m], k_t in proportion; as it is for NaN."""
+    law = law_of(config)
+    if law is None or math.isnan(stiffness):
+        return config
+    made = attrs.evolve(law, k_n=stiffness, k_t=law.k_t * stiffness / law.k_n)
+    forces = tuple(made if force is law else force for force in config.forces)
+    return attrs.evolve(config, forces=forces)
+
+
+def stiffnesses(config: Config, given: tuple[float, float] | None) -> list[float]:
+    """The ends of the stiffness [N/m]; where they are not stated, none that preflight refuses."""
+    law = law_of(config)
+    if law is None:
+        if given is not None:
+            raise UsageError(
+                "--stiffness is for forces.contact, which the config does not have: leave it out"
+            )
+        return [math.nan]
+    if given is not None:
+        return list(given)
+    try:
+        check_study(stiff(config, law.k_n / DECADE))
+    except ConfigError:
+        return [law.k_n, law.k_n * DECADE]
+    return [law.k_n / DECADE, law.k_n * DECADE]
+
+
+def methods(config: Config, condition: int, given: tuple[float, float] | None) -> list[Integrator]:
+    """The method of a type at the ends of its tolerance, the loosest first."""
+    integrator = config.integrator
+    method = integrator.method
+    if given is not None:
+        if not math.isfinite(method.tolerance) or exact_method(method) is None:
+            raise UsageError(
+                f"--tolerance is for methods that have one, which {integrator.label} has not: "
+                "leave it out"
+            )
+        low, high = given
+        made: Any = method
+        return [attrs.evolve(made, tolerance=each) for each in (high, low)]
+    if integrator.is_chosen:
+        length = scene_length(config, condition)
+        return [at_rung(Implicit(), rung * length) for rung in (RUNGS[0], RUNGS[-1])]
+    exact = exact_method(method)
+    return [method] if exact is None else [method, exact]
+
+
+def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
+    """All runs, one tolerance beside the other."""
+    stated = ends("--stiffness", args.stiffness, "N/m")
+    tolerances = ends("--tolerance", args.tolerance, "m")
+    counts = sorted({min(config.shapes.vertices), max(config.shapes.vertices)})
+    places = range(len(config.scene.conditions))
+    number = itertools.count()
+    for place, vertices, k_n in itertools.product(places, counts, stiffnesses(config, stated)):
+        for _ in range(args.count):
+            # Other displacements and other random numbers each time, as far as there are any.
+            at = next(number)
+            delta = config.scene.delta[at % len(config.scene.delta)]
+            for method in methods(config, place, tolerances):
+                yield Case(place, vertices, k_n, method, delta, at % config.replicates)
+
+
+@attrs.define
+class Checker:
+    """Runs Cases of a config; the flocs are grown or read once."""
+
+    config: Config
+    studies: dict[float, Study] = attrs.Factory(dict)
+    flocs: list | None = None
+    warm: set = attrs.Factory(set)
+
+    def study(self, stiffness: float) -> Study:
+        """The Study with this stiffness; ConfigError where its impacts are too deep."""
+        if stiffness not in self.studies:
+            config = stiff(self.config, stiffness)
+            check_study(config)
+            self.flocs = flocs_of(config) if self.flocs is None else self.flocs
+            self.studies[stiffness] = Study(config, self.flocs, first_methods(config))
+        return self.studies[stiffness]
+
+    def judge(self, case: Case, reference: float) -> Verdict:
+        """Run a Case and its reference at a tolerance [m], to the time at which both are there."""
+        try:
+            scene = Scene.of(self.study(case.stiffness), case)
+            kind = case.stiffness, scene.encounter.system.spheres_only, type(case.method)
+            if kind not in self.warm:  # compiled, or loaded, before it is timed
+                scene.run(case.method)
+                self.warm.add(kind)
+            return judged(scene, Implicit(reference))
+        except FlocsimError as error:
+            return Verdict(0, math.nan, math.nan, math.nan, WRONG, str(error))
+        except MemoryError:
+            raise
+        except Exception as error:  # of a class of the user's own
+            words = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            return Verdict(0, math.nan, math.nan, math.nan, WRONG, words)
+
+
+@attrs.frozen
+class Scene:
+    """A replicate that can be run by any method, to any time."""
+
+    study: Study
+    case: Case
+    encounter: Encounter
+    angles: tuple[float, float]
+
+    @classmethod
+    def of(cls, study: Study, case: Case) -> "Scene":
+        numbers = draws(study.config.seed, case.replicate)
+        encounter = study.encounter(case.condition, case.vertices, numbers)
+        return cls(study, case, encounter, orientations(numbers))
+
+    def run(
+        self, method: Integrator, more: int = 1, until: float = math.inf,
+        moved: Callable[[Run], None] | None = None,
+    ) -> tuple[Run, dict]:  # fmt: skip
+        """(Run that has ended, its row); ``moved`` may change the start."""
+        made = self.encounter.begin(
+            self.study.driver(self.encounter, method), self.angles, self.case.delta,
+            more * self.study.config.integrator.max_steps, until, integrator=method,
+        )  # fmt: skip
+        if moved is not None:
+            moved(made)
+        return made, replicate_row(made.to_end(), self.angles, made)
+
+
+def judged(scene: Scene, exact: Integrator) -> Verdict:
+    """The Verdict on a Scene's Case, against a run by the method ``exact``."""
+    case = scene.case
+    _ = scene.encounter.scene
+    began = time.process_time()
+    found, row = scene.run(case.method)
+    spent = time.process_time() - began
+    stated = found.error if math.isfinite(case.method.tolerance) else math.nan
+    about = found.steps + found.rejected, spent
+    if row["failure"]:
+        return Verdict(*about, math.nan, stated, WRONG, ending(row))
+    reference, other = scene.run(exact, MORE_STEPS)
+    if other["failure"]:
+        return Verdict(*about, math.nan, stated, WRONG, f"no reference: it ends {ending(other)}")
+    at = min(found.time, reference.time)
+    # Both are stopped where the first of them was decided.
+    if found.time > at:
+        found, _ = scene.run(case.method, until=at)
+    elif reference.time > at:
+        reference, _ = scene.run(exact, MORE_STEPS, until=at)
+    error = end_distance(scene.encounter.system.bodies, place_of(found), place_of(reference))
+    stated = found.error if math.isfinite(case.method.tolerance) else math.nan
+    if (row["outcome"], row["inside"]) != (other["outcome"], other["inside"]):
+        why = f"{ending(row)}, and the reference {ending(other)}{remark(scene, reference, exact)}"
+        return Verdict(*about, error, stated, WRONG, why)
+    if error <= allowed(scene):
+        return Verdict(*about, error, stated, RIGHT)
+    if error <= stated:
+        return Verdict(*about, error, stated, STATED)
+    if error <= stated + reference.error:
+        own = f"of which {reference.error:.2g} m may be the reference's own"
+        why = f"no good reference: off by {error:.3g} m, {own}"
+        return Verdict(*about, error, stated, WRONG, f"{why}{remark(scene, reference, exact)}")
+    times = f"{error / stated:.3g} times its stated error" if stated > 0.0 else "and states none"
+    why = f"off by {error:.2g} m, {times}{remark(scene, reference, exact)}"
+    return Verdict(*about, error, stated, WRONG, why)
+
+
+def allowed(scene: Scene) -> float:
+    """Error [m] that is right: the tolerance, or a share of the smaller radius where there is
+    none."""
+    if math.isfinite(scene.case.method.tolerance):
+        return scene.case.method.tolerance
+    return CLOSE * min(shape.equivalent_radius for shape in scene.encounter.shapes)
+
+
+def ending(row):
+    """How a replicate ended, in words."""
+    reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
+    zone = {0: ", outside", 1: ", inside"}.get(row["inside"], "") if not reason else ""
+    return f"{OUTCOMES[row['outcome']]}{reason}{zone}"
+
+
+def place_of(run: Run) -> np.ndarray:
+    """Where bodies are (n, 3) [m, m, rad]."""
+    return run.work.motion[NOW, :, :3]
+
+
+def remark(scene: Scene, reference: Run, exact: Integrator) -> str:
+    """Words on a motion that amplifies whatever is off at its start."""
+    factor = amplification(scene, reference, exact)
+    if factor <= MOST_AMPLIFIED:
+        return ""
+    return f"; the motion amplifies a nudge {factor:.2g} times"
+
+
+def amplification(scene: Scene, reference: Run, exact: Integrator) -> float:
+    """The distance of a nudged companion from the reference, over the nudge, where the first of
+    both is decided."""
+    bodies = scene.encounter.system.bodies
+    nudge = nudge_of(bodies)
+    still = [attrs.evolve(body, position=(0.0, 0.0)) for body in bodies]
+    shift = np.array([body.position for body in nudged(still, nudge)])
+
+    def move(run):
+        run.work.motion[NOW, :, :2] += shift
+
+    companion, _ = scene.run(exact, MORE_STEPS, reference.time, move)
+    if companion.time < reference.time:
+        reference, _ = scene.run(exact, MORE_STEPS, companion.time)
+    return end_distance(bodies, place_of(companion), place_of(reference)) / nudge
+
+
+def line_of(config: Config, case: Case, verdict: Verdict) -> str:
+    """A Case and its Verdict as a line of the table."""
+    name = config.scene.conditions[case.condition][0]
+    k_n = "as given" if math.isnan(case.stiffness) else f"{case.stiffness:g}"
+    method = case.method
+    step = getattr(method, "step", math.nan)
+    setting = f"{method.tolerance:.0e} m" if math.isfinite(method.tolerance) else f"{step:.0e} s"
+    numbers = [
+        "-" if math.isnan(value) else f"{value:.1e}" for value in (verdict.error, verdict.stated)
+    ]
+    spent = "-" if math.isnan(verdict.time) else f"{1e3 * verdict.time:.2f}"
+    why = f": {verdict.why}" if verdict.why else ""
+    return (
+        f"{name:<12}{case.vertices:>5}{k_n:>11}{setting:>11}{case.delta:>7.3g}"
+        f"{case.replicate:>6}{verdict.steps or '-':>8}{spent:>10}{numbers[0]:>11}{numbers[1]:>12}"
+        f"  {verdict.kind}{why}"
+    )
+
+
+def run(args: Namespace) -> int:
+    """Run all cases and print the table; 0 where all are right or within their stated error."""
+    if not args.count >= 1:
+        raise UsageError(f"--count must be at least 1, found {args.count}")
+    config = load_config(args.config, nested(map(parse_setting, args.settings)))
+    check_study(config)
+    config = sized(config, ends("--size", args.size, "m"))
+    cases = list(cases_of(config, args))
+    settings = [each.method.tolerance for each in cases if math.isfinite(each.method.tolerance)]
+    reference = max(TIGHTER * min(settings, default=1e-9), TIGHTEST)
+    tell(
+        f"{len(cases)} runs at the ends of sizes, N, stiffness and tolerance, against Implicit at "
+        f"{reference:.0e} m\nerror: of any point of an outline, where the first of both is "
+        f"decided\n\n{HEADER}"
+    )
+    checker = Checker(config)
+    kinds = []
+    for case in cases:
+        verdict = checker.judge(case, reference)
+        kinds.append(verdict.kind)
+        tell(line_of(config, case, verdict))
+    right, stated, wrong = (kinds.count(kind) for kind in (RIGHT, STATED, WRONG))
+    tell(f"\n{right} {RIGHT} (within the tolerance), {stated} {STATED}, {wrong} {WRONG}")
+    return 1 if wrong else 0

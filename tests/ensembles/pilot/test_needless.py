@@ -1,0 +1,147 @@
+"""Which parts of the physics changed no outcome: said, tried fairly, and never acted on."""
+
+import math
+
+import attrs
+import pytest
+
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.pilot import needless
+from flocsim.ensembles.pilot.forecast import Timed, in_turn, time_replicates
+from flocsim.ensembles.pilot.needless import (
+    ENOUGH,
+    INERTIA,
+    LEAST,
+    Finding,
+    Part,
+    find,
+    parts_of,
+    stokes_number,
+    tried_without,
+    without_force,
+    words_of,
+)
+from flocsim.ensembles.pilot.sample import Task
+from flocsim.ensembles.study import Study
+from flocsim.integrators import Implicit, Overdamped
+from tests.helpers.small_study import small_study
+
+SPHERES = {"shapes": {"vertices": [1]}, "replicates": 40, "scene": {"types": ["III"]}}
+
+
+def never():
+    """Nothing asks for an end."""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Spheres whose repulsion is too weak to matter, in a zone that does not hang on it."""
+    weak = {"double_layer": {"potential": 1e-6}}
+    over = SPHERES | {"forces": weak, "zone": {"distance": 5e-6}}
+    return small_study(tmp_path_factory.mktemp("study"), over)
+
+
+@pytest.fixture(scope="module")
+def runs(study):
+    return time_replicates(study, in_turn(study.config), never, seconds=0.0)
+
+
+def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, runs, monkeypatch):
+    monkeypatch.setattr(needless, "LARGEST_STOKES", 0.0)  # another engine to compile
+    before = dict(study.zones), study.config.forces
+    found = {each.name: each for each in find(study, runs, never, seconds=0.0)}
+    assert list(found) == [*study.config.force_names, INERTIA]
+    for name in ("gravity", "drag"):
+        assert "settle" in found[name].why
+    assert "needs a contact force" in found["contact"].why
+    assert found["double_layer"][1:3] == (0, LEAST)
+    assert found["double_layer"].time > 0.0
+    assert (dict(study.zones), study.config.forces) == before
+
+
+def test_attraction_that_holds_spheres_matters(study, runs):
+    place = study.config.force_names.index("van_der_waals")
+    part = Part("van_der_waals", without_force(place))
+    found = tried_without(study, runs * 3, part, never, seconds=100.0)
+    # Spheres that no force holds roll off each other: a few are enough to know.
+    assert found[1:3] == (ENOUGH, ENOUGH)
+
+
+def test_outcomes_are_held_against_those_of_the_pilot(study, runs):
+    other = [run._replace(inside=1 - run.inside) for run in runs]
+    found = tried_without(study, other, Part("nothing", lambda system: system), never, 0.0)
+    assert found[1:3] == (LEAST, LEAST)
+
+
+def test_a_force_that_is_absent_is_not_tried(tmp_path):
+    over = SPHERES | {"forces": {"van_der_waals": {"hamaker": 0.0}}, "zone": {"distance": 5e-6}}
+    config = small_study(tmp_path, over).config
+    assert "van_der_waals" not in [part.name for part in parts_of(config, [Implicit()])]
+
+
+def test_inertia_is_tried_where_bodies_forget_their_speed(tmp_path, study):
+    parts = {part.name: part for part in parts_of(study.config, [Implicit(1e-9)])}
+    assert stokes_number(study.config) < 1.0
+    system = next(iter(study.encounters.values())).system
+    bare = parts[INERTIA].left_out(attrs.evolve(system, integrator=Implicit(1e-7)))
+    assert bare.integrator == Overdamped(1e-7)
+    assert INERTIA not in [part.name for part in parts_of(study.config, [Overdamped()])]
+
+
+def test_inertia_is_not_tried_where_it_must_matter(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('preset = "tang2014"\n[scene]\ntypes = ["I"]\n', "utf-8")
+    [finding] = [part for part in parts_of(load_config(path), [Implicit()]) if part.name == INERTIA]
+    assert "Stokes number of 3.8" in finding.why
+
+
+@pytest.mark.slow
+def test_light_solids_do_without_inertia(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'preset = "si"\nreplicates = 20\n[scene]\ntypes = ["III"]\ndelta = [0.0]\n'
+        "[shapes]\nvertices = [1]\n", "utf-8",
+    )  # fmt: skip
+    study = Study(load_config(path))
+    runs = time_replicates(study, in_turn(study.config), never)
+    found = {each.name: each for each in find(study, runs, never)}
+    assert found[INERTIA][1:3] == (0, 20)
+
+
+TASK = Task(0, 1, 0.0, 0)
+
+
+def again(count, flips):
+    """Replicates that were run again, of which some flipped, and as many that were not."""
+    once = Timed(TASK, 0, 1, 1.0, math.nan, 0.0)
+    return [once._replace(second=2.0, flipped=k < flips) for k in range(count)] + [once] * count
+
+
+@pytest.mark.parametrize(
+    ("finding", "flips", "words"),
+    [
+        (Finding("a", 0, 200, 0.9), 9, "a: never changed an outcome of 200 replicates (rate below "
+         "1.9 %); leaving it out would save 10 % of the time"),
+        (Finding("a", 0, 200, 1.2), 0, "would save none of the time"),
+        (Finding(INERTIA, 0, 200, 0.5), 0, "replicates (Overdamped agrees) (rate below"),
+        (Finding("a", 8, 20, 0.9), 0, "a: matters, without it 8 of 20 outcomes change"),
+        (Finding("a", 2, 200, 0.9), 1, "a: 2 of 200 outcomes change, which may be numerical (of "
+         "100 run again more exactly 1 do); leaving it out would save 10 %"),
+        (Finding("a", why="it must"), 0, "a: stays, it must"),
+    ],
+)  # fmt: skip
+def test_findings_in_words(finding, flips, words):
+    assert words in words_of(finding, again(100, flips))
+
+
+def test_without_second_runs_what_changes_an_outcome_matters():
+    assert "matters" in words_of(Finding("a", 1, 200, 0.9), again(0, 0))
+
+
+def test_a_signal_ends_it(study, runs):
+    def stop():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        find(study, runs, stop)
+    assert all(isinstance(run, Timed) for run in runs)

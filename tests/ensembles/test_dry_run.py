@@ -1,0 +1,110 @@
+"""`--dry-run`: with a pilot, without one, and where there can be none."""
+
+import re
+
+import pytest
+
+from flocsim.ensembles import cli, dry_run
+from flocsim.ensembles.pilot import forecast, needless
+from flocsim.errors import FlocsimError
+from tests.helpers.small_study import run_command, small_config, write_small
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Pilots of the least that they run, and nothing compiled but what the suite has anyway."""
+    monkeypatch.setattr(forecast.time_replicates, "__defaults__", (0.0,))
+    monkeypatch.setattr(needless, "LARGEST_STOKES", 0.0)
+    monkeypatch.setattr(needless.find, "__defaults__", (0.0,))
+
+
+def spheres(folder, **over):
+    return small_config(folder, {"shapes": {"vertices": [1]}, "replicates": 30} | over)
+
+
+def test_the_pilot_says_what_the_study_takes_and_what_matters(tmp_path, brief):
+    text = dry_run.dry_run(spheres(tmp_path), 2)
+    assert (
+        "ran 12 replicates of 4 of the 4 conditions, 4 of them again (0 outcomes flipped); they "
+        "ended 12 A"
+    ) in text
+    [hours] = re.findall(
+        r"core-hours: (\S+) \((\S+) to (\S+)\), \d+ % of them for second runs; on 2 rank", text
+    )
+    value, low, high = map(float, hours)
+    assert 0.0 < low < value < high
+    assert re.search(r"results file: \d+ kB \(\d+ kB to \d+ kB\), \d+ B for each replicate", text)
+    for name in ("gravity: stays", "contact: stays", "inertia: stays", "van_der_waals: "):
+        assert f"without {name}" in text
+    assert text.endswith("nothing was run but the pilot (--dry-run)")
+
+
+def test_without_a_pilot_it_is_as_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(dry_run, "pilot_lines", None)
+    text = dry_run.dry_run(spheres(tmp_path), 1, pilot=False)
+    assert "pilot:" not in text
+    assert text.endswith("nothing was run (--dry-run)")
+
+
+def test_auto_is_forecast_at_what_it_chooses(tmp_path, brief):
+    auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
+    config = spheres(tmp_path, **auto)
+    text = dry_run.dry_run(config, 1)
+    assert re.search(r"pilot:\n  III: implicit, \S+ m, expected flips", text)
+
+
+def test_auto_is_not_waited_for_where_it_takes_long(tmp_path, brief, monkeypatch):
+    monkeypatch.setattr(dry_run, "MOST_CHOOSING", 0.0)
+    auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
+    monkeypatch.setattr(dry_run, "choose", None)
+    text = dry_run.dry_run(spheres(tmp_path, **auto), 1)
+    assert re.search(r"what follows is at Implicit\(tolerance=1e-09", text)
+    assert "core-hours: " in text
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (FlocsimError("no compiler"), "no compiler"),
+        (ZeroDivisionError("by\nnothing"), "ZeroDivisionError: by nothing"),
+    ],
+)
+def test_a_pilot_that_fails_is_one_line_among_the_others(tmp_path, monkeypatch, error, words):
+    def fail(*arguments):
+        raise error
+
+    monkeypatch.setattr(dry_run, "forecast_study", fail)
+    lines = dry_run.dry_run(spheres(tmp_path), 1).splitlines()
+    assert lines[-2] == f"  none could be run: {words}"
+    assert any(line.startswith("stiffness:") for line in lines)
+
+
+def test_a_machine_without_a_compiler_is_told_the_rest(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    write_small(tmp_path, vertices="[1]")
+    done = run_command(tmp_path, "small.toml", "--dry-run")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "none could be run: NUMBA_DISABLE_JIT is set" in done.stdout
+
+
+def test_a_signal_ends_the_pilot(tmp_path, monkeypatch, capsys):
+    write_small(tmp_path, vertices="[1]")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(dry_run, "stop_requested", lambda: True)
+    assert cli.main(["small.toml", "--dry-run"]) == 75
+    assert capsys.readouterr().out == ""
+
+
+def test_no_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
+    write_small(tmp_path, vertices="[1]")
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["small.toml", "--no-pilot"]) == 2
+    assert capsys.readouterr().err == "flocsim: --no-pilot is for --dry-run: leave it out\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+@pytest.mark.parametrize(
+    ("size", "words"), [(812e3, "812 kB"), (25.9e6, "25.9 MB"), (3.14e9, "3.14 GB")]
+)
+def test_sizes_in_words(size, words):
+    assert dry_run.megabytes(size) == words

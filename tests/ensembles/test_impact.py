@@ -1,0 +1,142 @@
+"""Impacts deeper than the contact law covers are refused before anything runs."""
+
+import math
+import re
+
+import attrs
+import pytest
+from scipy.integrate import solve_ivp
+
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.impact import depth, rounded_up
+from flocsim.ensembles.preflight import check_study
+from flocsim.errors import ConfigError
+from flocsim.fields import quantity
+from flocsim.forces import ContactForce
+from tests.helpers.small_study import run_command, small_config, write_small
+
+HEAVY = {"bodies": {"surface_density": 20.0}}
+
+
+@attrs.frozen
+class Hertz(ContactForce):
+    """A law of a user's own: k Δ^1.5."""
+
+    k: float = quantity("", above=0.0)
+
+    @staticmethod
+    def kernel(contact, k):
+        return k * contact.overlap**1.5, 0.0
+
+
+@attrs.frozen
+class Sticky(ContactForce):
+    """A law without stiffness: nothing can be said of how deep it lets bodies in."""
+
+    @staticmethod
+    def kernel(contact):
+        return -1e-12, 0.0
+
+
+@attrs.frozen
+class Singular(ContactForce):
+    """A law that gives no number."""
+
+    @staticmethod
+    def kernel(contact):
+        return 1.0 / (contact.overlap - contact.overlap), 0.0
+
+
+def with_law(config, law):
+    forces = [force for force in config.forces if not isinstance(force, ContactForce)]
+    made = attrs.evolve(config)
+    object.__setattr__(made, "forces", (*forces, law))
+    return made
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0, 2.5])
+def test_the_depth_is_that_of_the_damped_spring(share):
+    speed, mass, stiffness = 0.2, 3e-9, 20.0
+    omega = math.sqrt(stiffness / mass)
+    motion = solve_ivp(
+        lambda t, y: (y[1], -(omega**2) * y[0] - 2.0 * share * omega * y[1]),
+        (0.0, 4.0 / omega), (0.0, speed), rtol=1e-9, atol=1e-15, max_step=0.01 / omega,
+    )  # fmt: skip
+    found = depth(speed, mass, stiffness, 2.0 * share * math.sqrt(stiffness * mass))
+    assert found == pytest.approx(max(motion.y[0]), rel=1e-4)
+
+
+def test_critical_damping_stops_at_an_e_th():
+    damping = 2.0 * math.sqrt(20.0 * 3e-9)
+    assert depth(0.2, 3e-9, 20.0, damping) == pytest.approx(0.2 * math.sqrt(3e-9 / 20.0) / math.e)
+
+
+def test_a_value_is_rounded_up():
+    assert [rounded_up(x) for x in (38.0, 37.01, 0.0991, 2751.0)] == [38.0, 38.0, 0.1, 2800.0]
+
+
+def test_heavy_flocs_are_refused_with_the_stiffness_that_would_do(tmp_path):
+    with pytest.raises(ConfigError, match=r"I: an impact at 242\.9 mm/s is 2\.12 um deep") as told:
+        check_study(small_config(tmp_path, HEAVY))
+    line = str(told.value)
+    assert "\n" not in line and "more than the 1 um" in line
+    wanted = float(re.search(r"k_n (\S+) N/m or more", line)[1])
+    for factor, fits in ((1.0, True), (0.95, False)):
+        over = HEAVY | {"forces": {"contact": {"k_n": factor * wanted}}}
+        config = small_config(tmp_path, over)
+        if fits:
+            check_study(config)
+        else:
+            with pytest.raises(ConfigError, match="deep"):
+                check_study(config)
+
+
+def test_spheres_alone_have_room_for_more(tmp_path):
+    check_study(small_config(tmp_path, HEAVY | {"shapes": {"vertices": [1]}}))
+
+
+def test_without_damping_impacts_are_deeper(tmp_path):
+    loose = {"damping_n": 0.0}
+    over = {"bodies": {"surface_density": 8.0}, "forces": {"contact": loose}}
+    check_study(small_config(tmp_path, {"bodies": {"surface_density": 8.0}}))
+    with pytest.raises(ConfigError, match="deep"):
+        check_study(small_config(tmp_path, over))
+
+
+def test_a_law_of_ones_own_is_judged_by_its_work(tmp_path):
+    config = small_config(tmp_path)
+    speed, limit = 0.02429, 1e-6
+    # M v²/2 = k L^2.5/2.5 at the deepest overlap that is covered.
+    mass = min_mass(config)
+    least = 1.25 * mass * speed**2 / limit**2.5
+    check_study(with_law(config, Hertz(1.05 * least)))
+    with pytest.raises(ConfigError, match=r"make the contact 1\.1 times as stiff"):
+        check_study(with_law(config, Hertz(0.95 * least)))
+
+
+def min_mass(config):
+    """M [kg] of the pair of Type I."""
+    from flocsim.ensembles.preflight import sphere_pairs
+    from flocsim.explain import pairs_of
+
+    return next(mass for _, _, mass in pairs_of(next(sphere_pairs(config))[1].system))
+
+
+@pytest.mark.parametrize("law", [Sticky(), Singular()])
+def test_a_law_that_cannot_be_judged_is_left_alone(tmp_path, law):
+    check_study(with_law(small_config(tmp_path, HEAVY), law))
+
+
+def test_the_command_refuses_before_it_runs(tmp_path):
+    write_small(tmp_path)
+    for words in ((), ("--dry-run",)):
+        done = run_command(tmp_path, "small.toml", "--set", "bodies.surface_density=20", *words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "forces.contact.k_n 90 N/m or more" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+def test_si_and_the_examples_are_not_refused(tmp_path):
+    path = tmp_path / "si.toml"
+    path.write_text('preset = "si"\n[scene]\ntypes = ["I", "II", "III"]\n', "utf-8")
+    check_study(load_config(path))
