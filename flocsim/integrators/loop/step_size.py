@@ -85,6 +85,9 @@ SHARE_OF_FAILED, RECOVERY = 0.6, 2.0
 SETTLED_GROWTH = 3.0
 """The first step behind a switch is at most so many times the one behind the switch before."""
 
+MOST_SWITCHING = 4.0
+"""Steps in a row that may each end at a switch before they grow all the same."""
+
 
 def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
@@ -149,7 +152,11 @@ def plan(clock, step, ratio, was_cut, switched):
         # The forces are new, and settle about as fast as behind the last switch.
         clock[PREVIOUS_STEP] = math.inf
         clock[STAGED_STEP] = 0.0
-        clock[SETTLING] = 1.0
+        clock[SETTLING] += 1.0
+        if clock[SETTLING] > MOST_SWITCHING and not was_cut:
+            # A pair on the verge of touching switches step after step: they have to grow, too.
+            clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
+            clock[SETTLED_STEP] = max(clock[SETTLED_STEP], step)
         clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
     elif switched == OTHER_FRICTION:
         clock[PREVIOUS_STEP] = math.inf
@@ -160,7 +167,7 @@ def plan(clock, step, ratio, was_cut, switched):
         clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
         clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
     else:
-        if clock[SETTLING] == 1.0:
+        if clock[SETTLING] > 0.0:
             clock[SETTLED_STEP] = step
             clock[SETTLING] = 0.0
         cut = step < 0.5 * clock[STEP]

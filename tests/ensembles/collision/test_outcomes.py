@@ -294,3 +294,12 @@ def test_a_step_through_a_body_ends_at_the_first_touch(tmp_path):
     for share, replicate in ((0.158, 152), (0.07, 307), (0.752, 422)):
         row = study.run(0, 8, share, replicate)
         assert OUTCOMES[row["outcome"]] in "ABCD", FAILURES[row["failure"]]
+
+
+def test_a_pair_on_the_verge_of_touching_does_not_hold_steps_back(tmp_path):
+    """One of its contacts opens and closes step after step, far below the tolerance."""
+    words = {"preset": "si", "seed": 5, "replicates": 1000, "scene": {"types": ["III"]}}
+    words |= {"shapes": {"vertices": [16], "pool": 10}, "integrator": {"tolerance": 1e-7}}
+    row = Study(small_config(tmp_path, words)).run(0, 16, 0.0, 35)
+    assert OUTCOMES[row["outcome"]] == "C"
+    assert row["steps"] < 1000
