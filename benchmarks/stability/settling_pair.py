@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from benchmarks.stability.case import WATER_DENSITY, Answer, Case, ReferenceGaveUpError
 from benchmarks.stability.spheres import contact_of, drag_of, mass_between
 from flocsim import Body, Fluid, Sphere
-from flocsim.constants import STANDARD_GRAVITY
+from flocsim.constants import CENTRE_SOFTENING, STANDARD_GRAVITY
 from flocsim.forces import DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from tests.reference.forces import Contact as PlainContact
 from tests.reference.forces import DoubleLayer as PlainDoubleLayer
@@ -77,8 +77,13 @@ class Approach:
         self.reduced = reduced(*(body.shape.radius for body in bodies))
         self.attraction = PlainVanDerWaals(attraction.hamaker, attraction.d_min)
         self.repulsion = PlainDoubleLayer(repulsion.potential, repulsion.debye_length)
-        self.reaches = attraction.reach, repulsion.reach
-        kinks = sorted([0.0, attraction.d_min, *self.reaches])
+        self.radii = sum(body.shape.radius for body in bodies)
+        # Forces along the line of centres are those of a softened distance.
+        along_centres = attraction.gap == "equivalent_spheres"
+        self.softening = CENTRE_SOFTENING * self.radii if along_centres else 0.0
+        self.d_min = self.hard(attraction.d_min)
+        self.reaches = self.hard(attraction.reach), self.hard(repulsion.reach)
+        kinks = sorted([0.0, self.d_min, *self.reaches])
         self.bounds = [-math.inf, *(kink / self.length for kink in kinks), math.inf]
         self.mass = mass_between(*bodies)
         self.contact = PlainContact(
@@ -93,16 +98,23 @@ class Approach:
         omega = math.sqrt(contact.k_n / self.mass)
         self.stiff = max(*self.decays, omega * self.time) > 3e3
 
+    def hard(self, soft):
+        """The gap of which the softened one is this [m]."""
+        return math.sqrt((soft + self.radii) ** 2 - self.softening**2) - self.radii
+
     def force(self, gap, rate, between):
         """Repulsion [N] of the pair; which kinks the gap lies between is given, not asked."""
         total = 0.0
+        distance = math.hypot(gap + self.radii, self.softening)
+        soft, upright = distance - self.radii, (gap + self.radii) / distance
         if between < self.reaches[0]:
             # Beyond a kink by a trial step, the law goes on as it was before the kink.
             d_min = self.attraction.d_min
-            d = d_min if between < d_min else max(gap, 0.5 * d_min)
-            total -= self.attraction.hamaker * self.reduced / (6.0 * d * d)
+            d = d_min if between < self.d_min else max(soft, 0.5 * d_min)
+            total -= upright * self.attraction.hamaker * self.reduced / (6.0 * d * d)
         if between < self.reaches[1]:
-            total += self.repulsion.repulsion(0.0 if between < 0.0 else gap, self.reduced)
+            inside = 0.0 if between < self.hard(0.0) else soft
+            total += upright * self.repulsion.repulsion(inside, self.reduced)
         if between < 0.0:
             total += self.contact.components(self.mass, -gap, 0.0, rate, 0.0)[0]
         return total
