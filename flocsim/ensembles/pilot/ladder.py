@@ -34,7 +34,7 @@ CORE = 0.25
 
 WEIGHTS: dict[type, float] = {Implicit: 1.0, DormandPrince54: 0.5}
 """CPU time of one evaluation of the forces, all that is done besides included, over that of
-Implicit: `python -m benchmarks.speed.pilot_weights`."""
+Implicit: `python -m benchmarks.accuracy.pilot_weights`."""
 
 MORE_STEPS = 5
 """Times the step budget of the config for a reference."""

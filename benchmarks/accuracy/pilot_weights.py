@@ -1,6 +1,6 @@
 """CPU time of one evaluation of the forces by each method that a pilot may choose.
 
-    python -m benchmarks.speed.pilot_weights [--quick]
+    python -m benchmarks.accuracy.pilot_weights [--quick]
 
 All that a step does besides (Newton's systems, events, lists) is shared out over its evaluations.
 The ratio to Implicit is WEIGHTS of flocsim.ensembles.pilot.ladder: a pilot counts, and never takes
