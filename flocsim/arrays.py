@@ -127,9 +127,9 @@ error [m], largest step [s]; size of the step before (inf: none, 0: it was rejec
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
 the step whose stages are still there (0: none are) and the time at which it began; the largest
 step that is expected to work at all; the error of the step just taken [m]; size and error over
-tolerance of the trial that was just rejected (0: none was); 1 from a switch until a step has been
-taken behind it; the size of the last such step; the share of what the method estimates for its
-steps that counts in the stated error."""
+tolerance of the trial that was just rejected (0: none was); steps in a row that ended at a switch,
+until one has been taken that does not; the size of the last such step; the share of what the method
+estimates for its steps that counts in the stated error."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, COUNTS_SIZE = range(9)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after

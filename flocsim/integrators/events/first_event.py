@@ -43,21 +43,17 @@ def deepest_overlap(work):
     return deepest
 
 
-def resolution_of(work, clock):
-    """How far a pair may go behind its switch unnoticed [m]."""
+def resolutions_of(work, clock):
+    """How far a pair may go behind its switch unnoticed, and how far it may be there without being
+    told from one before it [m]."""
     resolution = RESOLUTION * step_tolerance(work, clock) if clock[TOLERANCE] < math.inf else 1e-13
     deepest = deepest_overlap(work)
     if deepest > 0.0:
         resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
-    return max(resolution, ROUNDING * furthest_place(work, NEW))
-
-
-def depth_of(work, clock):
-    """How far a pair may be behind its switch without being told from one before it [m]."""
-    resolution = resolution_of(work, clock)
-    if deepest_overlap(work) > 0.0:
-        return resolution
-    return max(resolution, min(SHALLOWEST_TOUCH, clock[TOLERANCE]))
+    resolution = max(resolution, ROUNDING * furthest_place(work, NEW))
+    if deepest > 0.0:
+        return resolution, resolution
+    return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock[TOLERANCE]))
 
 
 def event_share(scene, work, row, which):
@@ -100,7 +96,8 @@ def law_share(scene, work, clock, step):
     or ends to slide; above 1 where none does. Expects the geometry of all pairs in NEW."""
     share = law_event_share(scene, work, NEVER)
     if has(scene, SLIP_LIMIT):
-        share = friction_share(scene, work, share, step, resolution_of(work, clock))
+        resolution, _ = resolutions_of(work, clock)
+        share = friction_share(scene, work, share, step, resolution)
     return share
 
 
@@ -110,7 +107,7 @@ def switch_share(scene, work, observed, clock, step):
     Expects the geometry of all pairs in NEW.
     """
     if clock[TOLERANCE] < math.inf or awaits_touch(observed):
-        resolution, depth = resolution_of(work, clock), depth_of(work, clock)
+        resolution, depth = resolutions_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)
         return share if share <= 1.0 else law_share(scene, work, clock, step)
     return math.inf

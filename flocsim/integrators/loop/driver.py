@@ -33,12 +33,7 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
-from flocsim.integrators.events.first_event import (
-    depth_of,
-    law_share,
-    resolution_of,
-    switch_share,
-)
+from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
 from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
 from flocsim.integrators.rhs.friction import hold_slides
@@ -91,7 +86,8 @@ def accept(scene, work, clock, counts, step, lists):
     if not lists:
         return SAME
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
-        add_switch_errors(scene, work, step, depth_of(work, clock))
+        _, depth = resolutions_of(work, clock)
+        add_switch_errors(scene, work, step, depth)
     hand_over(scene, work)
     return set_modes(scene, work)
 
@@ -151,7 +147,7 @@ def ends_early(scene, work, clock, step, ratio, share):
     locate_contacts(scene, work, NEW)
     hold_slides(scene, work, NEW)
     # A long step may have run through a body: what came first is seen from a nearer end alone.
-    resolution, depth = resolution_of(work, clock), depth_of(work, clock)
+    resolution, depth = resolutions_of(work, clock)
     return not may_switch(scene, work, share * step, resolution, depth)
 
 

@@ -23,7 +23,7 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
-from flocsim.integrators.events.first_event import resolution_of
+from flocsim.integrators.events.first_event import resolutions_of
 from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
@@ -91,7 +91,7 @@ MOST_SWITCHING = 4.0
 
 def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
-    resolution = resolution_of(work, clock)
+    resolution, _ = resolutions_of(work, clock)
     for row in range(work.tally[CANDIDATES]):
         gap = work.geometry[NOW, row, GAP]
         if 0.0 <= gap < clock[TOLERANCE]:

@@ -49,23 +49,34 @@ def stage_weights(share):
     return basis(share, 0), basis(share, 1), basis(share, 2), basis(share, 3)
 
 
+def cubic(weights, start, one, two, three):
+    """The cubic through a value at the start and those at the stages."""
+    _, first, second, third = weights
+    # In changes, so that what does not move stays just where it is.
+    change = first * (one - start)
+    change += second * (two - start)
+    return start + change + third * (three - start)
+
+
 def weighted(work, body, axis, weights):
     """The cubic through START and the stages."""
     motion = work.motion
-    _, first, second, third = weights
-    start = motion[START, body, axis]
-    # In changes, so that what does not move stays just where it is.
-    change = first * (motion[FIRST_STAGE, body, axis] - start)
-    change += second * (motion[SECOND_STAGE, body, axis] - start)
-    return start + change + third * (motion[THIRD_STAGE, body, axis] - start)
+    return cubic(
+        weights, motion[START, body, axis], motion[FIRST_STAGE, body, axis],
+        motion[SECOND_STAGE, body, axis], motion[THIRD_STAGE, body, axis],
+    )  # fmt: skip
+
+
+def write_cubic(work, weights, state):
+    """Write the motion at a share of the step, of these weights, into a state."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(6):
+            work.motion[state, body, axis] = weighted(work, body, axis, weights)
 
 
 def collocate(work, step, share):
     """Write the motion at a share of the step into TRIAL: the cubic through the stages."""
-    weights = stage_weights(share)
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            work.motion[TRIAL, body, axis] = weighted(work, body, axis, weights)
+    write_cubic(work, stage_weights(share), TRIAL)
 
 
 def stiffness_of(scene, work, step):
@@ -90,18 +101,14 @@ def end_on_the_cubic(scene, work, step, ratio, share):
     """
     if ratio > GOOD_CUBIC or stiffness_of(scene, work, step) > STIFF:
         return False
-    collocate(work, 0.0, share)
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            work.motion[NEW, body, axis] = work.motion[TRIAL, body, axis]
-    slip = work.slip
-    _, first, second, third = stage_weights(share)
+    weights, slip = stage_weights(share), work.slip
+    write_cubic(work, weights, NEW)
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
-            now = slip[NOW, row]
-            change = first * (slip[FIRST_STAGE, row] - now)
-            change += second * (slip[SECOND_STAGE, row] - now)
-            slip[NEW, row] = now + change + third * (slip[THIRD_STAGE, row] - now)
+            slip[NEW, row] = cubic(
+                weights, slip[NOW, row], slip[FIRST_STAGE, row], slip[SECOND_STAGE, row],
+                slip[THIRD_STAGE, row],
+            )  # fmt: skip
     return True
 
 
