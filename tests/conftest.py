@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # Before numpy or numba is imported: they read these once.
@@ -17,3 +18,13 @@ os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The current folder, with the small config in it, spheres only."""
+    from tests.helpers.small_study import write_small
+
+    monkeypatch.chdir(tmp_path)
+    write_small(tmp_path, vertices="[1]")
+    return tmp_path

@@ -19,7 +19,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim.ensembles.collision.start import draws
+from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.choice import (
     ALLOWED,
@@ -46,7 +46,6 @@ STUDIES = {
 """Name of a study → its config, but for shapes and numbers."""
 
 GOAL = 1.3
-MORE_STEPS = 5
 
 
 def config_of(text, arguments):
@@ -103,8 +102,7 @@ def make_ready(study):
     for kind in study.kinds:
         study.run(*kind, study.config.scene.delta[0], 0)
     for task in (task for tasks in sample_of(study.config) for task in tasks):
-        numbers = draws(study.config.seed, task.replicate)
-        study.encounter(task.condition, task.vertices, numbers)
+        study.drawn(task.condition, task.vertices, task.replicate)
 
 
 def judge(name, text, arguments, table):
@@ -156,7 +154,7 @@ def rates(arguments):
     places, count = study.places, min(arguments.sample, config.replicates)
     for replicate in range(count):
         for condition, vertices, _ in places:
-            study.encounter(condition, vertices, draws(config.seed, replicate))
+            study.drawn(condition, vertices, replicate)
     began = time.process_time()
     for replicate in range(count):
         for place in places:

@@ -192,8 +192,7 @@ def main():
                "99th percentile", "largest")  # fmt: skip
     table = Table(f"True error over stated error at {arguments.tolerance:g} m", columns)
     for family in arguments.families:
-        found = judged(family, arguments.tolerance, runs, arguments.processes)
-        shares, left, failed = found
+        shares, left, failed = judged(family, arguments.tolerance, runs, arguments.processes)
         values = np.array([each[0] for each in shares])
         table.add(
             family, len(shares), left, failed, 100.0 * np.mean(values <= 1.0),

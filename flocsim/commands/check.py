@@ -19,7 +19,6 @@ from flocsim.arrays import NOW
 from flocsim.ensembles.collision.checking import TIGHTER, exact_method
 from flocsim.ensembles.collision.encounter import Encounter, replicate_row
 from flocsim.ensembles.collision.failures import FAILURES
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.quantities import read_quantity
@@ -144,13 +143,7 @@ def sized(config: Config, sizes: tuple[float, float] | None) -> Config:
         pairs = tuple((float(f"{ratio * size:.3g}"), size) for size in sizes)
         return attrs.evolve(config, scene=attrs.evolve(scene, pairs=pairs))
     order = sorted(range(len(scene.conditions)), key=lambda k: sum(scene.conditions[k][1:]))
-    kept = sorted({order[0], order[-1]})
-    if scene.pairs:
-        made = attrs.evolve(scene, pairs=tuple(scene.pairs[place] for place in kept))
-    else:
-        names = [name for name, _, _ in scene.conditions]
-        made = attrs.evolve(scene, types=tuple(names[place] for place in kept))
-    return attrs.evolve(config, scene=made)
+    return attrs.evolve(config, scene=scene.only(sorted({order[0], order[-1]})))
 
 
 def law_of(config: Config) -> Contact | None:
@@ -269,9 +262,8 @@ class Scene:
 
     @classmethod
     def of(cls, study: Study, case: Case) -> "Scene":
-        numbers = draws(study.config.seed, case.replicate)
-        encounter = study.encounter(case.condition, case.vertices, numbers)
-        return cls(study, case, encounter, orientations(numbers))
+        drawn = study.drawn(case.condition, case.vertices, case.replicate)
+        return cls(study, case, *drawn)
 
     def run(
         self, method: Integrator, more: int = 1, until: float = math.inf,

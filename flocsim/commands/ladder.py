@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.commands.trajectory import select
+from flocsim.commands.trajectory import select, with_one_count
+from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.choice import (
@@ -26,7 +26,7 @@ from flocsim.ensembles.pilot.choice import (
     sampling_error,
     settled,
 )
-from flocsim.ensembles.pilot.ladder import DECADES, MORE_STEPS, Job, Trial, at_rung, scene_length
+from flocsim.ensembles.pilot.ladder import DECADES, Job, Trial, at_rung, scene_length
 from flocsim.ensembles.pilot.sample import sample_of
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.study import Study, flocs_of
@@ -81,25 +81,22 @@ class Measured:
 def part_of(config: Config, args: Namespace) -> Config:
     """The config with the type, N and δ alone that were named."""
     place, vertices, delta = select(config, args)
-    scene, shapes = config.scene, config.shapes
-    if args.type is not None and scene.pairs:
-        scene = attrs.evolve(scene, pairs=scene.pairs[place : place + 1])
-    elif args.type is not None:
-        scene = attrs.evolve(scene, types=(args.type,))
+    scene = config.scene
+    if args.type is not None:
+        scene = scene.only([place])
     if args.delta is not None:
         scene = attrs.evolve(scene, delta=(delta,))
     if args.vertices is not None:
-        shapes = attrs.evolve(shapes, vertices=(vertices,))
-    return attrs.evolve(config, scene=scene, shapes=shapes)
+        config = with_one_count(config, vertices)
+    return attrs.evolve(config, scene=scene)
 
 
 def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
     """(Trial whose cost is CPU time [µs], times, d_c and its rate) of a replicate; None for no
     motion."""
     condition, vertices, share, replicate = job.task
-    numbers = draws(study.config.seed, replicate)
-    encounter = study.encounter(condition, vertices, numbers)
-    driver, angles = study.driver(encounter, job.integrator), orientations(numbers)
+    encounter, angles = study.drawn(condition, vertices, replicate)
+    driver = study.driver(encounter, job.integrator)
     run = encounter.begin(
         driver, angles, share, job.max_steps, record=True, integrator=job.integrator
     )

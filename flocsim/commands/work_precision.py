@@ -12,7 +12,6 @@ import attrs
 from flocsim.commands import ladder
 from flocsim.commands.trajectory import add_replicate, one_count_study, select
 from flocsim.ensembles.collision.encounter import replicate_system
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import FlocsimError
@@ -85,10 +84,9 @@ def row(system, duration, exact, name, setting, integrator):
 def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
     study = one_count_study(config, place[1])
-    numbers = draws(config.seed, number)
     found = study.run(*place, number)
-    encounter = study.encounter(*place[:2], numbers)
-    system = replicate_system(encounter, orientations(numbers), place[2])
+    encounter, angles = study.drawn(*place[:2], number)
+    system = replicate_system(encounter, angles, place[2])
     return system, float(found["t_end"]), found
 
 

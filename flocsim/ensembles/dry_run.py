@@ -114,8 +114,8 @@ def chosen_study(study, tasks):
 
     began = time.process_time()
     choice = choose(study, share)
-    made = Study(config, flocs=study.flocs, methods=choice.methods)
-    return made, choice_lines(choice.record), time.process_time() - began
+    spent = time.process_time() - began
+    return study.by_methods(choice.methods), choice_lines(choice.record), spent
 
 
 def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[str], float]:

@@ -134,6 +134,13 @@ class Study:
         radii = (shape.equivalent_radius for shape in shapes)
         return zone_distance(self.config.zone, self.config.forces, *radii)
 
+    def drawn(
+        self, condition: int, vertices: int, replicate: int
+    ) -> tuple[Encounter, tuple[float, float]]:
+        """The Encounter and the two angles [rad] that a replicate's random numbers give."""
+        numbers = draws(self.config.seed, replicate)
+        return self.encounter(condition, vertices, numbers), orientations(numbers)
+
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
 

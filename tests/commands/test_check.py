@@ -13,14 +13,6 @@ from flocsim.integrators import Implicit
 from tests.helpers.small_study import write_small
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with the small config in it, spheres only."""
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path, vertices="[1]")
-    return tmp_path
-
-
 def call(capsys, *words):
     """(exit code, the table's rows, the last line) of the command."""
     code = main(["check", "small.toml", *words])

@@ -11,14 +11,6 @@ from flocsim.io.results.file import read_results, same_data
 from tests.helpers.small_study import run_command, write_small, write_star_library
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """The current folder, with the small config in it, spheres only."""
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path, vertices="[1]")
-    return tmp_path
-
-
 def call(capsys, *words):
     """(exit code, output, errors) of the command, run in this process."""
     code = cli.main([*map(str, words)])

@@ -1,6 +1,5 @@
 """The flocs of a study: grown by flocsim, read from a shape library, or of a class of the user's
-own; resized to the scene or as they
-were measured."""
+own; resized to the scene, or as they were measured."""
 
 import math
 from collections.abc import Sequence

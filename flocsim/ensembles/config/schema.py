@@ -10,7 +10,7 @@ the one source of flocs that a key goes with; ``beside_class`` marks keys that s
 named.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -135,6 +135,13 @@ class SceneConfig:
         if self.pairs:
             return tuple((f"{micrometres(i)}um-{micrometres(j)}um", i, j) for i, j in self.pairs)
         return tuple((name, *TYPES[name]) for name in self.types or ())
+
+    def only(self, places: Iterable[int]) -> "SceneConfig":
+        """The scene with the collision types, or pairs, at these places alone."""
+        if self.pairs:
+            return attrs.evolve(self, pairs=tuple(self.pairs[place] for place in places))
+        names = self.types or ()
+        return attrs.evolve(self, types=tuple(names[place] for place in places))
 
 
 def micrometres(length: float) -> str:

@@ -20,10 +20,10 @@ from typing import Any
 
 import attrs
 
+from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.pilot.ladder import (
     DECADES,
-    MORE_STEPS,
     REFERENCE,
     RUNGS,
     WEIGHTS,

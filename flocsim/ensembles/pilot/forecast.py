@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.collision.checking import count_checks
 from flocsim.ensembles.collision.encounter import Encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILED
-from flocsim.ensembles.collision.start import draws, orientations
+from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
 from flocsim.ensembles.study import Study
@@ -112,11 +112,10 @@ def in_turn(config: Config, size: int = MOST) -> list[Task]:
 
 def prepared(study: Study, task: Task) -> tuple[Encounter, Callable, tuple[float, float]]:
     """(Encounter, driver, angles) of a replicate, ready to run."""
-    numbers = draws(study.config.seed, task.replicate)
-    encounter = study.encounter(task.condition, task.vertices, numbers)
+    encounter, angles = study.drawn(task.condition, task.vertices, task.replicate)
     driver = study.driver(encounter)
     _ = encounter.scene  # made here, where it is timed
-    return encounter, driver, orientations(numbers)
+    return encounter, driver, angles
 
 
 def timed(study: Study, task: Task, again: bool) -> Timed:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from flocsim.arrays import EVALUATIONS
 from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import Task
 from flocsim.ensembles.study import Study
@@ -35,9 +34,6 @@ CORE = 0.25
 WEIGHTS: dict[type, float] = {Implicit: 1.0, DormandPrince54: 0.5}
 """CPU time of one evaluation of the forces, all that is done besides included, over that of
 Implicit: `python -m benchmarks.accuracy.pilot_weights`."""
-
-MORE_STEPS = 5
-"""Times the step budget of the config for a reference."""
 
 
 class Job(NamedTuple):
@@ -79,10 +75,8 @@ def trial(study: Study, job: Job) -> Trial:
     """
     condition, vertices, share, replicate = job.task
     try:
-        numbers = draws(study.config.seed, replicate)
-        encounter = study.encounter(condition, vertices, numbers)
+        encounter, angles = study.drawn(condition, vertices, replicate)
         driver = study.driver(encounter, job.integrator)
-        angles = orientations(numbers)
         run = encounter.begin(
             driver, angles, share, job.max_steps, integrator=job.integrator
         )  # fmt: skip

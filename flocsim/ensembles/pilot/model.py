@@ -20,6 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flocsim.ensembles.collision.checking import Z
+
 FLIPS = 0.025
 """Share of outcomes that flip where the tolerance is the scene's length, before any is seen."""
 
@@ -99,5 +101,4 @@ def beliefs(seen: Sequence[Sequence[Seen]]) -> list[Belief]:
 
 def sampling_half_width(count: int) -> float:
     """Half of Wilson's 95 % interval of a probability of ½ seen in so many replicates."""
-    z = 1.959963984540054
-    return 0.5 * z / math.sqrt(count + z * z)
+    return 0.5 * Z / math.sqrt(count + Z * Z)

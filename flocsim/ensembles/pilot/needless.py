@@ -13,7 +13,6 @@ import attrs
 
 from flocsim.ensembles.collision.encounter import Encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILED
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.forecast import Timed
 from flocsim.ensembles.preflight import sphere_pairs
@@ -134,15 +133,14 @@ def tried_without(
         go_on()
         if count >= LEAST and (whole > seconds or changed >= ENOUGH):
             break
-        encounter = study.encounter(
-            run.task.condition, run.task.vertices, draws(study.config.seed, run.task.replicate)
-        )
+        task = run.task
+        encounter, angles = study.drawn(task.condition, task.vertices, task.replicate)
         if id(encounter) not in made:
             bare = attrs.evolve(encounter, system=part.left_out(encounter.system))
             made[id(encounter)] = bare
-            compiled(study, bare, drivers, run)
+            compiled(study, bare, angles, drivers, run)
         began = time.process_time()
-        taken, outcome, inside = one_without(study, made[id(encounter)], drivers, run)
+        taken, outcome, inside = one_without(study, made[id(encounter)], angles, drivers, run)
         count += 1
         changed += (outcome, inside) != (run.outcome, run.inside)
         spent, before = spent + taken, before + run.first
@@ -150,17 +148,16 @@ def tried_without(
     return Finding(part.name, changed, count, spent / max(before, 1e-12))
 
 
-def compiled(study, encounter, drivers, run):
+def compiled(study, encounter, angles, drivers, run):
     """Compile the driver of a scene where there is none yet: no part of what is timed."""
     kind = encounter.system.spheres_only
     if kind not in drivers:
         drivers[kind] = study.driver(encounter, encounter.system.integrator)
-        one_without(study, encounter, drivers, run)
+        one_without(study, encounter, angles, drivers, run)
 
 
-def one_without(study, encounter, drivers, run):
+def one_without(study, encounter, angles, drivers, run):
     """(CPU time [s], outcome, inside) of a replicate in a scene without a part."""
-    angles = orientations(draws(study.config.seed, run.task.replicate))
     steps = study.config.integrator.max_steps
     _ = encounter.scene
     began = time.process_time()
