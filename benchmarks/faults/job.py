@@ -22,6 +22,9 @@ BESIDE_PYTHON = Path(sys.executable).parent
 PATIENCE = 30.0
 """Seconds after which a job that does not end hangs."""
 
+REPORTED = 50
+"""Faults of a kind after which a line says how they went: the whole takes hours."""
+
 STUDY = """\
 preset = "tang2014"
 seed = 3
@@ -181,6 +184,9 @@ class Tally:
         if problem:
             self.wrong.append(problem)
             print(problem, file=sys.stderr, flush=True)
+        if self.faults % REPORTED == 0:
+            counted = f"{self.faults} of a kind, {len(self.wrong)} wrong, {self.hangs} hangs"
+            print(f"{counted}, slowest {self.slowest:.1f} s", file=sys.stderr, flush=True)
 
 
 def make_study(folder):
