@@ -26,6 +26,7 @@ from flocsim.forces.check import (
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.plausibility.settling import terminal_speed
 
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}
@@ -344,7 +345,8 @@ def pair_scales(system):
 
 
 def body_scales(system):
-    """Stokes relaxation m/(6πγ r) and the time of settling by a radius, of the free bodies."""
+    """Stokes relaxation m/(6πγ r), at rest, and the time of settling by a radius, of the free
+    bodies."""
     force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
     free = [body for body in system.bodies if not body.fixed]
     if force is None or not free:
@@ -356,9 +358,8 @@ def body_scales(system):
             0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
         )
         resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
-        load = math.hypot(*force(at_rest, known)[:2])
-        sinks = load > 0.0 and resistance > 0.0
-        settling.append(radius * resistance / load if sinks else math.inf)
+        speed = terminal_speed(system, body)
+        settling.append(radius / speed if speed > 0.0 else math.inf)
         relaxation.append(decay_time(body.mass, resistance))
     return [
         Scale("Stokes relaxation", min(relaxation), True),

@@ -24,6 +24,7 @@ ROWS = [
     ["ensembles"],
     ["system", "io"],
     ["explain", "run"],
+    ["plausibility"],
     ["forces", "integrators"],
     ["body"],
     ["geometry", "laws"],

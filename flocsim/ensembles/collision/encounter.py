@@ -14,13 +14,18 @@ from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.blame import force_to_blame
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, UNABLE, WHY, collided, outcome_of
-from flocsim.ensembles.collision.settling import terminal_motion, turn_time
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
+from flocsim.plausibility.settling import (
+    largest_mobility,
+    least_mobility,
+    terminal_motion,
+    turn_time,
+)
 from flocsim.run import Run
 from flocsim.system import System
 
@@ -42,7 +47,7 @@ class Encounter:
     """Two shapes that meet: everything about them but orientation and displacement.
 
     Made once for each pair of shapes and used for all replicates that draw it. ``zone_distance``
-    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j.
+    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j, alone.
     """
 
     system: System
@@ -79,6 +84,29 @@ class Encounter:
         radius_i, radius_j = (shape.equivalent_radius for shape in self.shapes)
         return turn_time(radius_i, radius_j, self.drift)
 
+    @functools.cached_property
+    def mobilities(self) -> tuple[float, ...]:
+        """The largest of each body on its way between rest and settling [s/kg]: what is left of a
+        velocity dies away at least as fast, and attraction carries it no faster."""
+        return tuple(
+            largest_mobility(self.system, body, math.hypot(*velocity), mobility)
+            for body, (velocity, mobility) in zip(self.system.bodies, self.settling, strict=True)
+        )
+
+    @functools.cached_property
+    def largest_load(self) -> float:
+        """The pull on the bond of a settling doublet in its worst orientation [N].
+
+        |drift|/(µ_i + µ_j); where drag is not linear, at the least mobilities up to the speed of
+        the faster one, which bounds it from above.
+        """
+        fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
+        least = [
+            least_mobility(self.system, body, fastest, mobility)
+            for body, (_, mobility) in zip(self.system.bodies, self.settling, strict=True)
+        ]
+        return math.hypot(*self.drift) / sum(least)
+
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
@@ -89,8 +117,8 @@ class Encounter:
         observed[numbers.ESCAPE] = escape
         observed[numbers.REST_TIME] = rest
         observed[numbers.DRIFT_X : numbers.DRIFT_Y + 1] = self.drift
-        observed[numbers.MOBILITY_I] = self.settling[0][1]
-        observed[numbers.MOBILITY_J] = self.settling[1][1]
+        observed[numbers.MOBILITY_I], observed[numbers.MOBILITY_J] = self.mobilities
+        observed[numbers.LOAD] = self.largest_load
         return observed
 
     def time_limit(self) -> float:

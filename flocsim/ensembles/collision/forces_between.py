@@ -3,9 +3,9 @@
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.settling import lone_view, no_force
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators.rhs.views import pair_view
+from flocsim.plausibility.settling import lone_view, no_force
 
 OUTLINES = "contact"
 """Name of what acts at the outlines: contact, and forces of the surface gap if there are any."""

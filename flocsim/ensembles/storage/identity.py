@@ -34,7 +34,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
-    "run.py", "compiler",
+    "run.py", "plausibility/settling.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
     "ensembles/collision", "ensembles/study.py",
 )  # fmt: skip
