@@ -53,6 +53,10 @@ class ShapeError(UsageError, ValueError):
     """Vertices or a radius that do not make a body."""
 
 
+class PlausibilityWarning(UserWarning):
+    """What is possible, and done, but implausible: a value far out of its usual range, say."""
+
+
 class KernelError(UsageError):
     """A force's kernel that cannot be used: it names the force, the file and the line."""
 

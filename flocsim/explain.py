@@ -26,6 +26,8 @@ from flocsim.forces.check import (
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.plausibility.doubts import doubts_of
+from flocsim.plausibility.reynolds import all_settled
 from flocsim.plausibility.settling import terminal_speed
 
 PLACES = {"x", "y", "angle", "time"}
@@ -59,7 +61,8 @@ STABLE = 2.0
 
 
 def explain(system: Any) -> str:
-    """The report of System.explain() as text: forces, machinery, time scales."""
+    """The report of System.explain() as text: forces, machinery, settling, time scales, and what
+    is implausible."""
     return "\n".join(
         [
             heading(system),
@@ -67,7 +70,9 @@ def explain(system: Any) -> str:
             *machinery_lines(system),
             "in:  recording: every accepted step; run(record=False) keeps start and end only",
             "out: events and observer: a plain run awaits none; an ensemble puts its own",
+            *settling_lines(system),
             *scale_lines(system),
+            *(f"warning: {line}" for line in doubts_of([system])),
         ]
     )
 
@@ -204,6 +209,11 @@ def history_line(system):
     if any(holds_slip(system, force) for force in forces):
         return "in:  tangential history: displacements are kept while a contact lasts"
     return "idle: tangential history: no tangential stiffness, displacements carry no force"
+
+
+def settling_lines(system):
+    """A line for every kind of body that settles: its speed, Reynolds and Stokes number."""
+    return [f"settling: a body of {each.words}" for each in all_settled(system) if each.speed > 0.0]
 
 
 def exerts_torque(system, force):

@@ -25,6 +25,7 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
+from flocsim.plausibility.doubts import warn_of
 from flocsim.run import Run
 
 Fillings = dict[Callable, Callable]
@@ -214,8 +215,10 @@ class System:
 
         A run that ends early says why in ``Trajectory.status``; it raises no exception.
         ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
+        A PlausibilityWarning says, once for each, what of the scene is implausible.
         """
         check_limits(until, max_steps)
+        warn_of(self, stacklevel=2)
         self.check_overlaps()
         began = time.perf_counter()
         run = self.begin(until, max_steps=max_steps, record=record, jit=jit)
@@ -267,6 +270,7 @@ class System:
     def explain(self) -> str:
         """What is compiled into this scene and what is left out, each with its reason, as text.
 
-        Ends with the scene's time scales and the step that an explicit method would need.
+        Ends with Reynolds numbers, the scene's time scales, the step that an explicit method would
+        need, and a line on everything that is implausible.
         """
         return explain(self)

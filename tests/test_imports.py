@@ -42,6 +42,7 @@ INNER_ROWS = {
         ["disk_cache", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
+    "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit", "parts"],
@@ -57,7 +58,7 @@ INNER_ROWS = {
         ["pilot"],
         ["estimates"],
         ["storage"],
-        ["study"],
+        ["study", "doubts"],
         ["preflight"],
         ["impact"],
         ["collision"],

@@ -20,6 +20,7 @@ from flocsim.io.plots.shapes import draw_overlay
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
+from flocsim.plausibility.ranges import PIXEL_SIZE
 
 DESCRIPTION = """\
 Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
@@ -97,6 +98,9 @@ def run(args: argparse.Namespace) -> int:
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
     check_outputs(outputs, paths)
+    doubt = PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
+    if doubt:
+        report(f"warning: {doubt}")
     try:
         pictures, fits, lost = fit_pictures(paths, options)
     except KeyboardInterrupt:
@@ -115,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return LOST if lost else 2
     settings = {"method": options.method, "preserve_area": options.preserve_area,
-                "inscribed": options.inscribed}  # fmt: skip
+                "inscribed": options.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:

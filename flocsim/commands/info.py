@@ -18,7 +18,8 @@ from flocsim.io.results.schema import BONDS
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
-APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy")
+APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
+         "warnings", "settling")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -75,13 +76,16 @@ def results_text(path, results, totals):
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
         if choice := stored(results.run, "accuracy"):
             facts += [("accuracy", visible(line, "")) for line in choice_lines(choice)]
-        facts += origin(results.run)
+        facts += settling(results.run) + origin(results.run)
+        doubts = [visible(line, "") for line in stored(results.run, "warnings")]
         notes = stored(results.run, "failed")
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
+    if doubts:
+        lines += ["", *(f"warning: {line}" for line in doubts)]
     if notes:
         shown = [visible(describe_note(note), keep="") for note in notes[:MOST_FAILURES]]
         lines += ["", *(f"failed: {note}" for note in shown)]
@@ -130,6 +134,15 @@ def outcomes(results, totals):
         steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
         rows.append(("steps", steps))
     return rows
+
+
+def settling(run):
+    """[(name, value)] of the bodies at their terminal speeds, a line for each collision type."""
+    types: dict[str, list[str]] = {}
+    for each in stored(run, "settling"):
+        number = f"{visible(each['body'], '')} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
+        types.setdefault(visible(each["type"], ""), []).append(number)
+    return [("settling", f"{name}: {', '.join(numbers)}") for name, numbers in types.items()]
 
 
 def origin(run):

@@ -7,6 +7,7 @@ from math import inf
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
@@ -40,6 +41,12 @@ def condition_lines(config):
             f"D_0 = {1e6 * pair.zone_distance:.4g} um; "
             f"settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time {pair.turn_time:.3g} s"
         )
+        numbers = [
+            f"body {each['body']} Re = {each['reynolds']:.2g}, St = {each['stokes']:.2g}"
+            for each in settling_facts(config)
+            if each["type"] == name
+        ]
+        yield f"    at terminal speed: {'; '.join(numbers)}"
 
 
 def code_lines(config):
@@ -228,6 +235,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
             for name, pair in sphere_pairs(config)
             for line in scale_lines(pair.system)
         ),
+        *(f"warning: {line}" for line in study_doubts(config)),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
         "nothing was run but the pilot (--dry-run)" if pilot else "nothing was run (--dry-run)",
     ]

@@ -17,6 +17,7 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
@@ -406,6 +407,8 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",
+        "warnings": storable(json.dumps(study_doubts(config))),
+        "settling": storable(json.dumps(settling_facts(config))),
     }
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from flocsim.commands import fit, fit_pictures, info, plot
 from flocsim.errors import FileError, ShapeError, UsageError
-from flocsim.io.shapes.library import read_library
+from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.real_images import real_image
 
 
@@ -49,6 +49,14 @@ def test_pictures_become_a_library(tmp_path, frame, capsys):
     table = next(line for line in printed.out.splitlines() if line.split()[0] == "16")
     mean = np.mean([entry.fits[16].relative_error for entry in entries])
     assert float(table.split()[-1]) == pytest.approx(mean, abs=0.006)
+
+
+def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
+    options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
+    assert run(frame, "--pixel-size", "8.6", *options) == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("flocsim: warning: --pixel-size = 8.6 m is implausible: the side of a")
+    assert line.removeprefix("flocsim: warning: ") == read_settings(tmp_path / "s.h5")["warning"]
 
 
 def test_only_the_largest_flocs(tmp_path, frame, capsys):
