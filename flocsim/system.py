@@ -13,7 +13,7 @@ from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.explain import explain
-from flocsim.fields import is_number, is_whole
+from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.smoothing import smoothing_of
@@ -208,20 +208,21 @@ class System:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
 
     def run(
-        self, until: float, *, max_steps: int = 1_000_000, record: bool = True,
+        self, until: float | str, *, max_steps: int = 1_000_000, record: bool = True,
         amplification: bool = False, jit: bool = True,
     ) -> Trajectory:  # fmt: skip
-        """Move the bodies until a time [s] and return the Trajectory.
+        """Move the bodies until a time, in s or as "20 ms", and return the Trajectory.
 
         A run that ends early says why in ``Trajectory.status``; it raises no exception.
         ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
         A PlausibilityWarning says, once for each, what of the scene is implausible.
         """
-        check_limits(until, max_steps)
+        end: float = in_unit(until, "s", "until")
+        check_limits(end, max_steps)
         warn_of(self, stacklevel=2)
         self.check_overlaps()
         began = time.perf_counter()
-        run = self.begin(until, max_steps=max_steps, record=record, jit=jit)
+        run = self.begin(end, max_steps=max_steps, record=record, jit=jit)
         status = run.to_end()
         growth = None
         if amplification:

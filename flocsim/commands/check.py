@@ -21,13 +21,13 @@ from flocsim.ensembles.collision.encounter import Encounter, replicate_row
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
-from flocsim.ensembles.config.quantities import read_quantity
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import ConfigError, FlocsimError, UsageError
+from flocsim.fields.quantities import read_quantity
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance, nudge_of, nudged

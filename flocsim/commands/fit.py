@@ -14,6 +14,7 @@ from flocsim.commands.fit_pictures import (
     titles_of,
 )
 from flocsim.errors import ImageError, UsageError
+from flocsim.fields.quantities import read_quantity
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.shapes import draw_overlay
@@ -41,7 +42,8 @@ def add_parser(subparsers: Any) -> None:
     parser.set_defaults(run=run)
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
-    add("--pixel-size", metavar="METRES", help="length of a pixel's side in metres, e.g. 0.95e-6")
+    add("--pixel-size", metavar="LENGTH",
+        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6")  # fmt: skip
     add("--vertices", default="4,8,16,64", metavar="LIST",
         help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
     add("--radius", default="1", metavar="LIST",
@@ -138,7 +140,7 @@ def read_options(args):
     if args.pixel_size is None:
         raise UsageError(
             "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
-            "of its side in metres, for example --pixel-size 0.95e-6"
+            "of its side, for example --pixel-size '0.95 um'"
         )
     if args.inscribed and (args.preserve_area or args.method != "pattern"):
         raise UsageError(
@@ -157,7 +159,7 @@ def read_options(args):
         "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
     }
     return Options(
-        pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
+        pixel_size=length("--pixel-size", args.pixel_size),
         vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
         radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
         method=args.method,
@@ -183,6 +185,29 @@ def number(option, text, meaning, least, most):
 
 def positive(option, text, meaning="pixels"):
     return number(option, text, f"{meaning}, a number above 0", 5e-324, 1.7e308)
+
+
+def length(option, text):
+    """A length above 0 [m]: "0.95 um", or a number of metres."""
+    hint = ""
+    try:
+        value = read_quantity(text, "m")
+    except ValueError as reason:
+        hint = f" ({reason})" if str(reason) and not is_float(text) else ""
+        value = float(text) if is_float(text) else 0.0
+    if not 0.0 < value < float("inf"):
+        raise UsageError(
+            f"{option} takes a length above 0 such as '0.95 um', or in metres, found {text!r}{hint}"
+        )
+    return value
+
+
+def is_float(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def whole(option, text):

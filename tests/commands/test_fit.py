@@ -51,6 +51,12 @@ def test_pictures_become_a_library(tmp_path, frame, capsys):
     assert float(table.split()[-1]) == pytest.approx(mean, abs=0.006)
 
 
+def test_a_pixel_size_with_its_unit(tmp_path, frame):
+    options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
+    assert run(frame, "--pixel-size", "0.95 um", *options) == 0
+    assert [entry.pixel_size for entry in read_library(tmp_path / "s.h5")] == [0.95e-6]
+
+
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
     options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
     assert run(frame, "--pixel-size", "8.6", *options) == 0
@@ -230,6 +236,9 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--pixel-size", "0"),
         ("--pixel-size", "nan"),
         ("--pixel-size", "one"),
+        ("--pixel-size", "-1 um"),
+        ("--pixel-size", "1 kg"),
+        ("--pixel-size", "inf"),
         ("--radius", "-1"),
         ("--min-radius", "inf"),
         ("--vertices", "4,,8"),

@@ -13,9 +13,9 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.config.problems import Misfit, misfit, suggestion
-from flocsim.ensembles.config.quantities import kind_of, read_quantity
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
+from flocsim.fields.quantities import kind_of, read_quantity
 
 Reader = Callable[[Any], Any]
 

@@ -33,7 +33,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
+    "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
     "run.py", "plausibility/settling.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
     "ensembles/collision", "ensembles/study.py",
