@@ -15,6 +15,9 @@ ENTRIES = ("ensembles/study.py", "ensembles/collision/encounter.py")
 NOT_PHYSICS = {
     "errors.py": "messages; a row is what comes without an error",
     "explain.py": "text for people",
+    "plausibility/doubts.py": "text for people",
+    "plausibility/ranges.py": "text for people",
+    "plausibility/reynolds.py": "numbers for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/hdf5/": "reads flocs, and these are compared themselves",
