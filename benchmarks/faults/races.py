@@ -232,13 +232,15 @@ def unfinished_journal(root, references):
     """A journal of the first study that holds about half of it."""
     folder = make_study(root / "unfinished")
     words = [sys.executable, "-m", "flocsim.ensemble", "study.toml", "--quiet"]
-    job = subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL)
-    path = folder / "study.h5.journal"
+    path, results = folder / "study.h5.journal", folder / "study.h5"
     half = references[SEEDS[0]].stat().st_size // 3
-    while job.poll() is None and not (path.exists() and path.stat().st_size > half):
-        time.sleep(0.002)
-    job.kill()
-    job.wait()
+    while not path.exists():
+        results.unlink(missing_ok=True)  # of a job that was not stopped in time
+        job = subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL)
+        while job.poll() is None and not (path.exists() and path.stat().st_size > half):
+            time.sleep(0.002)
+        job.kill()
+        job.wait()
     return path
 
 
