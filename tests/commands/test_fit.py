@@ -151,6 +151,31 @@ def test_masks_are_taken_as_they_are(tmp_path, capsys):
     assert (tmp_path / "o.png").exists()
 
 
+def test_masks_among_pictures_are_left_out_in_one_line(tmp_path, frame, capsys):
+    mask = np.zeros((40, 50), np.uint8)
+    mask[5:12, 5:20] = mask[20:35, 25:45] = 255
+    labels = mask.astype(np.uint16)
+    labels[5:12, 5:20] = 2
+    Image.fromarray(mask).save(frame / "a_mask.png")
+    Image.fromarray(labels).save(frame / "a_labels.tif")
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(frame, *options) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "2 files of masks or labels among the pictures: a_labels.tif, a_mask.png" in line
+    assert {entry.image for entry in read_library(tmp_path / "s.h5")} == {"a.png"}
+    assert run(frame / "a_mask.png", *options, "--overwrite") == 2
+    assert "fit them with --masks" in capsys.readouterr().err
+
+
+def test_a_photograph_given_as_a_mask_is_refused_and_the_masks_are_fitted(tmp_path, frame, capsys):
+    noise = np.random.default_rng(1).integers(0, 255, (60, 60)).astype(np.uint8)
+    Image.fromarray(noise).save(frame / "noise.png")
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "--masks", "-o", tmp_path / "s.h5")
+    assert run(frame, *options) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "noise.png: is a photograph, not a mask" in line
+
+
 def test_areas_are_kept_on_request(tmp_path, frame):
     options = ("--pixel-size", "1e-6", "--vertices", "4", "--preserve-area")
     assert run(frame, *options, "-o", tmp_path / "s.h5") == 0

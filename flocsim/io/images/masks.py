@@ -18,6 +18,7 @@ from flocsim.io.images.limits import (
 )
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import SUFFIXES, read_pixels
+from flocsim.io.images.recognition import check_halves, check_labels
 from flocsim.io.images.regions import EIGHT, Filters, filled, sorted_out
 
 ARRAYS = (".npy", ".npz")
@@ -43,6 +44,7 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     pixels = read_pixels(path)
     flat = pixels if pixels.ndim == 2 else pixels[..., :3].max(axis=2)
     if path.suffix.lower() in (".jpg", ".jpeg"):
+        check_halves(path, flat)
         flat = flat > 0.5 * flat.max()
     return [(path.name, _mask(flat, str(path)))]
 
@@ -117,6 +119,7 @@ def _mask(array, name):
         raise ImageError(f"{name}: holds {len(values)} labels, more than {MOST_LABELS}")
     # Numbered anew from 1: a label may be any number, and a table as long as the largest is made.
     labels = np.searchsorted(values, array) + (values[0] > 0)
+    check_labels(name, labels, len(values))
     check_spread(name, array.shape, find_objects(labels))
     return labels.astype(np.int64)
 
