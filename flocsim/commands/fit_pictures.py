@@ -12,6 +12,7 @@ import numpy as np
 
 from flocsim.commands.fit_processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
+from flocsim.io.images.correction import Correction, check_names, corrected
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
 
@@ -48,6 +49,7 @@ class Options:
     background: str
     jobs: int
     segmentation: dict[str, Any]
+    correction: Correction
 
 
 @attrs.frozen(eq=False)
@@ -102,6 +104,7 @@ def fit_pictures(
                 warn_of_coarse(picture.name, picture.regions, options.radii)
                 pictures.append(picture)
         report_masks(masks_found)
+        check_names(options.correction, [(each.name, each.found) for each in pictures])
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
@@ -173,7 +176,7 @@ def find_flocs(task):
         if is_mask(pixels):
             return MaskFile(name)
         found = segment(grey_of(pixels, path), background=background, **options.segmentation)
-        return [Picture(path, name, found, largest(found.regions, options.max_flocs))]
+        return [chosen(path, name, found, options)]
     except FlocsimError as error:
         return error
 
@@ -185,9 +188,14 @@ def masked(path, name, options):
     pictures = []
     for inner, mask in read_masks(path):
         found = segment_mask(mask, **limits)
-        regions = largest(found.regions, options.max_flocs)
-        pictures.append(Picture(path, name + inner[len(path.name) :], found, regions))
+        pictures.append(chosen(path, name + inner[len(path.name) :], found, options))
     return pictures
+
+
+def chosen(path, name, found, options):
+    """A Picture of a Segmentation, corrected as the user wants it."""
+    found = corrected(name, found, options.correction)
+    return Picture(path, name, found, largest(found.regions, options.max_flocs))
 
 
 def largest(regions, count):

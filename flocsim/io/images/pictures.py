@@ -52,6 +52,7 @@ def segment(
     grey: np.ndarray,
     *,
     flocs: str = "auto",
+    threshold: float | None = None,
     noise_scale: float = 1.0,
     background_degree: int = 6,
     background: np.ndarray | None = None,
@@ -66,7 +67,8 @@ def segment(
     In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
     space, and of the background; contrast stretch between two thresholds, the median and the top
     `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
-    (find_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
+    (find_threshold); or `threshold`, a contrast above 0 and to 1.  Dark flocs:
+    contrast = 1 − grey/background (light is lost by a factor);
     bright flocs: contrast = grey − background.
 
     Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of
@@ -81,7 +83,7 @@ def segment(
     """
     grey = _checked(grey)
     filters = Filters(min_radius, max_radius, max_blur, neck)
-    _check_options(flocs, noise_scale, background_degree, saturated, filters)
+    _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
     light = None
     if background is not None:
@@ -95,7 +97,8 @@ def segment(
     if flocs == "auto":
         flocs = _guess_polarity(smooth, light)
     contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
-    threshold = find_threshold(contrast, noise, saturated)
+    if threshold is None:
+        threshold = find_threshold(contrast, noise, saturated)
     foreground = filled(contrast > threshold)
     regions, rejected = find_regions(foreground, contrast, filters)
     return Segmentation(foreground, regions, rejected, flocs, threshold)
@@ -110,8 +113,9 @@ def _checked(grey):
     return grey
 
 
-def _check_options(flocs, noise_scale, background_degree, saturated, filters):
+def _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters):
     allowed = [
+        (threshold is None or 0 < threshold <= 1, "threshold", threshold, "above 0, to 1"),
         (flocs in ("auto", "bright", "dark"), "flocs", flocs, "'auto', 'bright' or 'dark'"),
         (0 <= noise_scale < np.inf, "noise_scale", noise_scale, "at least 0 px"),
         (background_degree in range(13), "background_degree", background_degree, "0 to 12"),

@@ -40,7 +40,7 @@ def agreement(labels: np.ndarray) -> float:
 
 
 def check_labels(name: object, labels: np.ndarray, count: int) -> None:
-    """ImageError for labels, numbered from 0, that are the ``count`` grey levels of a photograph."""
+    """ImageError for labels, numbered from 0, that are ``count`` grey levels of a photograph."""
     share = agreement(labels)
     if share < AGREEING:
         raise ImageError(
@@ -57,8 +57,8 @@ def check_halves(name: object, grey: np.ndarray) -> None:
     level = (grey - least) / max(most - least, 1.0)
     inside = level > 0.5
     near = binary_dilation(inside, iterations=EDGE) & binary_dilation(~inside, iterations=EDGE)
-    between = np.count_nonzero((level > 0.25) & (level < 0.75) & ~near)
-    smaller = min(np.count_nonzero(inside), np.count_nonzero(~inside))
+    between = int(((level > 0.25) & (level < 0.75) & ~near).sum())
+    smaller = min(int(inside.sum()), int((~inside).sum()))
     if between > BETWEEN * max(smaller, 1):
         raise ImageError(
             f"{name}: is a photograph, not a mask: {between} pixels are neither black nor white; "

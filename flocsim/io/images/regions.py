@@ -17,7 +17,8 @@ STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 class Region:
     """One floc: 8-connected, holes filled.
 
-    label: number in the picture, counted from 1 from the top row down; centroid: (x, y) [px],
+    label: number in the picture, counted from 1 from the top row down, or that of a label image
+    that was given; centroid: (x, y) [px],
     x right and y *down*, the first pixel's centre at (0, 0); bbox: (top, left, bottom, right)
     [px], bottom and right exclusive; area [px]; equivalent_radius = √(area/π) [px]; mask: bool
     array of the bbox widened by one pixel on every side; blur: softness of its edge [px]
@@ -33,15 +34,11 @@ class Region:
     blur: float = float("nan")
 
 
-@attrs.frozen
-class Rejection:
-    """A region left out: centroid (x, y) [px, y down], area [px], radius [px], reason, blur."""
+@attrs.frozen(eq=False)
+class Rejection(Region):
+    """A region left out, and why; its label counts on from those of the picture's flocs."""
 
-    centroid: tuple[float, float]
-    area: int
-    equivalent_radius: float
-    reason: str
-    blur: float = float("nan")
+    reason: str = ""
 
 
 @attrs.frozen
@@ -78,22 +75,27 @@ def find_regions(foreground, contrast, filters):
     return sorted_out([(labels[box] == number, box) for number, box in boxes], contrast, filters)
 
 
-def sorted_out(masks, contrast, filters):
-    """(Regions, Rejections) of pairs (bool array, its box in the picture)."""
+def sorted_out(masks, contrast, filters, numbers=None):
+    """(Regions, Rejections) of pairs (bool array, its box in the picture).
+
+    numbers: of each the label; otherwise the flocs are counted, and then what is left out.
+    """
     accepted, rejected = [], []
     shape = None if contrast is None else contrast.shape
-    for mask, box in masks:
+    for place, (mask, box) in enumerate(masks):
         blur = float("nan") if contrast is None else blur_of(mask, box, contrast)
         size = int(mask.sum()), float(np.sqrt(mask.sum() / np.pi))
         reason = reason_to_reject(box, shape, size[1], blur, filters)
+        bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
+        number = len(accepted) + 1 if numbers is None else numbers[place]
+        about = (number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
         if reason:
-            rejected.append(Rejection(centroid_of(mask, box), *size, reason, blur))
+            rejected.append(Rejection(*about, reason))
         else:
-            number = len(accepted) + 1
-            bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
-            accepted.append(
-                Region(number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
-            )
+            accepted.append(Region(*about))
+    if numbers is None:
+        first = len(accepted) + 1
+        rejected = [attrs.evolve(each, label=first + k) for k, each in enumerate(rejected)]
     return tuple(accepted), tuple(rejected)
 
 

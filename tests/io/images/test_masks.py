@@ -57,6 +57,23 @@ def test_a_label_in_two_places_is_two_flocs():
         (100, (2, 2, 12, 12)), (130, (2, 15, 12, 28)), (100, (2, 28, 12, 38))
     ]  # fmt: skip
     assert found[1].centroid == (21.0, 6.5)
+    assert [r.label for r in found] == [4, 10, 9]
+
+
+def test_a_floc_keeps_the_number_of_its_label():
+    labels = np.zeros((30, 30), int)
+    labels[2:12, 2:12] = 7
+    assert [r.label for r in segment_mask(labels).regions] == [7]
+    labels[15:25, 15:25] = 3
+    found = segment_mask(labels, min_radius=1)
+    assert sorted((r.label, r.bbox[0]) for r in found.regions) == [(3, 15), (7, 2)]
+    assert [r.label for r in segment_mask((labels > 0) * 255).regions] == [1, 2]
+
+
+def test_a_label_in_a_hole_of_another_is_a_floc_of_its_own():
+    labels = np.zeros((40, 40), int)
+    labels[5:35, 5:35], labels[15:25, 15:25] = 1, 2
+    assert [(r.label, r.area) for r in segment_mask(labels).regions] == [(1, 800), (2, 100)]
 
 
 def test_an_empty_mask_has_no_flocs():
