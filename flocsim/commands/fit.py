@@ -18,7 +18,7 @@ from flocsim.io.files import write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
-from flocsim.io.plots.shapes import draw_overlay
+from flocsim.io.plots.overlay import draw_overlay
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
@@ -61,8 +61,9 @@ def add_parser(subparsers: Any) -> None:
         help="table of all regions, rejected ones with the reason (default: beside the library, "
         "ending .csv)")  # fmt: skip
     add("--overlay", metavar="FILE",
-        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
-        "pictures, one file each: FILE-picture.png")  # fmt: skip
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
+        "what is left out, with the reason; with several pictures, one file each: "
+        "FILE-picture.png")  # fmt: skip
     add("--masks-out", metavar="FOLDER",
         help="write a label image of every picture, 0 outside and in each floc its number (PNG of "
         "16 bits), to be edited and read back by --masks")  # fmt: skip
