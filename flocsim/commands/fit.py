@@ -86,12 +86,13 @@ def add_parser(subparsers: Any) -> None:
     add("--min-radius", default="4", metavar="PX",
         help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
     add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
-    add("--max-blur", default="0.4", metavar="SHARE",
-        help="softness of the edge, as a share of r_eq, from which a region is out of focus; "
-        "inf: keep all (default: %(default)s)")  # fmt: skip
-    add("--neck", default="0.5", metavar="SHARE",
+    add("--max-blur", default="0.25", metavar="SHARE",
+        help="softness, as a share of r_eq, that half of an outline has to stay below, or the "
+        "region is out of focus; inf: keep all (default: %(default)s)")  # fmt: skip
+    add("--neck", metavar="SHARE",
         help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
-        "never (default: %(default)s)")  # fmt: skip
+        "never (default: 0.5, but never in a picture of fractal aggregates, where most regions "
+        "with necks would become four flocs or more)")  # fmt: skip
     add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
     add("--drop", metavar="LIST",
         help="flocs to leave out, by the numbers of the overlay and the table: 3,5 with one "
@@ -179,7 +180,9 @@ def read_options(args):
         "min_radius": positive("--min-radius", args.min_radius),
         "max_radius": limit,
         "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
-        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+        "neck": None
+        if args.neck is None
+        else number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
     }
     return Options(
         pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),

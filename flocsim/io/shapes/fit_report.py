@@ -27,6 +27,8 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
+    if found.left_whole:
+        parts.append(f"{found.left_whole} taken for fractal aggregates and not parted (--neck)")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
