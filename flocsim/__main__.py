@@ -15,11 +15,21 @@ if "ensemble" in sys.argv[1:2]:
 if is_limited():
     check_memory()
 
-from flocsim.commands import check, ensemble, fit, info, init, plot, trajectory, work_precision
+from flocsim.commands import (
+    check,
+    ensemble,
+    fit,
+    info,
+    init,
+    plot,
+    shapes,
+    trajectory,
+    work_precision,
+)
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
-COMMANDS = (init, fit, check, ensemble, trajectory, plot, work_precision, info)
+COMMANDS = (init, fit, shapes, check, ensemble, trajectory, plot, work_precision, info)
 
 
 def make_parser() -> argparse.ArgumentParser:
