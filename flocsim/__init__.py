@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from flocsim.body import Body, Fluid
+    from flocsim.ensembles.studies.opened import StudyResults
+    from flocsim.ensembles.studies.opened import open_results as open
+    from flocsim.ensembles.studies.study import Study
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
@@ -18,10 +21,14 @@ HOMES = {
     "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
+    "Study": "ensembles.studies.study",
+    "StudyResults": "ensembles.studies.opened",
     "System": "system",
     "Trajectory": "system",
+    "open": "ensembles.studies.opened:open_results",
 }
-"""Public name → module. Loaded when asked for: a job takes over Ctrl-C before it loads any."""
+"""Public name → module, with a colon what it is called there where that differs. Loaded when asked
+for: a job takes over Ctrl-C before it loads any."""
 
 __all__ = [
     "Body",
@@ -29,16 +36,20 @@ __all__ = [
     "Shape",
     "Sphere",
     "SpheroPolygon",
+    "Study",
+    "StudyResults",
     "System",
     "Trajectory",
     "__version__",
+    "open",
 ]
 
 
 def __getattr__(name: str) -> object:
     if name not in HOMES:
         raise AttributeError(f"module 'flocsim' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"flocsim.{HOMES[name]}"), name)
+    home, _, there = HOMES[name].partition(":")
+    value = getattr(importlib.import_module(f"flocsim.{home}"), there or name)
     globals()[name] = value
     return value
 

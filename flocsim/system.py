@@ -41,7 +41,8 @@ class Trajectory:
     the errors of steps and of switches have led to by the end (nan where the method estimates
     none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a nudge (None
     where that was not asked for): above MOST_AMPLIFIED, 10, the error is no promise, and
-    ``error_text`` says so.
+    ``error_text`` says so; ``row``, of a replicate of a study, what its table of replicates holds
+    of it, in words (None of other runs).
     """
 
     t: np.ndarray
@@ -54,6 +55,7 @@ class Trajectory:
     error: float
     wall_time: float
     amplification: float | None = None
+    row: dict | None = None
 
     @property
     def error_text(self) -> str:

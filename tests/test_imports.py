@@ -50,7 +50,7 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["cli"],
+        ["cli", "studies"],
         ["dry_run", "runner", "report"],
         ["parallel"],
         ["pilot"],
@@ -94,6 +94,8 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
+    "xarray": ["ensembles/studies/tables.py"],
+    "pandas": ["ensembles/studies/tables.py"],
 }
 MOST_FILES = 15
 """Of a folder: more are found by their prefixes, not by their room."""
