@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from flocsim.body import Body, Fluid
+    from flocsim.ensembles.studies.compare import Comparison, compare
     from flocsim.ensembles.studies.opened import StudyResults
-    from flocsim.ensembles.studies.opened import open_results as open
     from flocsim.ensembles.studies.study import Study
+    from flocsim.ensembles.studies.sweep import SweepResults, sweep
+    from flocsim.ensembles.studies.sweep import open_any as open
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
@@ -22,26 +24,34 @@ HOMES = {
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
     "Study": "ensembles.studies.study",
+    "Comparison": "ensembles.studies.compare",
     "StudyResults": "ensembles.studies.opened",
+    "SweepResults": "ensembles.studies.sweep",
     "System": "system",
     "Trajectory": "system",
-    "open": "ensembles.studies.opened:open_results",
+    "compare": "ensembles.studies.compare",
+    "open": "ensembles.studies.sweep:open_any",
+    "sweep": "ensembles.studies.sweep",
 }
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked
 for: a job takes over Ctrl-C before it loads any."""
 
 __all__ = [
     "Body",
+    "Comparison",
     "Fluid",
     "Shape",
     "Sphere",
     "SpheroPolygon",
     "Study",
     "StudyResults",
+    "SweepResults",
     "System",
     "Trajectory",
     "__version__",
+    "compare",
     "open",
+    "sweep",
 ]
 
 

@@ -72,6 +72,7 @@ INNER_ROWS = {
             "own_mark",
             "hdf5",
             "json_text",
+            "labelled",
             "provenance",
             "confidence",
             "markdown",
@@ -87,6 +88,7 @@ HEAVYWEIGHTS = {
     "h5py": [
         "io/results/file.py",
         "io/results/layout.py",
+        "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",
     ],
@@ -94,8 +96,8 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
-    "xarray": ["ensembles/studies/tables.py"],
-    "pandas": ["ensembles/studies/tables.py"],
+    "xarray": ["io/labelled.py"],
+    "pandas": ["io/labelled.py"],
 }
 MOST_FILES = 15
 """Of a folder: more are found by their prefixes, not by their room."""

@@ -20,9 +20,9 @@ from flocsim.ensembles.studies.replicates import (
     recorded_methods,
     replicate_of,
 )
-from flocsim.ensembles.studies.tables import Column, DataFrame, Dataset, Labelled
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
+from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
