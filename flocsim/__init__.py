@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-    from flocsim.system import System, Trajectory
+    from flocsim.system import System
+    from flocsim.trajectories.trajectory import Trajectory
 
 __version__ = "0.1.0"
 
@@ -28,7 +29,7 @@ HOMES = {
     "StudyResults": "ensembles.studies.opened",
     "SweepResults": "ensembles.studies.sweep",
     "System": "system",
-    "Trajectory": "system",
+    "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.studies.compare",
     "open": "ensembles.studies.sweep:open_any",
     "sweep": "ensembles.studies.sweep",

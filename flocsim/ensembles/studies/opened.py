@@ -40,7 +40,7 @@ from flocsim.io.results.schema import (
     Results,
     last_axis,
 )
-from flocsim.system import Trajectory
+from flocsim.trajectories.trajectory import Trajectory
 
 GROUPS: dict[str, tuple[dict, tuple[str, ...]]] = {
     "probabilities": (TABLE, AXES),

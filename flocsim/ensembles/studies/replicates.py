@@ -6,6 +6,7 @@ from typing import Any
 
 import attrs
 
+from flocsim.arrays import UNTIL
 from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
@@ -15,7 +16,9 @@ from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import FLAGS
-from flocsim.system import Trajectory
+from flocsim.run import Run
+from flocsim.trajectories.replay import Origin
+from flocsim.trajectories.trajectory import Trajectory
 
 Place = tuple[int, int, float]
 """(place of the collision type, N, share of δ_max)."""
@@ -67,8 +70,17 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     began, record = time.perf_counter(), Record()
     row = study.run(*place, int(replicate), record)
     assert row is not None and record.run is not None and record.status is not None
-    trajectory = Trajectory.of(record.run, record.status, time.perf_counter() - began)
-    return attrs.evolve(trajectory, row=row_in_words(row))
+    encounter, angles = study.drawn(*place[:2], int(replicate))
+    driver, max_steps = study.driver(encounter), study.config.integrator.max_steps
+    system, run = encounter.system, record.run
+
+    def fresh() -> Run:
+        return encounter.begin(driver, angles, place[2], max_steps)
+
+    legs = ((run.steps, float(run.clock[UNTIL])),)
+    origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)
+    lasted = time.perf_counter() - began
+    return Trajectory.of(run, record.status, lasted, row=row_in_words(row), origin=origin)
 
 
 def row_in_words(row: dict) -> dict:

@@ -19,7 +19,7 @@ from flocsim.errors import ConfigError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.journal.journal import SUFFIX
 from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.system import Trajectory
+from flocsim.trajectories.trajectory import Trajectory
 
 MODES = ("new", "resume", "restart")
 
