@@ -4,6 +4,11 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from flocsim import ensembles as ensembles
+    from flocsim import errors as errors
+    from flocsim import forces as forces
+    from flocsim import geometry as geometry
+    from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
     from flocsim.ensembles.studies.compare import Comparison, compare
     from flocsim.ensembles.studies.opened import StudyResults
@@ -13,8 +18,9 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+    from flocsim.integrators.base import Status
     from flocsim.system import System
-    from flocsim.trajectories.trajectory import Trajectory
+    from flocsim.trajectories.trajectory import State, Trajectory
 
 __version__ = "0.1.0"
 
@@ -24,6 +30,8 @@ HOMES = {
     "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
+    "State": "trajectories.trajectory",
+    "Status": "integrators.base",
     "Study": "ensembles.studies.study",
     "Comparison": "ensembles.studies.compare",
     "StudyResults": "ensembles.studies.opened",
@@ -37,6 +45,9 @@ HOMES = {
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked
 for: a job takes over Ctrl-C before it loads any."""
 
+ROOMS = ("ensembles", "errors", "forces", "geometry", "integrators")
+"""Packages that are reached without an import of their own: flocsim.forces.Gravity."""
+
 __all__ = [
     "Body",
     "Comparison",
@@ -44,6 +55,8 @@ __all__ = [
     "Shape",
     "Sphere",
     "SpheroPolygon",
+    "State",
+    "Status",
     "Study",
     "StudyResults",
     "SweepResults",
@@ -57,6 +70,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
+    if name in ROOMS:
+        return importlib.import_module(f"flocsim.{name}")
     if name not in HOMES:
         raise AttributeError(f"module 'flocsim' has no attribute {name!r}")
     home, _, there = HOMES[name].partition(":")
@@ -66,4 +81,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *HOMES})
+    return sorted({*globals(), *HOMES, *ROOMS})

@@ -93,7 +93,7 @@ def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -
         raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class System:
     """Bodies in a fluid, the forces on them, and the method that moves them.
 
@@ -113,6 +113,12 @@ class System:
 
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
+
+    def __repr__(self) -> str:
+        n = len(self.bodies)
+        words = [f"{n} {'body' if n == 1 else 'bodies'}"]
+        words += [type(force).__name__ for force in self.forces]
+        return f"System({', '.join([*words, type(self.integrator).__name__])})"
 
     @property
     def spheres_only(self) -> bool:
