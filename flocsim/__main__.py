@@ -17,19 +17,23 @@ if is_limited():
 
 from flocsim.commands import (
     check,
+    compare,
     ensemble,
     fit,
     info,
     init,
     plot,
     shapes,
+    sweep,
     trajectory,
     work_precision,
 )
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
-COMMANDS = (init, fit, shapes, check, ensemble, trajectory, plot, work_precision, info)
+COMMANDS = (
+    init, fit, shapes, check, ensemble, sweep, trajectory, plot, compare, work_precision, info,
+)  # fmt: skip
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -22,7 +22,9 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
-    ["system", "io"],
+    ["system"],
+    ["trajectories"],
+    ["io"],
     ["explain", "run"],
     ["plausibility"],
     ["forces", "integrators"],
@@ -52,7 +54,7 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["cli"],
+        ["cli", "studies"],
         ["dry_run", "runner", "report"],
         ["parallel"],
         ["pilot"],
@@ -74,6 +76,7 @@ INNER_ROWS = {
             "own_mark",
             "hdf5",
             "json_text",
+            "labelled",
             "provenance",
             "confidence",
             "markdown",
@@ -89,6 +92,7 @@ HEAVYWEIGHTS = {
     "h5py": [
         "io/results/file.py",
         "io/results/layout.py",
+        "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",
     ],
@@ -96,6 +100,8 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
+    "xarray": ["io/labelled.py"],
+    "pandas": ["io/labelled.py"],
 }
 MOST_FILES = 15
 """Of a folder: more are found by their prefixes, not by their room."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.commands.trajectory import select, with_one_count
+from flocsim.commands.trajectory import select
 from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
@@ -29,6 +29,7 @@ from flocsim.ensembles.pilot.choice import (
 from flocsim.ensembles.pilot.ladder import DECADES, Job, Trial, at_rung, scene_length
 from flocsim.ensembles.pilot.sample import sample_of
 from flocsim.ensembles.preflight import check_study, inputs_of
+from flocsim.ensembles.studies.replicates import with_one_count
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit

@@ -10,10 +10,11 @@ from typing import Any
 import attrs
 
 from flocsim.commands import ladder
-from flocsim.commands.trajectory import add_replicate, one_count_study, select
+from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.studies.replicates import one_count_study
 from flocsim.errors import FlocsimError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.amplification import end_distance

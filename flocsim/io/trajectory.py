@@ -3,13 +3,17 @@
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule, keep, seal, write_file
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+
+COMPONENTS = ("x", "y", "angle")
+"""Of a place and of its rate."""
 
 DATASETS = {
     "time": ("s", "time since the start"),
@@ -42,23 +46,40 @@ def write_trajectory(
     """
     import h5py
 
-    arrays = {
-        "time": times,
-        "position": position,
-        "velocity": velocity,
-        "centre_distance": centre_distance(position),
-    }
+    arrays = {"position": position, "velocity": velocity}
+    if len(shapes) == 2:
+        arrays["centre_distance"] = centre_distance(position)
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
         file.attrs["kind"] = "flocsim trajectory"
         file.attrs["schema_version"] = SCHEMA_VERSION
         for name, value in facts.items():
             file.attrs[name] = value
-        for name, array in arrays.items():
+        scales: dict[str, Any] = {
+            "time": times, "body": np.arange(len(shapes)), "component": list(COMPONENTS),
+            "axis": list(COMPONENTS[:2]),
+        }  # fmt: skip
+        for body, shape in enumerate(shapes):
+            scales[f"vertex_{body}"] = np.arange(len(shape.vertices))
+        for name, values in scales.items():
+            kind = h5py.string_dtype() if isinstance(values, list) else None
+            scale = file.create_dataset(name, data=values, dtype=kind)
+            scale.make_scale(name)
+            units, text = DATASETS.get(name, ("1", name.replace("_", " of body ")))
+            scale.attrs["units"], scale.attrs["long_name"] = units, text
+
+        def write(name: str, array: np.ndarray, axes: Sequence[str]) -> Any:
             dataset = file.create_dataset(name, data=array)
+            for place, axis in enumerate(axes):
+                dataset.dims[place].attach_scale(file[axis])
+            return dataset
+
+        for name, array in arrays.items():
+            dataset = write(name, array, ("time", "body", "component")[: array.ndim])
             dataset.attrs["units"], dataset.attrs["long_name"] = DATASETS[name]
         for body, shape in enumerate(shapes):
-            dataset = file.create_dataset(f"vertices_{body}", data=np.array(shape.vertices))
+            axes = (f"vertex_{body}", "axis")
+            dataset = write(f"vertices_{body}", np.array(shape.vertices), axes)
             dataset.attrs["units"] = "m"
             dataset.attrs["radius"] = shape.radius
     write_file(path, seal(buffer.getvalue()), rule)

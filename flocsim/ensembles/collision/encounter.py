@@ -187,6 +187,7 @@ class Record:
     """Asks run_encounter to keep every step of a replicate."""
 
     run: Run | None = None
+    status: Status | None = None
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
@@ -212,7 +213,7 @@ def run_encounter(
     if status == Status.PAUSED:
         return None
     if record is not None:
-        record.run = run
+        record.run, record.status = run, status
     row = replicate_row(status, angles, run)
     if status in UNABLE and (why := force_to_blame(encounter.system, run)):
         row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}

@@ -21,7 +21,7 @@ from flocsim.ensembles.config.schema import (
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import parse
+from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
@@ -49,7 +49,8 @@ def load_config(
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):
-        parts["output"] = attrs.evolve(parts["output"], file=f"{Path(path).stem}.h5")
+        stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
+        parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
     return Config(text=text, folder=folder, overrides=overrides, **parts)
 
 
