@@ -120,7 +120,7 @@ def main(arguments):
         os.chdir(HERE)
     if command == "demo":
         return demo()
-    install("mpi", "test", "dev")
+    install("mpi", "test", "dev", "docs", "formats")
     return call(tool("python"), "-m", "pytest", *(rest or all_cores())) if command == "test" else 0
 
 

@@ -19,10 +19,12 @@ from flocsim.commands import (
     check,
     compare,
     ensemble,
+    export,
     fit,
     info,
     init,
     plot,
+    report,
     shapes,
     sweep,
     trajectory,
@@ -32,7 +34,8 @@ from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
 COMMANDS = (
-    init, fit, shapes, check, ensemble, sweep, trajectory, plot, compare, work_precision, info,
+    init, fit, shapes, check, ensemble, sweep, trajectory, plot, report, export, compare,
+    work_precision, info,
 )  # fmt: skip
 
 

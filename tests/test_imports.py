@@ -69,7 +69,7 @@ INNER_ROWS = {
     "io": [
         ["plots"],
         ["shapes", "trajectory"],
-        ["images", "results", "journal"],
+        ["images", "results", "journal", "exchange"],
         ["outputs"],
         [
             "files",
@@ -100,6 +100,7 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
+    "gsd": ["io/exchange/gsd_file.py"],
     "xarray": ["io/labelled.py"],
     "pandas": ["io/labelled.py"],
 }

@@ -146,7 +146,7 @@ def test_install_is_repeated_only_when_something_new_is_needed(stage):
         return [line for line in stage.run(command)[0] if "pip install" in line]
 
     assert installs("demo") and not installs("demo")
-    assert installs("setup") == [".venv/bin/python -m pip install -e .[mpi,test,dev]"]
+    assert installs("setup") == [".venv/bin/python -m pip install -e .[mpi,test,dev,docs,formats]"]
     assert not installs("setup") and not installs("test") and not installs("demo")
     (stage.folder / "pyproject.toml").write_text("[project]\nname = 'flocsim'")
     assert installs("demo") and installs("setup")

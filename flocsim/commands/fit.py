@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands.fit_pictures import (
+from flocsim.commands.fitting.pictures import (
     LOST,
     Options,
     fit_pictures,

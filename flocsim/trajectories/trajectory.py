@@ -259,7 +259,7 @@ class Trajectory:
         animated(self, Path(file), frames)
 
     def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write the motion to HDF5, which `flocsim info`, `flocsim plot` and xarray read.
+        """Write the motion to HDF5, which `flocsim info`, `flocsim plot`, xarray and ParaView read.
 
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.
@@ -276,6 +276,22 @@ class Trajectory:
             Path(file), self.t, self.position, self.velocity, self.shapes, facts,
             data_rule(overwrite),
         )  # fmt: skip
+
+    def export(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Write the motion as GSD for OVITO and HOOMD; ``file`` ends in .gsd.
+
+        Lengths are µm in it, times s; shapes are polygons without their holes. A file that is there
+        is left alone, unless ``overwrite``. UsageError where gsd is not installed
+        (``pip install 'flocsim[formats]'``). For ParaView: `save`.
+        """
+        from flocsim.io.exchange.gsd_file import write_gsd
+        from flocsim.io.outputs import Output, check_outputs, data_rule
+
+        path, rule = Path(file), data_rule(overwrite)
+        if path.suffix.lower() != ".gsd":
+            raise UsageError(f"{path}: what is exported must end in .gsd; ParaView reads `save`'s")
+        check_outputs([Output(path, rule)], [])
+        write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 
 def watched(run: Run, watch: Watch | None) -> Status:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import fit, fit_pictures, info, plot
+from flocsim.commands import fit, info, plot
+from flocsim.commands.fitting import pictures as fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.real_images import real_image

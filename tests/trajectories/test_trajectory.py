@@ -162,3 +162,17 @@ def test_a_saved_motion_opens_in_xarray(resting, tmp_path):
         np.testing.assert_array_equal(data["time"], run.t)
     with pytest.raises(UsageError, match="exists already"):
         run.save(tmp_path / "m.h5")
+
+
+def test_an_exported_motion_opens_in_gsd(resting, tmp_path):
+    hoomd = pytest.importorskip("gsd.hoomd", reason="needs flocsim[formats]")
+    _, run = resting
+    run.export(tmp_path / "m.gsd")
+    with hoomd.open(tmp_path / "m.gsd") as frames:
+        assert len(frames) == len(run.t)
+        places = frames[-1].particles.position[:, :2]
+    np.testing.assert_allclose(places, 1e6 * run.position[-1, :, :2], rtol=1e-6, atol=1e-9)
+    with pytest.raises(UsageError, match="exists already"):
+        run.export(tmp_path / "m.gsd")
+    with pytest.raises(UsageError, match=r"must end in \.gsd"):
+        run.export(tmp_path / "m.vtk")

@@ -20,6 +20,7 @@ from flocsim.ensembles.studies.replicates import (
     recorded_methods,
     replicate_of,
 )
+from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
@@ -65,6 +66,7 @@ class StudyResults:
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
         self.differences = results.differences
+        self.studies: dict[int, Study] = {}
 
     @functools.cached_property
     def replicates(self) -> dict[str, np.ndarray]:
@@ -178,13 +180,23 @@ class StudyResults:
         ):  # fmt: skip
             chosen(value, known, name, 0)
         place = place_of(self.config, type, vertices, delta)
-        study = one_count_study(self.config, place[1], recorded_methods(self.stored("accuracy")))
-        if unlike := differences(self.stored("identity"), identity_of(study)):
-            raise UsageError(
-                f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
-                "files and the kind of machine that it was made with"
-            )
-        return replicate_of(int(replicate), place, study)
+        return replicate_of(int(replicate), place, self.study_with(place[1]))
+
+    def study_with(self, vertices: int) -> Study:
+        """The study of the file with bodies of so many vertices, ready to run replicates again.
+
+        UsageError where this flocsim would compute something else than the file holds.
+        """
+        if vertices not in self.studies:
+            methods = recorded_methods(self.stored("accuracy"))
+            study = one_count_study(self.config, vertices, methods)
+            if unlike := differences(self.stored("identity"), identity_of(study)):
+                raise UsageError(
+                    f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
+                    "files and the kind of machine that it was made with"
+                )
+            self.studies[vertices] = study
+        return self.studies[vertices]
 
     def __repr__(self) -> str:
         shape = " × ".join(map(str, self.results.shape))

@@ -54,6 +54,7 @@ __all__ = [
     "REPLICATES",
     "TABLE",
     "Results",
+    "first_of_each",
     "read_overview",
     "read_results",
     "same_data",
@@ -164,6 +165,25 @@ def totals_in(rows, reasons):
         check_codes(columns, reasons)
         totals.add(*columns.values())
     return totals
+
+
+def first_of_each(path: str | Path) -> dict[str, tuple[int, int, int, int]]:
+    """{outcome: place (type, vertices, delta, replicate)} of its first replicate, where it has one.
+
+    Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
+    """
+    with opened(path) as file:
+        outcome, vertices = file["replicates/outcome"], file["replicates/vertices"][()]
+        order = np.argsort(-vertices, kind="stable")
+        found: dict[str, tuple[int, int, int, int]] = {}
+        types, _, deltas, count = outcome.shape
+        for v, t, d in ((v, t, d) for v in order for t in range(types) for d in range(deltas)):
+            for first in range(0, count, BLOCK):
+                codes = outcome[t, v, d, first : first + BLOCK]
+                for code, row in zip(*np.unique(codes, return_index=True), strict=True):
+                    if code < len(OUTCOMES):
+                        found.setdefault(OUTCOMES[code], (t, int(v), d, first + int(row)))
+        return found
 
 
 def parts_of(shape):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from flocsim.commands.fit_processes import Lost, workers
+from flocsim.commands.fitting.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.io.images.correction import Correction, check_names, corrected
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
