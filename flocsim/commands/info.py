@@ -4,14 +4,16 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections import Counter
 from typing import Any
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.report import checked_line, efficiency_lines, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io.results.file import OUTCOMES, read_overview, read_results
 from flocsim.io.results.schema import BONDS
@@ -28,11 +30,12 @@ MOST_FAILURES = 10
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
-        help="describe a results file",
-        description="Print what a results file holds: conditions, counts, probabilities with "
-        "95 % intervals, and where it came from.",
+        help="describe a results file, a running study, a library, a trajectory or a sweep",
+        description="Print what a file holds: conditions, counts, probabilities with 95 %% "
+        "intervals, and where it came from. Of a study that still runs or was interrupted, its "
+        "replicates so far, without touching it.",
     )
-    parser.add_argument("results", help="results file that flocsim ensemble wrote")
+    parser.add_argument("results", help="file that flocsim wrote, or is to write")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
@@ -40,6 +43,12 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: Namespace) -> int:
+    journal = journal_of(args.results)
+    if journal is not None:
+        if args.config:
+            raise FileError(f"{journal} holds no config: it is of a run that has not ended")
+        print(unfinished_text(read_unfinished(journal)))
+        return 0
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
@@ -92,7 +101,39 @@ def results_text(path, results, totals):
     if len(notes) > MOST_FAILURES:
         lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-    return "\n".join([*lines, "", table])
+    return "\n".join([*lines, *efficiency_block(results), "", table])
+
+
+def efficiency_block(results):
+    """The efficiencies, if there are any, behind an empty line."""
+    lines = efficiency_lines(results)
+    return ["", *lines] if lines else []
+
+
+def unfinished_text(found):
+    """What a run that has not ended has so far; nothing of it is final."""
+    results, last = found.results, found.sessions[-1]
+    reasons = Counter(str(note["why"]) for note in found.notes)
+    planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
+    counts = results.probabilities["n_total"]
+    facts = [
+        ("types", ", ".join(visible(name, "") for name in results.types)),
+        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
+         f"{planned}"),
+        ("numerical error", checked_line(results) or "unknown: none was run again yet"),
+        ("begun", visible(f"{last['date']} by {last['command']}", "")),
+    ]  # fmt: skip
+    if found.unread:
+        facts.append(("damaged", f"{found.unread} bytes of rows, left out"))
+    lines = [f"{found.path}: {found.progress}", ""]
+    lines += [f"{name:<18} {value}" for name, value in facts]
+    shown = reasons.most_common(MOST_FAILURES)
+    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    marked = f"{found.progress}, with 95 % intervals:"
+    return "\n".join([*lines, *efficiency_block(results), "", marked, table])
 
 
 def conditions(results):

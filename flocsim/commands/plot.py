@@ -8,7 +8,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.plots.style import FORMATS, save
+from flocsim.io.plots.style import FORMATS, mark_figure, save
 
 DESCRIPTION = """\
 Draw the figures of a results file, each into a file of its own:
@@ -46,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
-    content, figures = read_content(args.results)
+    content, figures, remark = read_content(args.results)
     foreign = [name for name in names or () if name not in figures]
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
@@ -62,7 +62,10 @@ def run(args: argparse.Namespace) -> int:
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     check_outputs([Output(path, rule) for path in paths.values()], [args.results])
     for name, path in paths.items():
-        save(figures[name](content), path, rule)
+        figure = figures[name](content)
+        if remark:
+            mark_figure(figure, remark)
+        save(figure, path, rule)
         print(path)
     return 0
 
@@ -72,13 +75,17 @@ def label(name):
 
 
 def read_content(path):
-    """What a file holds, Results or ShapeEntries, and {name: function} of its figures."""
+    """What a file holds, {name: function} of its figures, and what each of them has to say."""
+    from flocsim.ensembles.unfinished import journal_of, read_unfinished
     from flocsim.io.results.file import read_results
     from flocsim.io.shapes.library import is_library, read_library
 
+    if (journal := journal_of(path)) is not None:
+        found = read_unfinished(journal)
+        return found.results, FIGURES, found.progress
     if is_library(path):
-        return read_library(path), POPULATION_FIGURES
-    return read_results(path, replicates=False), FIGURES
+        return read_library(path), POPULATION_FIGURES, ""
+    return read_results(path, replicates=False), FIGURES, ""
 
 
 def figure_names(text):
