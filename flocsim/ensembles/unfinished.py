@@ -21,7 +21,7 @@ from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
 from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.errors import FileError, UsageError
 from flocsim.io.journal.journal import SUFFIX, journal_path
-from flocsim.io.journal.records import CHUNK, SESSION, scan
+from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
 from flocsim.io.json_text import matches
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.schema import Results
@@ -73,13 +73,14 @@ def read_unfinished(path: str | Path) -> Unfinished:
             records = list(scan(file))
     except OSError as error:
         raise FileError(f"{path} could not be read: {error.strerror}") from error
-    sessions = [each.description for each in records if getattr(each, "kind", 0) == SESSION]
+    found = [each for each in records if isinstance(each, Record)]
+    sessions = [each.description for each in found if each.kind == SESSION]
     sessions = [each for each in sessions if is_session(each)]
     if not sessions:
         raise FileError(f"{path} is no journal of an unfinished run, or has just begun: try again")
     current = any(each["layout"] == layout() for each in sessions)
-    chunks = [each for each in records if getattr(each, "kind", 0) == CHUNK and current]
-    whole: list[Any] = [each for each in chunks if fits(each.description, each.length)]
+    chunks = [each for each in found if each.kind == CHUNK and current]
+    whole = [each for each in chunks if fits(each.description, each.length)]
     axes = axes_of(sessions[-1], [condition_of(each.description) for each in whole])
     conditions = tuple(
         Condition(name, count, share)

@@ -5,11 +5,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
+from flocsim.errors import FileError, ShapeError
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.files import Rule, keep, seal, write_file
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.io.files import Rule, checked_sealed, keep, seal, write_file
+from flocsim.io.hdf5.structure import structure_of
 
+KIND = "flocsim trajectory"
 SCHEMA_VERSION = 2
 
 COMPONENTS = ("x", "y", "angle")
@@ -51,7 +57,7 @@ def write_trajectory(
         arrays["centre_distance"] = centre_distance(position)
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
-        file.attrs["kind"] = "flocsim trajectory"
+        file.attrs["kind"] = KIND
         file.attrs["schema_version"] = SCHEMA_VERSION
         for name, value in facts.items():
             file.attrs[name] = value
@@ -83,3 +89,78 @@ def write_trajectory(
             dataset.attrs["units"] = "m"
             dataset.attrs["radius"] = shape.radius
     write_file(path, seal(buffer.getvalue()), rule)
+
+
+@attrs.frozen(eq=False)
+class StoredTrajectory:
+    """A trajectory file as it is read back: arrays as in DATASETS, shapes, and ``facts`` {name:
+    number or text}."""
+
+    t: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    shapes: tuple[Shape, ...]
+    facts: dict[str, Any]
+
+    @property
+    def status(self) -> str:
+        """How the run ended, or which replicate it is, in words."""
+        if "status" in self.facts:
+            return str(self.facts["status"])
+        return f"replicate {self.facts['replicate']}" if "replicate" in self.facts else "motion"
+
+
+def is_trajectory(path: str | Path) -> bool:
+    """Whether a file is a trajectory's, by its attributes; FileError where it cannot be opened."""
+    with checked_sealed(path) as (data, size):
+        try:
+            root = structure_of(data, size)[""].attributes
+        except (ValueError, RuntimeError):
+            return False  # who reads it as results says what is wrong
+        return "kind" in root and "schema_version" in root
+
+
+def read_trajectory(path: str | Path) -> StoredTrajectory:
+    """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
+    import h5py
+
+    with checked_sealed(path) as (data, size):
+        try:
+            structure_of(data, size)
+            data.seek(0)
+            with h5py.File(data, "r") as file:
+                return stored_trajectory(file)
+        except (
+            OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, OverflowError,
+            AttributeError, ShapeError,
+        ) as error:  # fmt: skip
+            reason = " ".join(str(error).split())
+            raise FileError(
+                f"{path} holds no readable trajectory: {reason}; write it again"
+            ) from error
+
+
+def stored_trajectory(file):
+    """The StoredTrajectory of an open file; ValueError where it is none."""
+    facts = {name: plain_fact(value) for name, value in file.attrs.items()}
+    if facts.pop("kind", "") != KIND or facts.pop("schema_version", 0) != SCHEMA_VERSION:
+        raise ValueError(f"it is no {KIND} of version {SCHEMA_VERSION}")
+    time, *arrays = (file[name][()] for name in ("time", "position", "velocity"))
+    bodies = len(file["body"])
+    if time.ndim != 1 or not len(time) or not bodies:
+        raise ValueError("it has no times or no bodies")
+    for array in (time, *arrays):
+        shape = (len(time), bodies, 3) if array.ndim > 1 else (len(time),)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise ValueError("its arrays are not as long as its times and bodies, or no numbers")
+    shapes = []
+    for body in range(bodies):
+        vertices = file[f"vertices_{body}"]
+        radius, points = float(vertices.attrs["radius"]), vertices[()]
+        shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))
+    return StoredTrajectory(time, *arrays, tuple(shapes), facts)
+
+
+def plain_fact(value):
+    """An attribute as a Python number or text."""
+    return value.item() if hasattr(value, "item") else value
