@@ -57,6 +57,10 @@ class PlausibilityWarning(UserWarning):
     """What is possible, and done, but implausible: a value far out of its usual range, say."""
 
 
+class KernelWarning(UserWarning):
+    """A run has ended where a force gives no number: it names the force, the file and the line."""
+
+
 class KernelError(UsageError):
     """A force's kernel that cannot be used: it names the force, the file and the line."""
 

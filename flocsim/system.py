@@ -1,6 +1,7 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from itertools import combinations
 from typing import Any
@@ -22,7 +23,7 @@ from flocsim.arrays import (
 )
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
-from flocsim.errors import UsageError
+from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.explain import explain
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
@@ -38,6 +39,7 @@ from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
 from flocsim.plausibility.doubts import warn_of
 from flocsim.run import Run
+from flocsim.trajectories.blame import UNABLE, force_to_blame
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 
@@ -134,11 +136,26 @@ class System:
         pieces = self.pieces
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
-            laws=law_table(pieces.laws, jit=jit),
+            laws=self.laws(jit=jit),
             surface_reach=pieces.surface_reach, 
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
         )  # fmt: skip
+
+    def laws(self, *, jit: bool = True) -> Any:
+        """The laws of the scene as the drivers call them.
+
+        KernelError for one that cannot be compiled: it names the force.
+        """
+        try:
+            return law_table(self.pieces.laws, jit=jit)
+        except KernelError as error:
+            for name, force in self.pieces.used.items():
+                try:
+                    law_table(laws_of([force], self.fluid).laws, jit=jit)
+                except KernelError as its_own:
+                    raise KernelError(f"{name}: {its_own}") from None
+            raise error from None
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (n, 3) at the start."""
@@ -181,7 +198,8 @@ class System:
     ) -> Trajectory:  # fmt: skip
         """Move the bodies until a time, in s or as "20 ms", and return the Trajectory.
 
-        A run that ends early says why in ``Trajectory.status``; it raises no exception.
+        A run that ends early says why in ``Trajectory.status``; it raises no exception. Where a
+        force is to blame that gives no number, a KernelWarning names it, with file and line.
         ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
         ``start``: begin where another run of the same shapes has ended, at its time, in its motion
         and with the tangential displacements of its contacts; forces, masses and the method may be
@@ -206,6 +224,9 @@ class System:
 
         run = fresh(record)
         status = watched(run, watch)
+        if status in UNABLE and (why := force_to_blame(self, run)):
+            warnings.warn(f"the run has ended at t = {run.time:.6g} s ({status.name}): {why}",
+                          KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
             growth = self.amplification(run.time, run.work.motion[NOW, :, :3], max_steps, jit=jit)

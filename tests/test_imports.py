@@ -55,7 +55,7 @@ INNER_ROWS = {
     ],
     "ensembles": [
         ["cli", "studies"],
-        ["dry_run", "runner", "report"],
+        ["dry_run", "runner", "report", "unfinished"],
         ["parallel"],
         ["pilot"],
         ["estimates"],

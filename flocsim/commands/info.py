@@ -4,19 +4,25 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections import Counter
 from typing import Any
+
+import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.report import checked_line, efficiency_lines, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io.results.file import OUTCOMES, read_overview, read_results
 from flocsim.io.results.schema import BONDS
+from flocsim.io.results.sweep_file import is_sweep, read_sweep
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
+from flocsim.io.trajectory import centre_distance, is_trajectory, read_trajectory
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
          "warnings", "settling")  # fmt: skip
@@ -28,11 +34,12 @@ MOST_FAILURES = 10
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
-        help="describe a results file",
-        description="Print what a results file holds: conditions, counts, probabilities with "
-        "95 % intervals, and where it came from.",
+        help="describe a results file, a running study, a library, a trajectory or a sweep",
+        description="Print what a file holds: conditions, counts, probabilities with 95 %% "
+        "intervals, and where it came from. Of a study that still runs or was interrupted, its "
+        "replicates so far, without touching it.",
     )
-    parser.add_argument("results", help="results file that flocsim ensemble wrote")
+    parser.add_argument("results", help="file that flocsim wrote, or is to write")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
@@ -40,6 +47,18 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: Namespace) -> int:
+    journal = journal_of(args.results)
+    if journal is not None:
+        if args.config:
+            raise FileError(f"{journal} holds no config: it is of a run that has not ended")
+        print(unfinished_text(read_unfinished(journal)))
+        return 0
+    if not args.config and is_trajectory(args.results):
+        print(trajectory_text(args.results))
+        return 0
+    if not args.config and is_sweep(args.results):
+        print(sweep_text(args.results))
+        return 0
     if not args.config and is_library(args.results):
         print(library_text(args.results))
         return 0
@@ -92,7 +111,88 @@ def results_text(path, results, totals):
     if len(notes) > MOST_FAILURES:
         lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-    return "\n".join([*lines, "", table])
+    return "\n".join([*lines, *efficiency_block(results), "", table])
+
+
+def efficiency_block(results):
+    """The efficiencies, if there are any, behind an empty line."""
+    lines = efficiency_lines(results)
+    return ["", *lines] if lines else []
+
+
+def trajectory_text(path):
+    """What a trajectory file holds."""
+    found = read_trajectory(path)
+    moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+    facts = [
+        ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
+        *((f"body {number}", f"N = {len(shape.vertices)}, r_eq {1e6 * shape.equivalent_radius:.4g} "
+           f"µm, moved {1e6 * way:.4g} µm")
+          for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
+    ]  # fmt: skip
+    if len(found.shapes) == 2:
+        apart = 1e6 * centre_distance(found.position)
+        facts.append(
+            ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
+             f"{apart[-1]:.4g} at last")
+        )  # fmt: skip
+    for name, value in found.facts.items():
+        if name != "config":
+            told = f"{value:.6g}" if isinstance(value, float) else str(value)
+            facts.append((visible(name.replace("_", " "), ""), visible(told, "")))
+    width = max(len(name) for name, _ in facts)
+    return "\n".join([f"{path}: a trajectory", "", *(f"{n:<{width}}  {v}" for n, v in facts)])
+
+
+def sweep_text(path):
+    """What the joined file of a sweep holds: Pr[A] at every value."""
+    swept, groups = read_sweep(path)
+    table = groups["probabilities"]
+    lines = [f"{path}: a sweep", ""]
+    for name, each in swept.items():
+        unit = "" if each.unit == "1" else f" {each.unit}"
+        values = ", ".join(visible(f"{v:g}" if isinstance(v, float) else str(v), "")
+                           for v in each.values)  # fmt: skip
+        lines.append(f"{visible(each.key, '')} (as {visible(name, '')}): {values}{unit}")
+    rows = [(*swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
+    axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
+    columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
+    for place in np.ndindex(*columns[0].shape):
+        names = [axis[k] for axis, k in zip(axes, place, strict=True)]
+        n, value, low, high = (column[place] for column in columns)
+        told = (f"{value:.3f}", f"[{low:.3f}, {high:.3f}]") if value == value else ("-", "-")
+        words = [visible(f"{each:g}" if isinstance(each, float) else str(each), "")
+                 for each in names]  # fmt: skip
+        rows.append((*words, str(n), *told))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join([*lines, "", *aligned])
+
+
+def unfinished_text(found):
+    """What a run that has not ended has so far; nothing of it is final."""
+    results, last = found.results, found.sessions[-1]
+    reasons = Counter(str(note["why"]) for note in found.notes)
+    planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
+    counts = results.probabilities["n_total"]
+    facts = [
+        ("types", ", ".join(visible(name, "") for name in results.types)),
+        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
+         f"{planned}"),
+        ("numerical error", checked_line(results) or "unknown: none was run again yet"),
+        ("begun", visible(f"{last['date']} by {last['command']}", "")),
+    ]  # fmt: skip
+    if found.unread:
+        facts.append(("damaged", f"{found.unread} bytes of rows, left out"))
+    lines = [f"{found.path}: {found.progress}", ""]
+    lines += [f"{name:<18} {value}" for name, value in facts]
+    shown = reasons.most_common(MOST_FAILURES)
+    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    marked = f"{found.progress}, with 95 % intervals:"
+    return "\n".join([*lines, *efficiency_block(results), "", marked, table])
 
 
 def conditions(results):

@@ -113,6 +113,7 @@ def draw(args, encounter, arrays, row, title):
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
         centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
+        seen_from=0,
     )  # fmt: skip
     written = save_all(strip, args.output, rule)
     if args.distance:

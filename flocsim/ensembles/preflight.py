@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
+from flocsim.arrays import NOW, ContactView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
@@ -12,14 +13,23 @@ from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.impact import too_deep
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, KernelError
 from flocsim.forces import ContactForce
+from flocsim.forces.codegen import laws_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
 from flocsim.system import System
+from flocsim.trajectories.blame import wrong_answer
+
+CLOSE_GAPS = (1e-9, 1e-12, -1e-12)
+"""Gaps [m] that every two bodies that collide come through."""
+
+CLOSE_OVERLAPS = (1e-12, 1e-10)
+""" [m] The same of contacts, at rates of either sign."""
 
 
 def sphere_pairs(config: Config) -> Iterator[tuple[str, Encounter]]:
@@ -47,6 +57,7 @@ def check_study(config: Config) -> None:
     for name, pair in sphere_pairs(config):
         check_approach(config, name, pair)
         check_compilable(pair.system)
+        check_numbers(pair.system)
     if not isinstance(config.integrator.check_share, str) and (
         config.integrator.check_share > 0.0 and exact_method(config.integrator.method) is None
     ):
@@ -60,10 +71,39 @@ def check_study(config: Config) -> None:
 
 
 def check_compilable(system: System) -> None:
-    """KernelError where a kernel calls what compiled code cannot, as print."""
+    """KernelError where a kernel calls what compiled code cannot, as print, or does not compile."""
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
     refuse_interpreter(advance, system.fillings(OBSERVER))
+    if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
+        system.laws()
+
+
+def check_numbers(system: System) -> None:
+    """KernelError where a force gives no number at the start or where two bodies touch."""
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    i, j = system.bodies
+    radii = i.shape.equivalent_radius, j.shape.equivalent_radius
+    reduced = radii[0] * radii[1] / sum(radii)
+    mass = j.mass if i.fixed else i.mass * j.mass / (i.mass + j.mass)
+    pairs = [
+        PairView(0.0, gap, rate, sum(radii) + gap, *radii, reduced, mass)
+        for gap in CLOSE_GAPS for rate in (-1e-4, 1e-4)
+    ]  # fmt: skip
+    contacts = [
+        ContactView(overlap, rate, 0.0, 0.0, mass, *radii)
+        for overlap in CLOSE_OVERLAPS for rate in (-1e-4, 1e-4)
+    ]  # fmt: skip
+    bodies = [body_view(scene, work, 0.0, NOW, body) for body in range(2)]
+    views = {"body": bodies, "centre": pairs, "surface": pairs, "contact": contacts}
+    for name, force in system.pieces.used.items():
+        pieces = laws_of([force], system.fluid)
+        if words := wrong_answer(force, pieces, views, system.fluid):
+            raise KernelError(
+                f"{name}: {words}, where every collision comes: bound what it divides by, or takes "
+                "a root, power or logarithm of, as in max(pair.gap, 1e-10)"
+            )
 
 
 def check_approach(config, name, pair):

@@ -73,6 +73,7 @@ def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
         pair = len(trajectory.shapes) == 2
         return draw_strip(
             seen.outlines, seen.times.tolist(), seen.paths, title, contacts=seen.contacts,
+            seen_from=0 if len(trajectory.shapes) > 1 else None,
             centre_distance=seen.centre_distance.tolist() if pair else None,
         )  # fmt: skip
     check_pair(trajectory)

@@ -12,8 +12,7 @@ from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.blame import force_to_blame
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, UNABLE, WHY, collided, outcome_of
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided, outcome_of
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
@@ -28,6 +27,7 @@ from flocsim.plausibility.settling import (
 )
 from flocsim.run import Run
 from flocsim.system import System
+from flocsim.trajectories.blame import UNABLE, force_to_blame
 
 OBSERVER: dict[Callable, Callable] = {
     hooks.awaits_touch: outcomes.has_not_touched,

@@ -31,9 +31,6 @@ UNDECIDED_ENDS = {
 FAILED_ENDS = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
 """Ends in which the model was left, and their reasons."""
 
-UNABLE = (Status.STEP_BUDGET, Status.STALLED, Status.NOT_FINITE)
-"""Ends at which a force may be to blame that gives NaN or infinity."""
-
 WHY = "why"
 """Key of a row, beside the columns, for the words on a failure."""
 

@@ -25,6 +25,7 @@ from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
+from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
 
 def load_config(
@@ -123,9 +124,14 @@ class Reader:
 
     def library(self, name):
         path = self.folder / name
+        if str(name) == NAME_OF_SHIPPED and not os.path.lexists(path):
+            return SHIPPED
         if not os.path.isfile(path):
             what = "is no ordinary file" if os.path.exists(path) else "does not exist"
-            text = f"{path} {what}; name a library that `flocsim fit` wrote"
+            text = (
+                f"{path} {what}; name a library that `flocsim fit` wrote, or "
+                f'"{NAME_OF_SHIPPED}", the one that ships with flocsim'
+            )
             self.problems.note(("shapes", "file"), text)
         return path
 

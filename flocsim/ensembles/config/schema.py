@@ -221,7 +221,8 @@ class ShapesConfig:
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",
-            "help": 'shape library that `flocsim fit` wrote; with source = "library" only',
+            "help": 'shape library that `flocsim fit` wrote, or "synthetic", the one that ships '
+            'with flocsim (24 grown flocs at N = 4, 8, 16, 32, 64); with source = "library" only',
             "only_for": "library",
         },
     )

@@ -179,13 +179,23 @@ def begin(
         session = {
             "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
             "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": start.rule,
-            "accuracy": start.accuracy,
+            "accuracy": start.accuracy, "asked": asked_of(study),
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
         start.resources.close()
         raise
     return start
+
+
+def asked_of(study: Study) -> dict:
+    """What a study consists of, for those who look into its journal."""
+    config = study.config
+    return {
+        "types": [name for name, *_ in config.scene.conditions],
+        "vertices": list(config.shapes.vertices), "delta": list(config.scene.delta),
+        "replicates": config.replicates,
+    }  # fmt: skip
 
 
 def recorded_choices(journal: Journal) -> list[dict]:

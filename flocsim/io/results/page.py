@@ -54,6 +54,24 @@ GROUPS = (
      "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again.", REPLICATES),
 )  # fmt: skip
 
+EFFICIENCY = """\
+## The efficiency over the displacements
+
+`flocsim info` and the figure `efficiency` of `flocsim plot` add up the probability P(δ) that an
+approach ends aggregated, misses among the approaches, undecided and failed ones left out, over
+its sideways offset δ (a share of δ_max), linear between the simulated ones:
+
+- in the plane: E = ∫₀¹ P dδ, of all approaches within the width 2 δ_max;
+- axially symmetric: E = ∫₀¹ P 2δ dδ, of all approaches within the area π δ_max². Where P is 1 up
+  to y_c and 0 beyond, it is (y_c/δ_max)², the collision efficiency of two settling bodies
+  (Pruppacher and Klett 1997, *Microphysics of Clouds and Precipitation*, ch. 14.4; Han and Lawler
+  1991, *J. Hydraul. Eng.* 117, 1269).
+
+The bounds are the same sums of Wilson's 95 % bounds at each δ, as wide as where all err together.
+There is none where `scene.delta` does not reach from 0 to 1. The numbers follow from the table
+`probabilities` (`flocsim.io.results.efficiency`).
+"""
+
 NUMERICAL = """\
 ## The numerical error of a probability
 
@@ -106,7 +124,9 @@ def results_page() -> str:
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
-    return "\n".join([*parts, NUMERICAL + RUN, "## Coordinates\n", coordinates()])
+    return "\n".join(
+        [*parts, NUMERICAL + EFFICIENCY + "\n" + RUN, "## Coordinates\n", coordinates()]
+    )
 
 
 def table(schema):

@@ -40,6 +40,12 @@ from flocsim.io.hdf5.structure import Node, structure_of
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
 
+NAME_OF_SHIPPED = "synthetic"
+"""What a config calls the library that ships with flocsim."""
+
+SHIPPED = Path(__file__).with_name("synthetic.h5")
+"""Its place; flocsim.io.shapes.shipped made it."""
+
 KIND = "flocsim shape library"
 SCHEMA_VERSION = 1
 MOST_VERTICES = 10_000

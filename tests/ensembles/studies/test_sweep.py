@@ -121,3 +121,15 @@ def test_a_dry_run_prints_commands_for_a_cluster(tmp_path, capsys):
     assert first[:3] == ["flocsim", "ensemble", str(path)]
     assert first[3:5] == ["--set", f'{HAMAKER}="5 zJ"']
     assert second[-2:] == ["-o", "small-sweep.parts/0001.h5"]
+
+
+def test_info_and_plot_know_the_joined_file(swept, capsys, tmp_path):
+    _, path = swept
+    assert main(["info", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert f"{HAMAKER} (as hamaker): 1e-18, 1e-20 J" in told
+    assert [line.split()[:5] for line in told.splitlines()[-2:]] == [
+        [value, "I", "1", "0", "2"] for value in ("1e-18", "1e-20")
+    ]
+    assert main(["plot", str(path), "--output-dir", str(tmp_path)]) == 0
+    assert (tmp_path / "all-sweep.png").stat().st_size > 1000
