@@ -8,6 +8,9 @@ from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 
 DEFAULT_FILE = "study.toml"
 
+KINDS = ("types", "measured")
+"""Kinds of study that there is an example of."""
+
 EXAMPLE = """\
 # A study of binary collisions of settling flocs, for `flocsim ensemble`. docs/config.md has all
 # keys. A quantity is a number in SI units, or a string with a unit such as "16.41 um".
@@ -73,6 +76,44 @@ tolerance = "1 nm"         # largest error in position of a step
 """
 
 
+MEASURED = (
+    ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
+    (
+        """\
+types = ["I", "II", "III"] # the paper's sizes
+# pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
+""",
+        """\
+pairs = "measured"         # two flocs of the library, each at its own size
+# weight = "volume"        # how often each is drawn: "number", all alike; "area", "volume"
+# min_radius = "5 um"      # of the flocs that are drawn, by r_eq; max_radius
+# classes = ["10 um", "20 um"]        # results by size class; or 3: so many of equal weight
+""",
+    ),
+    (
+        """\
+source = "synthetic"       # flocs that flocsim grows
+# source = "library"       # or flocs fitted to images with `flocsim fit`
+# file = "shapes.h5"
+""",
+        """\
+source = "library"         # flocs fitted to images with `flocsim fit`
+file = "shapes.h5"         # beside this file, with fits at the vertices below
+""",
+    ),
+    ('radius = "1 um"            # spheroradius\n', ""),
+)
+"""(text of EXAMPLE, what a study of measured flocs has in its place)."""
+
+
+def example(kind: str) -> str:
+    """The text of an example: "types", of stated sizes, or "measured", of those of a library."""
+    text = EXAMPLE
+    for old, new in MEASURED if kind == "measured" else ():
+        text = text.replace(old, new)
+    return text
+
+
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "init",
@@ -82,6 +123,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
     )
+    parser.add_argument(
+        "--kind", choices=KINDS, default=KINDS[0],
+        help="types: flocs resized to stated radii (default); measured: flocs of a library, each "
+        "at its own size",
+    )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -90,6 +136,6 @@ def run(args: Namespace) -> int:
     """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
     rule = data_rule(args.overwrite)
     check_outputs([Output(args.file, rule)], [])
-    write_file(args.file, EXAMPLE.encode(), rule)
+    write_file(args.file, example(args.kind).encode(), rule)
     print(f"wrote {args.file}; run it with: flocsim ensemble {args.file}")
     return 0
