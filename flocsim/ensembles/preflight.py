@@ -99,10 +99,11 @@ def check_impacts(config: Config, flocs: Sequence[Floc]) -> None:
     """ConfigError where bodies meet so fast that they leave the contact law: of the worst pair."""
     found = []
     for name, pair in sphere_pairs(config, flocs, "fastest"):
-        for shapes in kinds(config, pair.shapes):
+        spheres = pair.shapes
+        for shapes in kinds(config, spheres):
             radii = [shape.radius for shape in shapes]
-            what = "the spheres" if shapes is pair.shapes else "the outlines, their spheroradii"
-            if flocs and config.shapes.size == "own" and shapes is not pair.shapes:
+            what = "the spheres" if shapes is spheres else "the outlines, their spheroradii"
+            if flocs and config.shapes.size == "own" and shapes is not spheres:
                 measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
                 radii = [float(np.median(measured))] * 2
             found.append(too_deep(name, pair, radii, what))

@@ -115,6 +115,9 @@ def test_an_impact_too_deep_is_that_of_the_fastest_pair(folder):
     with pytest.raises(ConfigError, match=r"measured: an impact at .* give forces.contact.k_n"):
         check_study(load_text(folder, STUDY, soft))
     check_study(load_text(folder, STUDY, soft | {"scene": {"max_radius": "6 um"}}))
+    softer = {"forces": {"contact": {"k_n": 1e-4}}}
+    with pytest.raises(ConfigError, match=r"r_i \+ r_j of the spheres\)"):
+        check_study(load_text(folder, STUDY, SPHERES | softer))
 
 
 def test_pairs_of_size_classes_are_the_types_of_a_study(folder):
