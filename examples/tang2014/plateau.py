@@ -41,7 +41,7 @@ SHOWN = 0
 
 def pair_of(study, kind):
     """(r*, L) of a type: reduced radius [m] and the largest load of settling on a bond [N]."""
-    _, radius_i, radius_j = study.config.scene.conditions[kind]
+    radius_i, radius_j = study.pairings[kind].radii
     system = study.encounter(kind, 1, np.zeros(4)).system
     motions = [terminal_motion(system, body) for body in system.bodies]
     drift = np.hypot(*(motions[1][0] - motions[0][0]))
@@ -112,7 +112,7 @@ def nearest_approach(study, kind, replicate):
     times, position, _ = record.arrays()
     distance = centre_distance(position)
     after = distance[times >= row["t_collision"]] if row["inside"] <= 1 else distance
-    _, radius_i, radius_j = study.config.scene.conditions[kind]
+    radius_i, radius_j = study.pairings[kind].radii
     return row["outcome"], after.min() - radius_i - radius_j
 
 

@@ -91,7 +91,7 @@ def library_text(path):
 
 def results_text(path, results, totals):
     try:
-        facts = conditions(results) + outcomes(results, totals)
+        facts = conditions(results) + sizes(results, totals) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
         if choice := stored(results.run, "accuracy"):
             facts += [("accuracy", visible(line, "")) for line in choice_lines(choice)]
@@ -207,6 +207,25 @@ def conditions(results):
     ]
     over = stored(results.run, "overrides")
     return [*facts, ("over the config", json.dumps(over))] if over else facts
+
+
+def sizes(results, totals):
+    """[(name, value)] of the radii of the types, and between which values the replicates were."""
+    known = [
+        f"{visible(name, '')}: {1e6 * i:.4g}, {1e6 * j:.4g}"
+        for name, i, j in zip(
+            results.types, results.radii["r_i"], results.radii["r_j"], strict=True
+        )
+        if i > 0.0 and j > 0.0
+    ]
+    facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
+    units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
+    words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
+    for name, (low, high) in totals.spans.items():
+        low, high = units[name] * low, units[name] * high
+        if f"{low:.4g}" != f"{high:.4g}":
+            facts.append((words[name], f"{low:.4g} to {high:.4g} in the replicates"))
+    return facts
 
 
 def preset(run):

@@ -188,10 +188,49 @@ vertices = [1, 16]
 hamaker = "10 zJ"          # replaced by the values of --over
 """
 
+MEASURED = (
+    ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
+    (
+        """\
+types = ["I", "II", "III"] # the paper's sizes
+# pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
+""",
+        """\
+pairs = "measured"         # two flocs of the library, each at its own size
+# weight = "volume"        # how often each is drawn: "number", all alike; "area", "volume"
+# min_radius = "5 um"      # of the flocs that are drawn, by r_eq; max_radius
+# classes = ["10 um", "20 um"]        # results by size class; or 3: so many of equal weight
+""",
+    ),
+    (
+        """\
+source = "synthetic"       # flocs that flocsim grows
+# source = "library"       # or flocs fitted to images with `flocsim fit`
+# file = "shapes.h5"
+""",
+        """\
+source = "library"         # flocs fitted to images with `flocsim fit`
+file = "synthetic"         # ships with flocsim; now write "shapes.h5", your own
+""",
+    ),
+    ('radius = "1 um"            # spheroradius\n', ""),
+)
+"""(text of EXAMPLE, what a study of measured flocs has in its place)."""
+
+
+def measured() -> str:
+    """The text of a study of flocs at their measured sizes."""
+    text = EXAMPLE
+    for old, new in MEASURED:
+        text = text.replace(old, new)
+    return text
+
+
 KINDS = {
     "study": (EXAMPLE, "all keys, commented"),
     "spheres": (SPHERES, "spheres alone"),
     "paper": (PAPER, "the conditions of Tang et al. (2014)"),
+    "measured": (measured(), "flocs at their measured sizes"),
     "pictures": (PICTURES, "flocs fitted to pictures"),
     "force": (FORCE, "a force of your own, its module too"),
     "sweep": (SWEEP, "several values of a key"),

@@ -133,7 +133,10 @@ def distance_at(motion: tuple, instant: float) -> float:
 
 def climb(study: Study, condition: int, tasks: Sequence) -> Iterator[Measured]:
     """Both methods' ladders of a type, from the loosest rung to the tightest."""
-    length, budget = scene_length(study.config, condition), study.config.integrator.max_steps
+    length, budget = (
+        scene_length(study.config, condition, study.flocs),
+        study.config.integrator.max_steps,
+    )
     reference = REFERENCE * DECADES[-1]
     exact = at_rung(Implicit(), reference * length)
     found = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
@@ -202,7 +205,7 @@ def run(args: Namespace) -> int:
     climbed: list[Measured] = []
     panels: dict[str, list[Rung]] = {}
     for condition, tasks in enumerate(sample_of(config, args.count or COUNT)):
-        name = config.scene.conditions[condition][0]
+        name = config.scene.names[condition]
         tell(f"\ntype {name}, {len(tasks)} replicates over all N and delta\n{HEADER}")
         panels[name] = []
         for ladder in climb(study, condition, tasks):

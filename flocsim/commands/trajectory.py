@@ -80,7 +80,7 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
     if not 2 <= args.frames <= 50:
         raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
-    names = [name for name, _, _ in config.scene.conditions]
+    names = list(config.scene.names)
     condition = chosen(args.type, names, "--type", 0)
     vertices = config.shapes.vertices
     vertex_count = vertices[chosen(args.vertices, vertices, "--vertices", -1)]
@@ -92,7 +92,7 @@ def outcome_line(config, place, replicate, row):
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
     reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
-    name = config.scene.conditions[condition][0]
+    name = config.scene.names[condition]
     touch = ""
     if row["inside"] <= 1:
         touch = f"collision at {1e3 * row['t_collision']:.4g} ms, "
@@ -138,7 +138,7 @@ def save_all(figure, names, rule):
 def default_name(args, config, place):
     """A figure's name that says what it shows: "study-I-64-0.5-17.png"."""
     condition, vertices, share = place
-    name = config.scene.conditions[condition][0]
+    name = config.scene.names[condition]
     return f"{Path(args.config).stem}-{name}-{vertices}-{share:g}-{args.replicate}.png"
 
 

@@ -101,7 +101,7 @@ def run(args: Namespace) -> int:
     check_study(config)
     system, duration, found = replicate(config, place, args.replicate)
     exact = reference(system, duration)
-    name = config.scene.conditions[place[0]][0]
+    name = config.scene.names[place[0]]
     print(
         f"type {name}, N = {place[1]}, delta = {place[2]:g}, replicate {args.replicate}: "
         f"{OUTCOMES[found['outcome']]} after {1e3 * duration:.4g} ms"

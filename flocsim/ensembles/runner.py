@@ -375,7 +375,7 @@ def results_of(
     config = study.config
     probabilities, pooled, differences = tables_of(sums)
     return Results(
-        types=tuple(name for name, _, _ in config.scene.conditions),
+        types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=replicates,
@@ -386,6 +386,7 @@ def results_of(
         pooled=pooled,
         differences=differences,
         count=count,
+        radii=study.radii,
     )
 
 
@@ -407,8 +408,8 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",
-        "warnings": storable(json.dumps(study_doubts(config))),
-        "settling": storable(json.dumps(settling_facts(config))),
+        "warnings": storable(json.dumps(study_doubts(config, study.flocs))),
+        "settling": storable(json.dumps(settling_facts(config, study.flocs))),
     }
 
 

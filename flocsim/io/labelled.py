@@ -30,7 +30,10 @@ class Column:
 
 @attrs.frozen(eq=False)
 class Labelled:
-    """Arrays along named axes; ``axes`` {name: Column} has a coordinate for each."""
+    """Arrays along named axes; ``axes`` {name: Column} has a coordinate for each.
+
+    A coordinate that is no axis itself lies along those that its Column names.
+    """
 
     axes: dict[str, Column]
     columns: dict[str, Column]
@@ -54,7 +57,8 @@ class Labelled:
         labels = [self.axes[name].values for name in index]
         rows = pandas.MultiIndex.from_product(labels, names=list(index))
         found = {}
-        for name, column in self.columns.items():
+        further = {name: each for name, each in self.axes.items() if each.axes != (name,)}
+        for name, column in (further | self.columns).items():
             for label, values in self.spread(name, column, index):
                 found[label] = worded(pandas, column, values)
         return pandas.DataFrame(found, index=rows)
@@ -67,9 +71,11 @@ class Labelled:
         words = [self.axes[axis].values for axis in further]
         lengths = [len(self.axes[axis].values) for axis in index]
         places = [column.axes.index(axis) for axis in further]
-        values = np.moveaxis(column.values, places, range(-len(places), 0)) if places else (
-            column.values
-        )  # fmt: skip
+        values = np.moveaxis(column.values, places, range(-len(places), 0))
+        # A column that does not lie along an axis of the index is the same all along it.
+        own = iter(values.shape)
+        shape = [next(own) if axis in column.axes else 1 for axis in index]
+        values = np.broadcast_to(values.reshape(*shape, *own), (*lengths, *map(len, words)))
         for place in np.ndindex(*map(len, words)):
             parts = [str(labels[at]) for labels, at in zip(words, place, strict=True)]
             yield "_".join([name, *parts]), values[(..., *place)].reshape(lengths).ravel()

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import NOW, Scene, Work, work_of
+from flocsim.arrays import EQUIVALENT_RADIUS, NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes
@@ -225,14 +225,19 @@ def replicate_row(status, angles, run):
     observed = run.observed
     outcome, failure = outcome_of(status, run.code, observed)
     touched = collided(observed)
+    zone = observed[numbers.ZONE]
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
+        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
+        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
+        "D_0": zone,
         "outcome": outcome,
         "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
         "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
         "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
         "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
+        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
         "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
         "d_c_last": observed[numbers.D_LAST],
         "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,

@@ -18,6 +18,7 @@ from flocsim.ensembles.config.schema import (
     TOP_KEYS,
     Config,
     contradictions,
+    implied,
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
@@ -46,6 +47,7 @@ def load_config(
     preset = table.get("preset")
     if isinstance(preset, str):
         table = lay_over(PRESETS.get(preset, {}), table)
+    table = lay_over(implied(table), table)
     reader = Reader(folder, problems, sources)
     parts = reader.config_parts(table)
     problems.raise_if_any()
@@ -77,8 +79,8 @@ class Reader:
             parts[name] = self.table(name, table_class, table.get(name, {}))
         forces = self.forces(table.get("forces", {}))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
-        if not self.problems.at("preset", "bodies", "fluid"):
-            for place, text in contradictions(parts["bodies"], parts["fluid"]):
+        if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
+            for place, text in contradictions(parts):
                 self.problems.note(place, text)
         return parts
 

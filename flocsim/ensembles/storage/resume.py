@@ -192,7 +192,7 @@ def asked_of(study: Study) -> dict:
     """What a study consists of, for those who look into its journal."""
     config = study.config
     return {
-        "types": [name for name, *_ in config.scene.conditions],
+        "types": list(config.scene.names),
         "vertices": list(config.shapes.vertices), "delta": list(config.scene.delta),
         "replicates": config.replicates,
     }  # fmt: skip

@@ -36,6 +36,7 @@ from flocsim.io.results.schema import (
     FLAGS,
     LAST_AXES,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
     Results,
@@ -50,6 +51,9 @@ GROUPS: dict[str, tuple[dict, tuple[str, ...]]] = {
     "replicates": (REPLICATES, (*AXES, "replicate")),
 }
 """Groups of a results file: what each holds, and along which axes."""
+
+SIZED = ("probabilities", "pooled")
+"""Groups that have the radii of the types beside them; the replicates have their own."""
 
 
 class StudyResults:
@@ -109,7 +113,13 @@ class StudyResults:
             about = {"units": units, "long_name": text} | self.flags(group, name)
             columns[name] = Column((*axes, *filter(None, further)), arrays[name], about)
         used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
-        return Labelled({axis: self.coordinate(axis) for axis in used}, columns)
+        sizes = {name: self.radius(name) for name in RADII if group in SIZED}
+        return Labelled({axis: self.coordinate(axis) for axis in used} | sizes, columns)
+
+    def radius(self, name: str) -> Column:
+        """The radius r_i or r_j that stands for each type: a coordinate along the types."""
+        _, units, text = RADII[name]
+        return Column(("type",), self.results.radii[name], {"units": units, "long_name": text})
 
     def flags(self, group: str, name: str) -> dict:
         """The codes of a column of the replicates, and their words."""
@@ -142,6 +152,8 @@ class StudyResults:
 
     def to_pandas(self, group: str = "probabilities") -> DataFrame:
         """A group as a pandas DataFrame, a row for each condition (or replicate), codes as words.
+
+        The radii of the types are columns.
 
         UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
         """

@@ -26,7 +26,7 @@ Place = tuple[int, int, float]
 
 def place_of(config: Config, type: str | None, vertices: int | None, delta: float | None) -> Place:
     """The condition with these values: by default the first type, the last N, the first δ."""
-    names = [name for name, _, _ in config.scene.conditions]
+    names = list(config.scene.names)
     return (
         chosen(type, names, "type", 0),
         config.shapes.vertices[chosen(vertices, config.shapes.vertices, "vertices", -1)],

@@ -129,7 +129,7 @@ class Study:
 
     def __repr__(self) -> str:
         scene, vertices = self.config.scene, self.config.shapes.vertices
-        count = len(scene.conditions) * len(vertices) * len(scene.delta)
+        count = len(scene.names) * len(vertices) * len(scene.delta)
         over = f", {len(list(settings_of(self.overrides)))} changed" if self.overrides else ""
         return f"Study({str(self.path)!r}: {count} conditions × {self.config.replicates}{over})"
 

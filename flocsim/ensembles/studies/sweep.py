@@ -19,13 +19,17 @@ from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
+from flocsim.io.results.schema import RADII
 from flocsim.io.results.sweep_file import Swept, is_sweep, read_sweep, write_sweep
 
 JOINED = ("probabilities", "pooled")
 """The groups of the parts that are joined; the rows stay in the parts."""
 
 MOST_PARTS = 10_000
-FIXED = ("seed", "output.file", "scene.types", "scene.pairs", "scene.delta", "shapes.vertices")
+FIXED = (
+    "seed", "output.file", "scene.types", "scene.pairs", "scene.classes", "scene.delta",
+    "shapes.vertices",
+)  # fmt: skip
 """Keys that are no dimension of a sweep: they are dimensions already, or no physics."""
 
 
@@ -155,12 +159,17 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
     found = {}
     for group in JOINED:
         labelled = [each.labelled(group) for each in parts]
-        columns = {}
-        for name, column in labelled[0].columns.items():
-            stacked = np.stack([each.columns[name].values for each in labelled])
-            shape = (*lengths, *column.values.shape)
-            columns[name] = Column((*swept, *column.axes), stacked.reshape(shape), column.about)
-        found[group] = Labelled(coordinates | labelled[0].axes, columns)
+
+        def stacked(kind, name, labelled=labelled):
+            columns = [getattr(each, kind)[name] for each in labelled]
+            values = np.stack([each.values for each in columns])
+            shape = (*lengths, *columns[0].values.shape)
+            return Column((*swept, *columns[0].axes), values.reshape(shape), columns[0].about)
+
+        columns = {name: stacked("columns", name) for name in labelled[0].columns}
+        # Sizes may follow from what is swept, as from the limits of measured flocs.
+        axes = labelled[0].axes | {name: stacked("axes", name) for name in RADII}
+        found[group] = Labelled(coordinates | axes, columns)
     return found
 
 

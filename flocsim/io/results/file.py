@@ -42,6 +42,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     OUTCOMES,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
     Results,
@@ -119,6 +120,7 @@ def results_in(file, replicates):
         pooled=read_group(file, "pooled", POOLED),
         differences=read_group(file, "differences", DIFFERENCES),
         count=len(rows["replicate"]),
+        radii={name: table[name][()] for name in RADII},
     )
     check_tables(results)
     if results.replicates is not None:
@@ -135,9 +137,13 @@ def read_scalar(dataset):
     return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
 
 
+SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
+
+
 @attrs.define
 class Totals:
-    """How many replicates had each outcome and each reason, and what steps they took."""
+    """How many replicates had each outcome and each reason, what steps they took, and between
+    which values (NaN: none) the columns of SPANNED lie."""
 
     outcomes: np.ndarray
     failures: np.ndarray
@@ -145,6 +151,14 @@ class Totals:
     steps: int = 0
     most_steps: int = 0
     rejected: int = 0
+    spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
+
+    def span(self, name: str, values: np.ndarray) -> None:
+        """Take the values of a column into its span."""
+        known = values[np.isfinite(values)]
+        if known.size:
+            low, high = self.spans.get(name, (np.inf, -np.inf))
+            self.spans[name] = min(low, float(known.min())), max(high, float(known.max()))
 
     def add(
         self, outcome: np.ndarray, failure: np.ndarray, steps: np.ndarray, rejected: np.ndarray
@@ -164,6 +178,8 @@ def totals_in(rows, reasons):
         columns = {name: rows[name][part] for name in CODED}
         check_codes(columns, reasons)
         totals.add(*columns.values())
+        for name in SPANNED:
+            totals.span(name, rows[name][part])
     return totals
 
 

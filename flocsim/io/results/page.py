@@ -10,6 +10,7 @@ from flocsim.io.results.schema import (
     DIFFERENCES,
     FLAGS,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
 )
@@ -51,7 +52,10 @@ GROUPS = (
      "the axis `against` (so 0 there itself). The same replicates in both: Newcombe's paired "
      "interval (method 10).", DIFFERENCES),
     ("replicates", "(type, vertices, delta, replicate): every single collision. `flocsim "
-     "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again.", REPLICATES),
+     "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again. Radii and D_0 "
+     "are those of the pair: with `scene.pairs = \"measured\"`, or `shapes.size = \"own\"`, each "
+     "replicate has its own, the same at all N and δ; so has δ_max, which follows from the two "
+     "outlines and angles.", REPLICATES),
 )  # fmt: skip
 
 EFFICIENCY = """\
@@ -149,7 +153,12 @@ def codes(name):
 
 def coordinates():
     rows = [[f"`{name}`", text] for name, (_, text) in COORDINATES.items()]
-    return markdown_table(["axis", "meaning"], rows) + "\n"
+    sizes = [[f"`{name}` [m]", text] for name, (_, _, text) in RADII.items()]
+    return (
+        f"{markdown_table(['axis', 'meaning'], rows)}\n\n"
+        "Beside `type`, in `probabilities` and `pooled`, its radii as numbers:\n\n"
+        f"{markdown_table(['coordinate', 'meaning'], sizes)}\n"
+    )
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from flocsim.io.results.schema import (
     COORDINATES,
     LAST_AXES,
     POOLED,
+    RADII,
     TABLE,
     last_axis,
     tail_of,
@@ -71,13 +72,17 @@ def write_sweep(
         )
         for group, labelled in groups.items():
             place = file.create_group(group)
+            inner = {name: each for name, each in labelled.axes.items() if each.axes != (name,)}
             for name, axis in labelled.axes.items():
+                if name in inner:
+                    continue
                 words = axis.values.dtype.kind == "O"
                 kind = h5py.string_dtype() if words else None
                 scale = place.create_dataset(name, data=axis.values.tolist(), dtype=kind)
                 scale.make_scale(name)
                 scale.attrs.update(axis.about)
-            for name, column in labelled.columns.items():
+            place.attrs["coordinates"] = " ".join(inner)
+            for name, column in (inner | labelled.columns).items():
                 dataset = place.create_dataset(name, data=column.values)
                 dataset.attrs.update(column.about)
                 for number, axis_name in enumerate(column.axes):
@@ -154,6 +159,7 @@ def expected(nodes, names):
             name: Expected(kind, (*names, *axes, *tail_of(name) * (group == "probabilities")))
             for name, (kind, _, _) in schema.items()
         }
+        columns |= {name: Expected(kind, (*names, "type")) for name, (kind, _, _) in RADII.items()}
         columns |= {axis: Expected(KINDS[axis], (axis,)) for axis in axes}
         if group == "probabilities":
             for axis, words in LAST_AXES.items():
@@ -175,7 +181,11 @@ def labelled_of(place, group, names):
         about = {"units": units, "long_name": text}
         columns[name] = Column((*names, *axes, *further), place[name][()], about)
     used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
-    return Labelled({axis: coordinate(place[axis], axis) for axis in used}, columns)
+    sizes = {
+        name: Column((*names, "type"), place[name][()], {"units": units, "long_name": text})
+        for name, (_, units, text) in RADII.items()
+    }
+    return Labelled({axis: coordinate(place[axis], axis) for axis in used} | sizes, columns)
 
 
 def coordinate(dataset, axis):

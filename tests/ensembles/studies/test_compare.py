@@ -87,7 +87,7 @@ def test_conditions_that_both_have_are_found_by_their_names(files, tmp_path):
         first, types=first.types[::-1][:2], delta=first.delta[1:],
         replicates={k: v[::-1][:2, :, 1:] for k, v in first.replicates.items()},
         probabilities={k: v[::-1][:2, :, 1:] for k, v in first.probabilities.items()},
-        pooled={}, differences={},
+        pooled={}, differences={}, radii={k: v[::-1][:2] for k, v in first.radii.items()},
     )  # fmt: skip
     write_results(tmp_path / "d.h5", fewer)
     comparison = flocsim.compare(flocsim.open(a), flocsim.open(tmp_path / "d.h5"))

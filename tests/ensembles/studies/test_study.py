@@ -50,7 +50,7 @@ def test_with_takes_dotted_nested_and_named_keys_and_leaves_the_first_alone(tmp_
         scene={"delta": [0.5]},
     )  # fmt: skip
     assert study.config.seed == 1 and other.config.seed == 7
-    assert other.config.scene.delta == (0.5,) and other.config.scene.conditions[1][0] == "III"
+    assert other.config.scene.delta == (0.5,) and other.config.scene.names[1] == "III"
     assert next(f for f in other.config.forces if hasattr(f, "k_n")).k_n == 10.0
     assert "double_layer" not in other.config.force_names
     third = other.with_({"forces": {"contact": {"k_t": 1.0}}})

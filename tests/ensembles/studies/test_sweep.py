@@ -43,6 +43,8 @@ def test_the_joined_file_has_the_key_as_a_dimension(swept):
         assert table["hamaker"].values.tolist() == [1e-18, 1e-20]
         assert table["hamaker"].attrs == {"units": "J", "long_name": HAMAKER}
         assert table["n_class"].dims[-1] == "class"
+        assert table.coords["r_i"].dims == ("hamaker", "type")
+        assert table["r_i"].values.tolist() == [[16.41e-6], [16.41e-6]]
         for place in range(2):
             part = read_results(path.parent / "all.parts" / f"000{place}.h5")
             np.testing.assert_array_equal(
