@@ -157,12 +157,7 @@ def own_config(comm, arguments):
 
 def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
-    from flocsim.ensembles.doubts import study_doubts
     from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
-
-    if comm.rank == 0 and not arguments.quiet:
-        for line in study_doubts(config):
-            tell(f"flocsim: warning: {line}", sys.stderr)
 
     output = config.output.file
     try:

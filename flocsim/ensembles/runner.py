@@ -125,7 +125,9 @@ def run_to_file(
                 joint.accuracy,
             )  # fmt: skip
         resources.enter_context(start.resources)
-        for remark in [*remarks, *start.remarks]:
+        # Once nothing else stands in the way: what is refused is refused in one line.
+        doubts = [] if quiet else study_doubts(config, joint.study.flocs)
+        for remark in [*remarks, *start.remarks, *(f"warning: {line}" for line in doubts)]:
             progress.warn(remark)
         ended = lead(joint.study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):
