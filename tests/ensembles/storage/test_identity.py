@@ -25,6 +25,7 @@ NOT_PHYSICS = {
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",
     "io/trajectory.py": "writes motions",
     "io/plots/": "draws",
+    "io/exchange/": "writes motions for other programs",
     "io/outputs.py": "what may be written to",
     "io/own_mark.py": "what may be written to",
     "limits.py": "what the system allows; a row is what comes without an error",
