@@ -114,13 +114,19 @@ class StoredTrajectory:
 
 
 def is_trajectory(path: str | Path) -> bool:
-    """Whether a file is a trajectory's, by its attributes; FileError where it cannot be opened."""
+    """Whether a file is a trajectory's, by its kind; FileError where it cannot be opened."""
+    import h5py
+
     with checked_sealed(path) as (data, size):
         try:
-            root = structure_of(data, size)[""].attributes
-        except (ValueError, RuntimeError):
+            if "kind" not in structure_of(data, size)[""].attributes:
+                return False
+            data.seek(0)
+            with h5py.File(data, "r") as file:
+                kind = file.attrs["kind"]
+                return isinstance(kind, str) and kind == KIND
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError):
             return False  # who reads it as results says what is wrong
-        return "kind" in root and "schema_version" in root
 
 
 def read_trajectory(path: str | Path) -> StoredTrajectory:
