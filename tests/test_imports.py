@@ -70,7 +70,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
-        ["outputs"],
+        ["outputs", "opening"],
         [
             "files",
             "own_mark",
@@ -90,7 +90,7 @@ INNER_ROWS = {
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/mpi.py"],
     "h5py": [
-        "io/results/file.py",
+        "io/opening.py",
         "io/results/layout.py",
         "io/results/sweep_file.py",
         "io/shapes/library.py",

@@ -17,12 +17,14 @@ from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
+from flocsim.io import trajectory
+from flocsim.io.opening import kind_of
+from flocsim.io.results import sweep_file
 from flocsim.io.results.file import OUTCOMES, read_overview, read_results
+from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import BONDS
-from flocsim.io.results.sweep_file import is_sweep, read_sweep
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
-from flocsim.io.trajectory import centre_distance, is_trajectory, read_trajectory
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
          "warnings", "settling")  # fmt: skip
@@ -53,17 +55,8 @@ def run(args: Namespace) -> int:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
         print(unfinished_text(read_unfinished(journal)))
         return 0
-    if not args.config and is_trajectory(args.results):
-        print(trajectory_text(args.results))
-        return 0
-    if not args.config and is_sweep(args.results):
-        print(sweep_text(args.results))
-        return 0
-    if not args.config and is_library(args.results):
-        print(library_text(args.results))
-        return 0
     if not args.config:
-        print(results_text(args.results, *read_overview(args.results)))
+        print(text_of(args.results))
         return 0
     results = read_results(args.results, replicates=False)
     if results.run.get("config"):
@@ -71,6 +64,18 @@ def run(args: Namespace) -> int:
     else:
         raise FileError(f"{args.results} holds no config: it was not written by flocsim ensemble")
     return 0
+
+
+def text_of(path):
+    """What a file holds, of whatever kind it is."""
+    kind = kind_of(path)
+    if kind == trajectory.KIND:
+        return trajectory_text(path)
+    if kind == sweep_file.FORMAT:
+        return sweep_text(path)
+    if kind != FORMAT and is_library(path):
+        return library_text(path)
+    return results_text(path, *read_overview(path))
 
 
 def library_text(path):
@@ -122,7 +127,7 @@ def efficiency_block(results):
 
 def trajectory_text(path):
     """What a trajectory file holds."""
-    found = read_trajectory(path)
+    found = trajectory.read_trajectory(path)
     moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
     facts = [
         ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
@@ -131,7 +136,7 @@ def trajectory_text(path):
           for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
     ]  # fmt: skip
     if len(found.shapes) == 2:
-        apart = 1e6 * centre_distance(found.position)
+        apart = 1e6 * trajectory.centre_distance(found.position)
         facts.append(
             ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
              f"{apart[-1]:.4g} at last")
@@ -146,7 +151,7 @@ def trajectory_text(path):
 
 def sweep_text(path):
     """What the joined file of a sweep holds: Pr[A] at every value."""
-    swept, groups = read_sweep(path)
+    swept, groups = sweep_file.read_sweep(path)
     table = groups["probabilities"]
     lines = [f"{path}: a sweep", ""]
     for name, each in swept.items():

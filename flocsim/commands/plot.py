@@ -108,20 +108,23 @@ def label(name):
 def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
+    from flocsim.io import trajectory
+    from flocsim.io.opening import kind_of
+    from flocsim.io.results import sweep_file
     from flocsim.io.results.file import read_results
-    from flocsim.io.results.sweep_file import is_sweep, read_sweep
+    from flocsim.io.results.layout import FORMAT
     from flocsim.io.shapes.library import is_library, read_library
-    from flocsim.io.trajectory import is_trajectory, read_trajectory
 
     if (journal := journal_of(path)) is not None:
         found = read_unfinished(journal)
         return found.results, FIGURES, found.progress
-    if is_trajectory(path):
-        moved = read_trajectory(path)
+    kind = kind_of(path)
+    if kind == trajectory.KIND:
+        moved = trajectory.read_trajectory(path)
         return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
-    if is_sweep(path):
-        return read_sweep(path), SWEEP_FIGURES, ""
-    if is_library(path):
+    if kind == sweep_file.FORMAT:
+        return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
+    if kind != FORMAT and is_library(path):
         return read_library(path), POPULATION_FIGURES, ""
     return read_results(path, replicates=False), FIGURES, ""
 

@@ -8,13 +8,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, ShapeError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.exchange.vtkhdf import write_vtkhdf
-from flocsim.io.files import Rule, checked_sealed, keep, seal, write_file
-from flocsim.io.hdf5.structure import structure_of
+from flocsim.io.files import Rule, keep, seal, write_file
+from flocsim.io.opening import kind_of, opened_file
 
 KIND = "flocsim trajectory"
 SCHEMA_VERSION = 2
@@ -115,38 +114,15 @@ class StoredTrajectory:
 
 def is_trajectory(path: str | Path) -> bool:
     """Whether a file is a trajectory's, by its kind; FileError where it cannot be opened."""
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            if "kind" not in structure_of(data, size)[""].attributes:
-                return False
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                kind = file.attrs["kind"]
-                return isinstance(kind, str) and kind == KIND
-        except (OSError, KeyError, ValueError, TypeError, RuntimeError):
-            return False  # who reads it as results says what is wrong
+    return kind_of(path) == KIND
 
 
 def read_trajectory(path: str | Path) -> StoredTrajectory:
     """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            structure_of(data, size)
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                return stored_trajectory(file)
-        except (
-            OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, OverflowError,
-            AttributeError, ShapeError,
-        ) as error:  # fmt: skip
-            reason = " ".join(str(error).split())
-            raise FileError(
-                f"{path} holds no readable trajectory: {reason}; write it again"
-            ) from error
+    with opened_file(
+        path, lambda reason: f"{path} holds no readable trajectory: {reason}; write it again"
+    ) as (file, _):
+        return stored_trajectory(file)
 
 
 def stored_trajectory(file):

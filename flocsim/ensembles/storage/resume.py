@@ -34,10 +34,11 @@ from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.opening import UNREADABLE
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.provenance import now
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import BLOCK, UNREADABLE, opened, read_scalar
+from flocsim.io.results.file import BLOCK, opened, read_scalar
 from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"

@@ -18,9 +18,10 @@ from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.opening import kind_of
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
 from flocsim.io.results.schema import RADII
-from flocsim.io.results.sweep_file import Swept, is_sweep, read_sweep, write_sweep
+from flocsim.io.results.sweep_file import FORMAT, Swept, read_sweep, write_sweep
 
 JOINED = ("probabilities", "pooled")
 """The groups of the parts that are joined; the rows stay in the parts."""
@@ -187,4 +188,4 @@ def open_any(
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    return open_sweep(path) if is_sweep(Path(path)) else open_results(path, folder)
+    return open_sweep(path) if kind_of(Path(path)) == FORMAT else open_results(path, folder)

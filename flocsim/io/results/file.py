@@ -23,9 +23,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, UsageError
-from flocsim.io.files import Rule, checked_sealed, keep
-from flocsim.io.hdf5.structure import structure_of
+from flocsim.errors import FileError
+from flocsim.io.files import Rule, keep
+from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results.checks import (
     CODED,
     check_codes,
@@ -219,39 +219,21 @@ def opened(path: str | Path) -> Iterator[Any]:
 
     And once its structure was found to be one that flocsim writes: HDF5 sees no other.
     """
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            nodes = structure_of(data, size)
-            known = nodes[""].attributes
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                if known.get("format") != ("text", ()) or file.attrs["format"] != FORMAT:
-                    raise FileError(
-                        f"{path} is not a results file: name one that flocsim ensemble wrote"
-                    )
-                version = read_version(file, known)
-                if version != SCHEMA_VERSION:
-                    raise FileError(
-                        f"{path} has results of schema version {version}, this flocsim reads "
-                        f"{SCHEMA_VERSION}: read it with the version that wrote it"
-                    )
-                check_structure(nodes)
-                check_coordinates(file)
-                yield file
-        except FileError:
-            raise
-        except UNREADABLE as error:
-            reason = " ".join(str(error).split())
-            raise FileError(f"{path} holds no readable results: {reason}; run it again") from error
-
-
-UNREADABLE = (
-    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
-    OverflowError, IndexError, EOFError,
-)  # fmt: skip
-"""What h5py raises for what it cannot read."""
+    with opened_file(
+        path, lambda reason: f"{path} holds no readable results: {reason}; run it again"
+    ) as (file, nodes):
+        known = nodes[""].attributes
+        if text_of(file, nodes, "format") != FORMAT:
+            raise FileError(f"{path} is not a results file: name one that flocsim ensemble wrote")
+        version = read_version(file, known)
+        if version != SCHEMA_VERSION:
+            raise FileError(
+                f"{path} has results of schema version {version}, this flocsim reads "
+                f"{SCHEMA_VERSION}: read it with the version that wrote it"
+            )
+        check_structure(nodes)
+        check_coordinates(file)
+        yield file
 
 
 def read_version(file, known):

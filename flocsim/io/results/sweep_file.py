@@ -4,23 +4,20 @@ HDF5 as the results file is: groups `probabilities` and `pooled` with dimension 
 meanings, a checksum behind; the attribute `swept` (JSON) names the keys.
 """
 
-import contextlib
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError
-from flocsim.io.files import Rule, checked_sealed, keep, seal, write_file
+from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
-from flocsim.io.hdf5.structure import structure_of
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Column, Labelled
+from flocsim.io.opening import opened_file
 from flocsim.io.results.schema import (
     AXES,
     COORDINATES,
@@ -90,22 +87,15 @@ def write_sweep(
     write_file(path, seal(image.getvalue()), rule)
 
 
-def is_sweep(path: str | Path) -> bool:
-    """Whether a file is a sweep's, by its format; FileError for one that cannot be opened."""
-    with checked_sealed(path) as (data, size):
-        try:
-            nodes = structure_of(data, size)
-        except (ValueError, RuntimeError):
-            return False  # who reads it as results says what is wrong
-        return "swept" in nodes[""].attributes
-
-
 def read_sweep(path: str | Path) -> tuple[dict[str, Swept], dict[str, Labelled]]:
     """({dimension: Swept}, {group: Labelled}) of a joined file.
 
     FileError for one that is absent, damaged, of another kind or version.
     """
-    with opened(path) as (file, nodes):
+    with opened_file(
+        path,
+        lambda reason: f"{path} holds no readable sweep: {reason}; join it again with --resume",
+    ) as (file, nodes):
         check_root(nodes, ROOT)
         if str(file.attrs["format"]) != FORMAT or int(file.attrs["schema_version"]) != (
             SCHEMA_VERSION
@@ -126,29 +116,6 @@ def read_sweep(path: str | Path) -> tuple[dict[str, Swept], dict[str, Labelled]]
             for name, each in about.items()
         }
         return swept, groups
-
-
-@contextlib.contextmanager
-def opened(path: str | Path) -> Iterator[tuple[Any, Any]]:
-    """(open h5py file, its structure), once checksum and structure were found right."""
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            nodes = structure_of(data, size)
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                yield file, nodes
-        except FileError:
-            raise
-        except (
-            OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, OverflowError,
-            AttributeError,
-        ) as error:  # fmt: skip
-            reason = " ".join(str(error).split())
-            raise FileError(
-                f"{path} holds no readable sweep: {reason}; join it again with --resume"
-            ) from error
 
 
 def expected(nodes, names):

@@ -22,6 +22,7 @@ NOT_PHYSICS = {
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/hdf5/": "reads flocs, and these are compared themselves",
     "io/json_text.py": "reads flocs, and these are compared themselves",
+    "io/opening.py": "reads flocs, and these are compared themselves",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",
     "io/trajectory.py": "writes motions",
     "io/plots/": "draws",
