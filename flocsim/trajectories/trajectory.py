@@ -264,10 +264,10 @@ class Trajectory:
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.
         """
-        from flocsim.io.outputs import Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
         from flocsim.io.trajectory import write_trajectory
 
-        check_outputs([Output(file, data_rule(overwrite))], [])
+        check_outputs([Output(file, data_rule(overwrite), ways=SCRIPT_WAYS)], [])
         facts: dict[str, str | float] = {
             "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
             "error": self.error,
@@ -285,12 +285,12 @@ class Trajectory:
         (``pip install 'flocsim[formats]'``). For ParaView: `save`.
         """
         from flocsim.io.exchange.gsd_file import write_gsd
-        from flocsim.io.outputs import Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
 
         path, rule = Path(file), data_rule(overwrite)
         if path.suffix.lower() != ".gsd":
             raise UsageError(f"{path}: what is exported must end in .gsd; ParaView reads `save`'s")
-        check_outputs([Output(path, rule)], [])
+        check_outputs([Output(path, rule, ways=SCRIPT_WAYS)], [])
         write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 
