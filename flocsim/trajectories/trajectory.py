@@ -135,6 +135,8 @@ class Trajectory:
 
     def checked_times(self, times: Any) -> np.ndarray:
         """Times as an array (k,); UsageError for what is no time of the run."""
+        if isinstance(times, str):
+            times = in_unit(times, "s", "t")
         try:
             found = np.atleast_1d(np.asarray(times, dtype=float))
         except (TypeError, ValueError):
@@ -148,7 +150,7 @@ class Trajectory:
         return found
 
     def at(self, t: Any) -> State:
-        """The State at a time [s], or at an array of times.
+        """The State at a time, in s or as "5 ms", or at an array of times [s].
 
         At a step, what was computed. Between two, the interpolation that the method itself goes by:
         of Implicit and Overdamped the cubic through the stages, whose error is below a quarter of
