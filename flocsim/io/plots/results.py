@@ -242,7 +242,9 @@ def against_size(results: Results) -> Figure:
         if known.any() and results.pooled:
             bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
             bar.minorticks_off()
-            marks = receivers if len(receivers) <= MOST_SIZES_NAMED else np.geomspace(low, high, 4)
+            apart = np.append(True, np.diff(np.log(receivers)) > 0.06 * np.log(1.1 * high / low))
+            few = len(receivers) <= MOST_SIZES_NAMED
+            marks = receivers[apart] if few else np.geomspace(low, high, 4)
             bar.set_ticks(marks, labels=[f"{each:.3g}" for each in marks])
         return figure
 

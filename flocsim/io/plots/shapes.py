@@ -67,11 +67,13 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
         for radius, axes in zip(radii, panels, strict=True):
             draw_errors(axes, [e for e in entries if e.spheroradius == radius])
             axes.set_title(f"spheroradius r = {radius:g} px")
-            axes.set_xlabel("vertices N")
+            axes.set_xlabel("vertices $N$")
         panels[0].set_ylabel("relative error RE [%]")
         panels[0].set_ylim(bottom=0.0)
         title = "mean ± standard deviation\ndashed: circle of equal area"
-        panels[0].legend(title=title, alignment="left", loc="upper left")
+        # Not struck through by the dashed lines.
+        panels[0].legend(title=title, alignment="left", loc="upper left", frameon=True,
+                         facecolor="white", edgecolor="none", framealpha=1.0)  # fmt: skip
         return figure
 
 

@@ -24,12 +24,17 @@ from flocsim.io.plots.style import (
     type_title,
 )
 
+PREFIXED = ("m", "s", "J", "N", "V")
+"""Units whose values are written with a prefix, as 500 nm."""
+
 STEEP = 20.0
 """Ratio of the largest value to the least from which on the axis is logarithmic."""
 
 
 def against_key(content: tuple[dict[str, Any], dict[str, Any]]) -> Figure:
     """Pr[A] against the first swept key: a panel per type, a line per N, delta and further keys."""
+    from matplotlib.ticker import EngFormatter, NullFormatter, StrMethodFormatter
+
     swept, groups = content
     first = next(iter(swept.values()))
     table = groups["probabilities"]
@@ -45,22 +50,36 @@ def against_key(content: tuple[dict[str, Any], dict[str, Any]]) -> Figure:
     numbers = None if first.words else np.array(first.values, dtype=float)
     where = np.arange(len(first.values), dtype=float) if numbers is None else numbers
     order = np.argsort(where)
+    is_log = numbers is not None and numbers.min() > 0.0 and numbers.max() > STEEP * numbers.min()
     with house_style():
-        unit = "" if first.unit == "1" else f" [{first.unit}]"
+        unit = f" [{first.unit}]" if first.unit not in ("1", *PREFIXED) else ""
         figure, panels = panel_grid(len(types), 2.0, plain(first.key) + unit)
         colours = graded_colours(len(words))
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
             for index in range(len(words)):
                 line = [each[number, index][order] for each in lines]
-                shift = 0.3 * dodge(index, len(words)) if numbers is None else 0.0
-                draw_bars(axes, where[order] + shift, line, index, colours[index])
+                aside = dodge(index, len(words))
+                if numbers is None:
+                    places = where[order] + 0.3 * aside
+                elif is_log:
+                    places = where[order] * (where.max() / where.min()) ** (0.1 * aside)
+                else:
+                    places = where[order] + 0.1 * aside * np.ptp(where)
+                draw_bars(axes, places, line, index, colours[index])
             note_if_empty(axes, bands[0][number], "no decided collision")
             axes.set_title(type_title(number, types[number]))
             if numbers is None:
                 axes.set_xticks(where, labels=[plain(each) for each in first.values])
-            elif numbers.min() > 0.0 and numbers.max() > STEEP * numbers.min():
+                continue
+            if is_log:
                 axes.set_xscale("log")
+                axes.xaxis.set_minor_formatter(NullFormatter())
+            style = (
+                EngFormatter(first.unit) if first.unit in PREFIXED else StrMethodFormatter("{x:g}")
+            )
+            axes.xaxis.set_major_formatter(style)
+            axes.locator_params(axis="x", nbins=5) if not is_log else None
         for axes in panels[::PANELS_PER_ROW]:
             axes.set_ylabel(LABELS["pr_a"])
         title = ", ".join(plain(name) for name in others) + BARS
