@@ -87,7 +87,7 @@ def accept(scene, work, clock, counts, step, lists):
         return SAME
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
         _, depth = resolutions_of(work, clock)
-        add_switch_errors(scene, work, step, depth)
+        add_switch_errors(scene, work, clock, step, depth)
     hand_over(scene, work)
     return set_modes(scene, work)
 
