@@ -37,6 +37,7 @@ from flocsim.arrays import (
     GAP,
     INERTIA,
     MASS,
+    MOTION_COLUMNS,
     NORMAL_X,
     NORMAL_Y,
     NOW,
@@ -63,7 +64,7 @@ from flocsim.laws import contact_force
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
 
-OF_VECTOR = 6.0
+OF_VECTOR = 9.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
 LEAST = 0.01
@@ -118,30 +119,30 @@ def overlap_error(scene, work, clock, row):
     return 0.0
 
 
-def carried_size(scene, work, body, first):
-    """How large a body's carried error of place, or of velocity, is in the place of its outline."""
+def carried_size(scene, work, body):
+    """How large a body's carried error is in the place of its outline [m]."""
     e = work.motion
-    size = math.hypot(e[CARRIED, body, first], e[CARRIED, body, first + 1])
-    return size + scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, first + 2])
+    turn = scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, ANGLE])
+    return math.hypot(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
 
 
-def shorten(scene, work, leader, first, place, speed):
-    """Shorten the carried errors of a cluster, of place or of velocity, to what they can be.
+def shorten(scene, work, leader):
+    """Shorten the carried error of a cluster to what its places can be wrong by.
 
-    All by one factor: it must not give the cluster a momentum that no step and no switch gave it.
+    All of it by one factor, for it must not give the cluster a momentum that no step and no switch
+    has given it, and velocities too: those of vibrations are what their places make them.
     """
     share = 1.0
     for body in range(work.bodies.shape[0]):
         if work.cluster[body] == leader:
-            errors = work.bodies
-            most = errors[body, place] + OF_SWITCHES * errors[body, speed]
-            size = carried_size(scene, work, body, first)
+            most = work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
+            size = carried_size(scene, work, body)
             if size > most:
                 share = min(share, most / size)
     if share < 1.0:
         for body in range(work.bodies.shape[0]):
             if work.cluster[body] == leader:
-                for axis in range(first, first + 3):
+                for axis in range(MOTION_COLUMNS):
                     work.motion[CARRIED, body, axis] *= share
 
 
@@ -151,10 +152,9 @@ def bound_carried(scene, work):
     largest = 0.0
     for body in range(work.bodies.shape[0]):
         if work.cluster[body] == body:
-            shorten(scene, work, body, VX, ERROR_SPEED, SWITCH_SPEED)
-            shorten(scene, work, body, X, ERROR_PLACE, SWITCH_PLACE)
+            shorten(scene, work, body)
     for body in range(work.bodies.shape[0]):
-        largest = max(largest, carried_size(scene, work, body, X))
+        largest = max(largest, carried_size(scene, work, body))
     return largest
 
 

@@ -95,6 +95,27 @@ def test_a_vector_is_kept_within_the_sums():
     assert not work.motion[CARRIED].any()
 
 
+def test_shortening_gives_a_cluster_no_momentum():
+    """Errors that a contact has given two bodies, of which one can be wrong by less than it has."""
+    bodies = [
+        Body(Sphere(radius), (x, 0.0), surface_density=2.0)
+        for radius, x in ((5e-6, 0.0), (8e-6, 1.3e-5 - 1e-9))
+    ]
+    system = System(bodies, [Contact()])
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    work.cluster[:] = 0
+    masses = scene.bodies[:, MASS]
+    work.motion[CARRIED, :, 0] = work.motion[CARRIED, :, 3] = 1e-9 / masses * masses.min()
+    work.motion[CARRIED, 1] *= -1.0
+    work.bodies[:, ERROR_PLACE] = 1e-10, 1e-8
+    assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
+    for axis in (0, 3):
+        moved = masses * work.motion[CARRIED, :, axis]
+        assert moved[0] != 0.0
+        assert moved[0] == pytest.approx(-moved[1], rel=1e-12, abs=0.0)
+
+
 def head_on(damping):
     """Two spheres that meet a little off the middle, and their run until well behind that."""
     bodies = [
