@@ -1,6 +1,6 @@
 """An integrator of one's own: a file beside the config, named there as class = "own_integrator:…".
 
-    mpirun -n 2 python -m flocsim.ensemble examples/own_integrator.toml
+    mpirun -n 2 flocsim ensemble examples/own_integrator.toml
 
 or, from Python, System(bodies, forces, SemiImplicitEuler(step=2e-8)).
 """

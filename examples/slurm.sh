@@ -23,7 +23,7 @@ study=${1:?usage: sbatch slurm.sh STUDY.toml}
 export FLOCSIM_CACHE=${FLOCSIM_CACHE:-$HOME/.cache/flocsim}
 
 # `srun` sends the signal to every rank. --resume starts anew where there is nothing to resume.
-srun python -m flocsim.ensemble "$study" --resume
+srun flocsim ensemble "$study" --resume
 code=$?
 
 # 75: stopped early, all finished replicates are in the journal: let Slurm run the job again.

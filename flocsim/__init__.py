@@ -4,11 +4,23 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from flocsim import ensembles as ensembles
+    from flocsim import errors as errors
+    from flocsim import forces as forces
+    from flocsim import geometry as geometry
+    from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
+    from flocsim.ensembles.studies.compare import Comparison, compare
+    from flocsim.ensembles.studies.opened import StudyResults
+    from flocsim.ensembles.studies.study import Study
+    from flocsim.ensembles.studies.sweep import SweepResults, sweep
+    from flocsim.ensembles.studies.sweep import open_any as open
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-    from flocsim.system import System, Trajectory
+    from flocsim.integrators.base import Status
+    from flocsim.system import System
+    from flocsim.trajectories.trajectory import State, Trajectory
 
 __version__ = "0.1.0"
 
@@ -18,30 +30,55 @@ HOMES = {
     "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
+    "State": "trajectories.trajectory",
+    "Status": "integrators.base",
+    "Study": "ensembles.studies.study",
+    "Comparison": "ensembles.studies.compare",
+    "StudyResults": "ensembles.studies.opened",
+    "SweepResults": "ensembles.studies.sweep",
     "System": "system",
-    "Trajectory": "system",
+    "Trajectory": "trajectories.trajectory",
+    "compare": "ensembles.studies.compare",
+    "open": "ensembles.studies.sweep:open_any",
+    "sweep": "ensembles.studies.sweep",
 }
-"""Public name → module. Loaded when asked for: a job takes over Ctrl-C before it loads any."""
+"""Public name → module, with a colon what it is called there where that differs. Loaded when asked
+for: a job takes over Ctrl-C before it loads any."""
+
+ROOMS = ("ensembles", "errors", "forces", "geometry", "integrators")
+"""Packages that are reached without an import of their own: flocsim.forces.Gravity."""
 
 __all__ = [
     "Body",
+    "Comparison",
     "Fluid",
     "Shape",
     "Sphere",
     "SpheroPolygon",
+    "State",
+    "Status",
+    "Study",
+    "StudyResults",
+    "SweepResults",
     "System",
     "Trajectory",
     "__version__",
+    "compare",
+    "open",
+    "sweep",
 ]
 
 
 def __getattr__(name: str) -> object:
+    if name in ROOMS:
+        return importlib.import_module(f"flocsim.{name}")
     if name not in HOMES:
         raise AttributeError(f"module 'flocsim' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"flocsim.{HOMES[name]}"), name)
+    home, _, there = HOMES[name].partition(":")
+    value = getattr(importlib.import_module(f"flocsim.{home}"), there or name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *HOMES})
+    return sorted({*globals(), *HOMES, *ROOMS})

@@ -15,11 +15,28 @@ if "ensemble" in sys.argv[1:2]:
 if is_limited():
     check_memory()
 
-from flocsim.commands import check, ensemble, fit, info, init, plot, trajectory, work_precision
+from flocsim.commands import (
+    check,
+    compare,
+    ensemble,
+    export,
+    fit,
+    info,
+    init,
+    plot,
+    report,
+    shapes,
+    sweep,
+    trajectory,
+    work_precision,
+)
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
-COMMANDS = (init, fit, check, ensemble, trajectory, plot, work_precision, info)
+COMMANDS = (
+    init, fit, shapes, check, ensemble, sweep, trajectory, plot, report, export, compare,
+    work_precision, info,
+)  # fmt: skip
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -9,8 +9,8 @@ import numpy as np
 
 from flocsim.arrays import Scene
 from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
-from flocsim.errors import UsageError
-from flocsim.fields import flag, is_number, quantity
+from flocsim.errors import RangeError, UsageError
+from flocsim.fields import flag, in_unit, quantity, word_or_quantity
 from flocsim.geometry.contact.circle_tree import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.laws import LAWS
@@ -23,9 +23,13 @@ NO_SMOOTHING = (1.0, 0.0, 0.0)
 
 
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
-    """``length`` finite numbers as a tuple of floats; UsageError for anything else."""
+    """``length`` finite numbers, or texts such as "5 um", as a tuple of floats; UsageError for
+    anything else."""
     try:
-        numbers = tuple(float(value) for value in values)
+        listed = [] if isinstance(values, str) else list(values)
+        numbers = tuple(float(in_unit(value, unit, name)) for value in listed)
+    except RangeError:
+        raise
     except (TypeError, ValueError):
         numbers = ()
     if len(numbers) != length or not all(math.isfinite(number) for number in numbers):
@@ -84,16 +88,6 @@ def check_shape(instance: object, attribute: attrs.Attribute, value: Any) -> Non
         )
 
 
-def check_positive_or_none(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if value is not None and not (is_number(value) and value > 0.0):
-        raise UsageError(f"{attribute.name} must be a finite number above 0, found {value!r}")
-
-
-def check_depth(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if value != "sphere":
-        check_positive_or_none(instance, attribute, value)
-
-
 @attrs.frozen(eq=False)
 class Body:
     """A rigid shape with a mass, a place and a motion.
@@ -109,13 +103,9 @@ class Body:
     angle: float = quantity("rad", default=0.0)
     velocity: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_velocity)
     spin: float = quantity("rad/s", default=0.0)
-    surface_density: float | None = attrs.field(
-        default=None, kw_only=True, validator=check_positive_or_none
-    )
-    density: float | None = attrs.field(
-        default=None, kw_only=True, validator=check_positive_or_none
-    )
-    depth: float | str = attrs.field(default="sphere", kw_only=True, validator=check_depth)
+    surface_density: float | None = quantity("kg/m^2", above=0.0, default=None, kw_only=True)
+    density: float | None = quantity("kg/m^3", above=0.0, default=None, kw_only=True)
+    depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere", kw_only=True)
     fixed: bool = flag(default=False)
 
     def __attrs_post_init__(self) -> None:

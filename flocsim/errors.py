@@ -53,6 +53,14 @@ class ShapeError(UsageError, ValueError):
     """Vertices or a radius that do not make a body."""
 
 
+class PlausibilityWarning(UserWarning):
+    """What is possible, and done, but implausible: a value far out of its usual range, say."""
+
+
+class KernelWarning(UserWarning):
+    """A run has ended where a force gives no number: it names the force, the file and the line."""
+
+
 class KernelError(UsageError):
     """A force's kernel that cannot be used: it names the force, the file and the line."""
 

@@ -26,6 +26,9 @@ from flocsim.forces.check import (
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.plausibility.doubts import doubts_of
+from flocsim.plausibility.reynolds import all_settled
+from flocsim.plausibility.settling import terminal_speed
 
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}
@@ -58,7 +61,8 @@ STABLE = 2.0
 
 
 def explain(system: Any) -> str:
-    """The report of System.explain() as text: forces, machinery, time scales."""
+    """The report of System.explain() as text: forces, machinery, settling, time scales, and what
+    is implausible."""
     return "\n".join(
         [
             heading(system),
@@ -66,7 +70,9 @@ def explain(system: Any) -> str:
             *machinery_lines(system),
             "in:  recording: every accepted step; run(record=False) keeps start and end only",
             "out: events and observer: a plain run awaits none; an ensemble puts its own",
+            *settling_lines(system),
             *scale_lines(system),
+            *(f"warning: {line}" for line in doubts_of([system])),
         ]
     )
 
@@ -203,6 +209,11 @@ def history_line(system):
     if any(holds_slip(system, force) for force in forces):
         return "in:  tangential history: displacements are kept while a contact lasts"
     return "idle: tangential history: no tangential stiffness, displacements carry no force"
+
+
+def settling_lines(system):
+    """A line for every kind of body that settles: its speed, Reynolds and Stokes number."""
+    return [f"settling: a body of {each.words}" for each in all_settled(system) if each.speed > 0.0]
 
 
 def exerts_torque(system, force):
@@ -344,7 +355,8 @@ def pair_scales(system):
 
 
 def body_scales(system):
-    """Stokes relaxation m/(6πγ r) and the time of settling by a radius, of the free bodies."""
+    """Stokes relaxation m/(6πγ r), at rest, and the time of settling by a radius, of the free
+    bodies."""
     force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
     free = [body for body in system.bodies if not body.fixed]
     if force is None or not free:
@@ -356,9 +368,8 @@ def body_scales(system):
             0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
         )
         resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
-        load = math.hypot(*force(at_rest, known)[:2])
-        sinks = load > 0.0 and resistance > 0.0
-        settling.append(radius * resistance / load if sinks else math.inf)
+        speed = terminal_speed(system, body)
+        settling.append(radius / speed if speed > 0.0 else math.inf)
         relaxation.append(decay_time(body.mass, resistance))
     return [
         Scale("Stokes relaxation", min(relaxation), True),

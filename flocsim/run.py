@@ -1,5 +1,6 @@
 """Run: one run of a scene in progress, and the only caller of a driver."""
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -77,6 +78,15 @@ class Run:
                 self.work = with_capacity(self.work, 2 * len(self.work.candidates))
             elif code != Status.RECORD_FULL:
                 return Status(code)
+
+    def copy(self) -> "Run":
+        """The same run with arrays of its own: either may go on."""
+        other = copy.copy(self)
+        other.work = Work(*(array.copy() for array in self.work))
+        other.clock, other.counts = self.clock.copy(), self.counts.copy()
+        other.observed, other.record = self.observed.copy(), self.record.copy()
+        other.saved = list(self.saved)
+        return other
 
     def to_end(self, halted: Callable[[], bool] | None = None) -> Status:
         """Go on until the run has ended: its Status; PAUSED where ``halted()`` said to give up."""

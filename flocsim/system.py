@@ -1,6 +1,7 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from itertools import combinations
 from typing import Any
@@ -8,79 +9,42 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import NOW, TOLERANCE, Scene, work_of
+from flocsim.arrays import (
+    ERROR,
+    EVALUATIONS,
+    NOW,
+    RADIUS,
+    TIME,
+    TOLERANCE,
+    UNTIL,
+    Scene,
+    Work,
+    work_of,
+)
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
-from flocsim.errors import UsageError
+from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.explain import explain
-from flocsim.fields import is_number, is_whole
+from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.smoothing import smoothing_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
-from flocsim.integrators.amplification import MOST_AMPLIFIED, amplification_of
+from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
+from flocsim.plausibility.doubts import warn_of
 from flocsim.run import Run
+from flocsim.trajectories.blame import UNABLE, force_to_blame
+from flocsim.trajectories.replay import Origin
+from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 
 Fillings = dict[Callable, Callable]
 """{hook of flocsim.hooks.HOOKS: the function in its place}."""
-
-
-@attrs.frozen(eq=False)
-class Trajectory:
-    """What happened in a run of n bodies.
-
-    ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
-    at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
-    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], what
-    the errors of steps and of switches have led to by the end (nan where the method estimates
-    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a nudge (None
-    where that was not asked for): above MOST_AMPLIFIED, 10, the error is no promise, and
-    ``error_text`` says so.
-    """
-
-    t: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    status: Status
-    steps: int
-    rejected: int
-    evaluations: int
-    error: float
-    wall_time: float
-    amplification: float | None = None
-
-    @property
-    def error_text(self) -> str:
-        """What can be said of the error at the end, in words."""
-        if not np.isfinite(self.error):
-            return "the method states no error"
-        stated = f"stated error {self.error:.2g} m"
-        if self.amplification is None:
-            return stated
-        if self.amplification > MOST_AMPLIFIED:
-            return (
-                f"{stated}, which is no promise: the motion amplifies a nudge "
-                f"{self.amplification:.2g} times"
-            )
-        return f"{stated}; the motion amplifies a nudge {self.amplification:.2g} times"
-
-    @classmethod
-    def of(
-        cls, run: Run, status: Status, wall_time: float, amplification: float | None = None
-    ) -> "Trajectory":
-        """What a Run has come to."""
-        times, position, velocity = run.motion()
-        adaptive = np.isfinite(run.clock[TOLERANCE])
-        return cls(
-            times, position, velocity, status, run.steps, run.rejected, run.evaluations,
-            run.error if adaptive else float("nan"), wall_time, amplification,
-        )  # fmt: skip
 
 
 def as_tuple(values: Any, what: str) -> tuple:
@@ -132,7 +96,7 @@ def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -
         raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class System:
     """Bodies in a fluid, the forces on them, and the method that moves them.
 
@@ -153,6 +117,12 @@ class System:
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
 
+    def __repr__(self) -> str:
+        n = len(self.bodies)
+        words = [f"{n} {'body' if n == 1 else 'bodies'}"]
+        words += [type(force).__name__ for force in self.forces]
+        return f"System({', '.join([*words, type(self.integrator).__name__])})"
+
     @property
     def spheres_only(self) -> bool:
         """Whether no body has an edge."""
@@ -166,11 +136,26 @@ class System:
         pieces = self.pieces
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
-            laws=law_table(pieces.laws, jit=jit),
+            laws=self.laws(jit=jit),
             surface_reach=pieces.surface_reach, 
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
         )  # fmt: skip
+
+    def laws(self, *, jit: bool = True) -> Any:
+        """The laws of the scene as the drivers call them.
+
+        KernelError for one that cannot be compiled: it names the force.
+        """
+        try:
+            return law_table(self.pieces.laws, jit=jit)
+        except KernelError as error:
+            for name, force in self.pieces.used.items():
+                try:
+                    law_table(laws_of([force], self.fluid).laws, jit=jit)
+                except KernelError as its_own:
+                    raise KernelError(f"{name}: {its_own}") from None
+            raise error from None
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity (n, 3) at the start."""
@@ -207,23 +192,73 @@ class System:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
 
     def run(
-        self, until: float, *, max_steps: int = 1_000_000, record: bool = True,
-        amplification: bool = False, jit: bool = True,
+        self, until: float | str, *, max_steps: int = 1_000_000, record: bool = True,
+        amplification: bool = False, jit: bool = True, start: Trajectory | None = None,
+        watch: Watch | None = None,
     ) -> Trajectory:  # fmt: skip
-        """Move the bodies until a time [s] and return the Trajectory.
+        """Move the bodies until a time, in s or as "20 ms", and return the Trajectory.
 
-        A run that ends early says why in ``Trajectory.status``; it raises no exception.
+        A run that ends early says why in ``Trajectory.status``; it raises no exception. Where a
+        force is to blame that gives no number, a KernelWarning names it, with file and line.
         ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
+        ``start``: begin where another run of the same shapes has ended, at its time, in its motion
+        and with the tangential displacements of its contacts; forces, masses and the method may be
+        others. ``watch(state)`` is called between two steps (some 0.1 ms each) and stops the run,
+        as STOPPED, where it returns what counts as true. A PlausibilityWarning says, once for each,
+        what of the scene is implausible.
         """
-        check_limits(until, max_steps)
-        self.check_overlaps()
+        end: float = in_unit(until, "s", "until")
+        check_limits(end, max_steps)
+        if start is None:
+            self.check_overlaps()
+        elif amplification:
+            raise UsageError("amplification is that of a whole run: leave start out")
+        if watch is not None and not callable(watch):
+            raise UsageError(f"watch must be a function of a State, found {watch!r}")
+        warn_of(self, stacklevel=2)
         began = time.perf_counter()
-        run = self.begin(until, max_steps=max_steps, record=record, jit=jit)
-        status = run.to_end()
+
+        def fresh(record: bool = False) -> Run:
+            run = self.begin(end, max_steps=max_steps, record=record, jit=jit)
+            return run if start is None else self.placed_at_end(run, start)
+
+        run = fresh(record)
+        status = watched(run, watch)
+        if status in UNABLE and (why := force_to_blame(self, run)):
+            warnings.warn(f"the run has ended at t = {run.time:.6g} s ({status.name}): {why}",
+                          KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
             growth = self.amplification(run.time, run.work.motion[NOW, :, :3], max_steps, jit=jit)
-        return Trajectory.of(run, status, time.perf_counter() - began, growth)
+        legs = ((run.steps, end),)
+        origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
+        return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
+
+    def placed_at_end(self, run: Run, start: Trajectory) -> Run:
+        """A fresh Run put where another has ended, with the history of its contacts.
+
+        UsageError where that has other shapes, or has come as far as this one is to go.
+        """
+        origin = start.known()
+        if run.clock[UNTIL] <= start.t[-1]:
+            raise UsageError(
+                f"until must be a time above {start.t[-1]:g} s, at which start has ended, found "
+                f"{run.clock[UNTIL]:g}"
+            )
+        scene = origin.ended.scene
+        if not all(
+            np.array_equal(getattr(run.scene, name), getattr(scene, name))
+            for name in ("first", "vertices")
+        ) or not np.array_equal(run.scene.bodies[:, RADIUS], scene.bodies[:, RADIUS]):
+            raise UsageError("start must be a run of the same shapes in the same order")
+        run.work = Work(*(array.copy() for array in origin.ended.work))
+        run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
+        run.work.tally[EVALUATIONS] = 0
+        run.clock[TIME] = start.t[-1]
+        if np.isfinite(start.error) and np.isfinite(run.clock[TOLERANCE]):
+            run.clock[ERROR] = start.error
+        run.saved = [run.row_now()]
+        return run
 
     def amplification(
         self, until: float, end: np.ndarray, max_steps: int = 1_000_000, *,
@@ -267,6 +302,7 @@ class System:
     def explain(self) -> str:
         """What is compiled into this scene and what is left out, each with its reason, as text.
 
-        Ends with the scene's time scales and the step that an explicit method would need.
+        Ends with Reynolds numbers, the scene's time scales, the step that an explicit method would
+        need, and a line on everything that is implausible.
         """
         return explain(self)

@@ -40,7 +40,7 @@ WRONG_BODIES = {
     "two masses": ({"surface_density": 2.0, "density": 2650.0}, "not both"),
     "no surface density": ({"surface_density": 0.0}, "surface_density must be .* above 0"),
     "a density of nan": ({"density": float("nan")}, "density must be"),
-    "a density in words": ({"density": "2650 kg/m^3"}, "density must be"),
+    "a density of another kind": ({"density": "2650 kg/m^2"}, "density must be a density such as"),
     "a depth in words": ({"density": 2650.0, "depth": "disk"}, "depth must be"),
     "a negative depth": ({"density": 2650.0, "depth": -1e-6}, "depth must be"),
     "a place in space": ({"density": 1.0, "position": (0, 0, 0)}, "position must be 2 finite"),

@@ -2,12 +2,14 @@
 benchmarks/faults/fuzz_readers.py does, in this process."""
 
 import random
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
+from tests.helpers import hostile_files
 
 EXAMPLES = 40
 
@@ -48,3 +50,35 @@ def test_some_are_read_and_some_are_refused(readers, kind):
     }
     assert ends <= {"read", "refused"}
     assert "refused" in ends
+
+
+def test_making_them_writes_into_no_other_file(tmp_path, monkeypatch):
+    """Data that a file says lie elsewhere are somebody's: whoever runs this must not lose them."""
+    precious = tmp_path / "precious"
+    precious.write_bytes(b"root:x:0:0")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(hostile_files, "ELSEWHERE", str(precious))
+    replaced = hostile_files.valid_results(tmp_path)
+    before = {path.name for path in tmp_path.iterdir()}
+    for number in range(300):
+        rng = random.Random(number)
+        data = replaced
+        for _ in range(3):
+            data = hostile_files.changed_hdf5(rng, data)
+    image = hostile_files.io.BytesIO(replaced)
+    with hostile_files.h5py.File(image, "r+") as file:
+        file.create_dataset("elsewhere", (4,), "u1", external=[(str(precious), 0, 4)])
+        for number in range(50):
+            hostile_files.change_values(random.Random(number), file, "elsewhere")
+    assert precious.read_bytes() == b"root:x:0:0"
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_no_test_names_a_file_of_the_system_as_storage():
+    found = [
+        path for path in Path(__file__).parent.rglob("*.py")
+        if path != Path(__file__) and any(
+            each in path.read_text("utf-8") for each in ('external=[("/', 'ExternalLink("/')
+        )
+    ]  # fmt: skip
+    assert found == []

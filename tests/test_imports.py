@@ -22,8 +22,11 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
-    ["system", "io"],
+    ["system"],
+    ["trajectories"],
+    ["io"],
     ["explain", "run"],
+    ["plausibility"],
     ["forces", "integrators"],
     ["body"],
     ["geometry", "laws"],
@@ -41,6 +44,7 @@ INNER_ROWS = {
         ["disk_cache", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
+    "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit", "parts"],
@@ -50,13 +54,13 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["cli"],
-        ["dry_run", "runner", "report"],
+        ["cli", "studies"],
+        ["dry_run", "runner", "report", "unfinished"],
         ["parallel"],
         ["pilot"],
         ["estimates"],
         ["storage"],
-        ["study"],
+        ["study", "doubts"],
         ["preflight"],
         ["impact"],
         ["collision"],
@@ -65,13 +69,14 @@ INNER_ROWS = {
     "io": [
         ["plots"],
         ["shapes", "trajectory"],
-        ["images", "results", "journal"],
-        ["outputs"],
+        ["images", "results", "journal", "exchange"],
+        ["outputs", "opening"],
         [
             "files",
             "own_mark",
             "hdf5",
             "json_text",
+            "labelled",
             "provenance",
             "confidence",
             "markdown",
@@ -85,8 +90,9 @@ INNER_ROWS = {
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/mpi.py"],
     "h5py": [
-        "io/results/file.py",
+        "io/opening.py",
         "io/results/layout.py",
+        "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",
     ],
@@ -94,6 +100,9 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
+    "gsd": ["io/exchange/gsd_file.py"],
+    "xarray": ["io/labelled.py"],
+    "pandas": ["io/labelled.py"],
 }
 MOST_FILES = 15
 """Of a folder: more are found by their prefixes, not by their room."""

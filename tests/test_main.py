@@ -75,7 +75,7 @@ def test_flocsim_ensemble_is_the_ensemble_command(tmp_path):
 
 @pytest.mark.parametrize("words", [["--dry-run", "--no-pilot"], ["--output", "a.h5"]])
 def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
-    write_small(tmp_path, vertices="[1]")
+    write_small(tmp_path, vertices="[1]", types='["III"]')  # the others settle implausibly fast
     job = subprocess.Popen(
         command("ensemble", "small.toml", *words, module="flocsim"),
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -92,7 +92,7 @@ def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
 def study(tmp_path_factory):
     """A folder with a config of spheres and results of it."""
     folder = tmp_path_factory.mktemp("study")
-    write_small(folder, vertices="[1]")
+    write_small(folder, vertices="[1]", types='["III"]')  # the others settle implausibly fast
     write_results(folder / "r.h5", make_results(types=("I",), vertices=(1,), delta=(0.0,), count=5))
     return folder
 

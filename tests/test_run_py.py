@@ -146,10 +146,20 @@ def test_install_is_repeated_only_when_something_new_is_needed(stage):
         return [line for line in stage.run(command)[0] if "pip install" in line]
 
     assert installs("demo") and not installs("demo")
-    assert installs("setup") == [".venv/bin/python -m pip install -e .[mpi,test,dev]"]
+    pip = ".venv/bin/python -m pip install -e "
+    assert installs("setup") == [pip + ".[mpi,test,dev]"]
+    assert installs("test") == [pip + ".[docs]", pip + ".[formats]"]
     assert not installs("setup") and not installs("test") and not installs("demo")
     (stage.folder / "pyproject.toml").write_text("[project]\nname = 'flocsim'")
     assert installs("demo") and installs("setup")
+
+
+def test_what_only_some_tests_need_may_be_missing(stage, capsys):
+    stage.exit_codes["[formats]"] = 1
+    commands, code = stage.run("test")
+    assert code == 0 and "-m pytest" in commands[-1]
+    assert "could not install formats; their tests are skipped" in capsys.readouterr().out
+    assert any("[formats]" in line for line in stage.run("test")[0])  # asked for again
 
 
 def test_half_made_venv_is_made_anew(stage):

@@ -80,7 +80,7 @@ def settings_of(config, condition, auto):
 def measure(study, choice, condition, arguments):
     """{setting: (flips, CPU time of a replicate [s])} of a type."""
     config = study.config
-    name = config.scene.conditions[condition][0]
+    name = config.scene.names[condition]
     settings = settings_of(config, condition, choice.methods[name])
     steps = config.integrator.max_steps
     pilot = len(sample_of(config)[condition])
@@ -117,7 +117,7 @@ def judge(name, text, arguments, table):
     target = ALLOWED * sampling_error(config)
     print("\n".join(f"{name}: {line}" for line in choice_lines(choice.record)), flush=True)
     # A type each: of several the pilot's time would have to be shared out.
-    assert len(config.scene.conditions) == 1
+    assert len(config.scene.names) == 1
     found, count = measure(study, choice, 0, arguments)
     share = {setting: flips / count for setting, (flips, _) in found.items()}
     cost = {setting: seconds for setting, (_, seconds) in found.items()}

@@ -47,6 +47,7 @@ def made_up_rows(seed, count):
     for number, name in enumerate(COLUMNS):
         drawn = np.random.default_rng([seed, number]).random(count)
         rows[name] = drawn if ROW[name].kind == "f" else (100.0 * drawn).astype("i8")
+    rows["d_c_over_D_0"] = rows["d_c_collision"] / rows["D_0"]
     rows["outcome"] %= 6
     inside = np.array([1, 1, 0, 0, NOT_APPLICABLE, NOT_APPLICABLE], "u1")
     rows["inside"] = inside[rows["outcome"]]

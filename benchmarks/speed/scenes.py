@@ -99,7 +99,7 @@ def collision(kind, preset, vertices=64, replicate=0, share=0.5, start_gap=2e-7)
     ``kind`` is the type, "I" to "III"; ``share`` the displacement over δ_max.
     """
     study = collision_study(preset, vertices, start_gap)
-    condition = [name for name, _, _ in study.config.scene.conditions].index(kind)
+    condition = study.config.scene.names.index(kind)
     numbers = draws(study.config.seed, replicate)
     encounter = study.encounter(condition, vertices, numbers)
     return replicate_system(encounter, orientations(numbers), share)

@@ -117,7 +117,7 @@ def compare(study, preset, condition, counts, budget, table):
     solver, by_scipy = best_scipy(few, part, allowed_few, own_few)
     ratios = ratio(by_verlet, own), ratio(by_scipy, own_few)
     table.add(
-        preset, study.config.scene.conditions[condition][0], f"{wrong}/{len(cases)}",
+        preset, study.config.scene.names[condition], f"{wrong}/{len(cases)}",
         1e3 * all_own.cpu, f"{allowed}/{len(some)}", f"{step:.1e}" if step else "none",
         1e3 * by_verlet.cpu if by_verlet else "-", ratios[0], f"{allowed_few}/{len(few)}", solver,
         1e3 * by_scipy.cpu if by_scipy else "-", ratios[1],

@@ -96,7 +96,7 @@ def rates(study, markdown):
         ("type", "N", "replicates", "per s", "with set-up", "median ms", "median steps",
          "slowest/median steps", "in time", "undecided %", "failed %"),
     )  # fmt: skip
-    names = [name for name, _, _ in study.config.scene.conditions]
+    names = list(study.config.scene.names)
     for vertices in study.config.shapes.vertices:
         found = {n: run_type(study, c, vertices) for c, n in enumerate(names)}
         for name, runs in found.items():

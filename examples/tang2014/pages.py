@@ -44,8 +44,8 @@ def write(folder, config, library, readings):
 def zones_of(config):
     """{type: D_0 [m]}."""
     return {
-        name: zone_distance(config.zone, config.forces, radius_i, radius_j)
-        for name, radius_i, radius_j in config.scene.conditions
+        name: zone_distance(config.zone, config.forces, *radii)
+        for name, radii in config.scene.given
     }
 
 

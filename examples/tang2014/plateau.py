@@ -20,7 +20,6 @@ from output import marked, save_all, write_page
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.collision.encounter import Record
-from flocsim.ensembles.collision.settling import terminal_motion
 from flocsim.ensembles.collision.zone import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
@@ -28,6 +27,7 @@ from flocsim.io.confidence import proportion
 from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
 from flocsim.io.trajectory import centre_distance
+from flocsim.plausibility.settling import terminal_motion
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)
@@ -41,7 +41,7 @@ SHOWN = 0
 
 def pair_of(study, kind):
     """(r*, L) of a type: reduced radius [m] and the largest load of settling on a bond [N]."""
-    _, radius_i, radius_j = study.config.scene.conditions[kind]
+    radius_i, radius_j = study.pairings[kind].radii
     system = study.encounter(kind, 1, np.zeros(4)).system
     motions = [terminal_motion(system, body) for body in system.bodies]
     drift = np.hypot(*(motions[1][0] - motions[0][0]))
@@ -112,7 +112,7 @@ def nearest_approach(study, kind, replicate):
     times, position, _ = record.arrays()
     distance = centre_distance(position)
     after = distance[times >= row["t_collision"]] if row["inside"] <= 1 else distance
-    _, radius_i, radius_j = study.config.scene.conditions[kind]
+    radius_i, radius_j = study.pairings[kind].radii
     return row["outcome"], after.min() - radius_i - radius_j
 
 

@@ -9,7 +9,7 @@ import itertools
 import math
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -19,15 +19,16 @@ from flocsim.arrays import NOW
 from flocsim.ensembles.collision.checking import TIGHTER, exact_method
 from flocsim.ensembles.collision.encounter import Encounter, replicate_row
 from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
-from flocsim.ensembles.config.quantities import read_quantity
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.preflight import check_study, measured_flocs
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import ConfigError, FlocsimError, UsageError
+from flocsim.fields.quantities import read_quantity
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance, nudge_of, nudged
@@ -100,7 +101,8 @@ def add_parser(subparsers: Any) -> None:
         "that of the config)")  # fmt: skip
     add("--size", nargs=2, metavar=("LOW", "HIGH"),
         help="ends of the approaching body's radius, e.g. '1 um' '50 um', in pairs as "
-        "unequal as the config's first (default: its smallest and its largest pair)")  # fmt: skip
+        "unequal as the config's first (default: its smallest and its largest pair); of measured "
+        "flocs: those between these radii")  # fmt: skip
     add("--tolerance", nargs=2, metavar=("LOW", "HIGH"),
         help="ends of the tolerance, e.g. '1e-11 m' '1e-7 m' (default: the study's and that of its "
         'second runs; with accuracy = "auto": all that may be chosen)')  # fmt: skip
@@ -138,12 +140,17 @@ def sized(config: Config, sizes: tuple[float, float] | None) -> Config:
     """The config with its smallest and its largest pair alone, or with pairs of these sizes [m]."""
     scene = config.scene
     if sizes is not None:
-        _, radius_i, radius_j = scene.conditions[0]
+        if scene.is_measured:
+            low, high = sizes
+            scene = attrs.evolve(scene, min_radius=low, max_radius=high)
+            return attrs.evolve(config, scene=scene)
+        _, (radius_i, radius_j) = scene.given[0]
         ratio = radius_i / radius_j
         pairs = tuple((float(f"{ratio * size:.3g}"), size) for size in sizes)
         return attrs.evolve(config, scene=attrs.evolve(scene, pairs=pairs))
-    order = sorted(range(len(scene.conditions)), key=lambda k: sum(scene.conditions[k][1:]))
-    return attrs.evolve(config, scene=scene.only(sorted({order[0], order[-1]})))
+    order = sorted(range(len(scene.given)), key=lambda k: sum(scene.given[k][1]))
+    ends = sorted({order[0], order[-1]}) if order else []
+    return attrs.evolve(config, scene=scene.only(ends))
 
 
 def law_of(config: Config) -> Contact | None:
@@ -179,7 +186,10 @@ def stiffnesses(config: Config, given: tuple[float, float] | None) -> list[float
     return [law.k_n / DECADE, law.k_n * DECADE]
 
 
-def methods(config: Config, condition: int, given: tuple[float, float] | None) -> list[Integrator]:
+def methods(
+    config: Config, condition: int, given: tuple[float, float] | None,
+    flocs: Sequence[Floc] | None = None,
+) -> list[Integrator]:  # fmt: skip
     """The method of a type at the ends of its tolerance, the loosest first."""
     integrator = config.integrator
     method = integrator.method
@@ -193,7 +203,7 @@ def methods(config: Config, condition: int, given: tuple[float, float] | None) -
         made: Any = method
         return [attrs.evolve(made, tolerance=each) for each in (high, low)]
     if integrator.is_chosen:
-        length = scene_length(config, condition)
+        length = scene_length(config, condition, flocs)
         return [at_rung(Implicit(), rung * length) for rung in (RUNGS[0], RUNGS[-1])]
     exact = exact_method(method)
     return [method] if exact is None else [method, exact]
@@ -204,14 +214,14 @@ def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
     stated = ends("--stiffness", args.stiffness, "N/m")
     tolerances = ends("--tolerance", args.tolerance, "m")
     counts = sorted({min(config.shapes.vertices), max(config.shapes.vertices)})
-    places = range(len(config.scene.conditions))
+    places, flocs = range(len(config.scene.names)), measured_flocs(config)
     number = itertools.count()
     for place, vertices, k_n in itertools.product(places, counts, stiffnesses(config, stated)):
         for _ in range(args.count):
             # Other displacements and other random numbers each time, as far as there are any.
             at = next(number)
             delta = config.scene.delta[at % len(config.scene.delta)]
-            for method in methods(config, place, tolerances):
+            for method in methods(config, place, tolerances, flocs):
                 yield Case(place, vertices, k_n, method, delta, at % config.replicates)
 
 
@@ -364,7 +374,7 @@ def amplification(scene: Scene, reference: Run, exact: Integrator) -> float:
 
 def line_of(config: Config, case: Case, verdict: Verdict) -> str:
     """A Case and its Verdict as a line of the table."""
-    name = config.scene.conditions[case.condition][0]
+    name = config.scene.names[case.condition]
     k_n = "as given" if math.isnan(case.stiffness) else f"{case.stiffness:g}"
     method = case.method
     step = getattr(method, "step", math.nan)

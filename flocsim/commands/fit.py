@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands.fit_pictures import (
+from flocsim.commands.fitting.pictures import (
     LOST,
     Options,
     fit_pictures,
@@ -13,13 +13,17 @@ from flocsim.commands.fit_pictures import (
     report,
     titles_of,
 )
-from flocsim.errors import ImageError, UsageError
+from flocsim.errors import FileError, ImageError, UsageError
+from flocsim.fields.quantities import read_quantity
 from flocsim.io.files import write_file
+from flocsim.io.images.correction import Correction, label_image, read_names
+from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
-from flocsim.io.plots.shapes import draw_overlay
+from flocsim.io.plots.overlay import draw_overlay
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
+from flocsim.plausibility.ranges import PIXEL_SIZE
 
 DESCRIPTION = """\
 Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
@@ -40,7 +44,8 @@ def add_parser(subparsers: Any) -> None:
     parser.set_defaults(run=run)
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
-    add("--pixel-size", metavar="METRES", help="length of a pixel's side in metres, e.g. 0.95e-6")
+    add("--pixel-size", metavar="LENGTH",
+        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6")  # fmt: skip
     add("--vertices", default="4,8,16,64", metavar="LIST",
         help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
     add("--radius", default="1", metavar="LIST",
@@ -59,8 +64,12 @@ def add_parser(subparsers: Any) -> None:
         help="table of all regions, rejected ones with the reason (default: beside the library, "
         "ending .csv)")  # fmt: skip
     add("--overlay", metavar="FILE",
-        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg); with several "
-        "pictures, one file each: FILE-picture.png")  # fmt: skip
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
+        "what is left out, with the reason; with several pictures, one file each: "
+        "FILE-picture.png")  # fmt: skip
+    add("--masks-out", metavar="FOLDER",
+        help="write a label image of every picture, 0 outside and in each floc its number (PNG of "
+        "16 bits), to be edited and read back by --masks")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add = parser.add_argument_group("finding the flocs").add_argument
     add("--flocs", default="auto", choices=("auto", "bright", "dark"),
@@ -68,6 +77,10 @@ def add_parser(subparsers: Any) -> None:
     add("--background", default="surface", choices=("surface", "median"),
         help="surface: fitted to each picture; median: of all pictures, of one fixed camera "
         "(default: %(default)s)")  # fmt: skip
+    add("--threshold", metavar="CONTRAST",
+        help="contrast from which a pixel belongs to a floc, above 0 to 1: of dark flocs the share "
+        "of the light that they take, of bright ones the grey above the background, white being 1 "
+        "(default: found for each picture, and printed)")  # fmt: skip
     add("--noise-scale", default="1", metavar="PX",
         help="detail finer than this is noise (default: %(default)s)")  # fmt: skip
     add("--saturated", default="0.001", metavar="SHARE",
@@ -76,13 +89,19 @@ def add_parser(subparsers: Any) -> None:
     add("--min-radius", default="4", metavar="PX",
         help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
     add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
-    add("--max-blur", default="0.4", metavar="SHARE",
-        help="softness of the edge, as a share of r_eq, from which a region is out of focus; "
-        "inf: keep all (default: %(default)s)")  # fmt: skip
-    add("--neck", default="0.5", metavar="SHARE",
+    add("--max-blur", default="0.25", metavar="SHARE",
+        help="softness, as a share of r_eq, that half of an outline has to stay below, or the "
+        "region is out of focus; inf: keep all (default: %(default)s)")  # fmt: skip
+    add("--neck", metavar="SHARE",
         help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
-        "never (default: %(default)s)")  # fmt: skip
+        "never (default: 0.5, but never in a picture of fractal aggregates, where most regions "
+        "with necks would become four flocs or more)")  # fmt: skip
     add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
+    add("--drop", metavar="LIST",
+        help="flocs to leave out, by the numbers of the overlay and the table: 3,5 with one "
+        "picture, 023.png#3,5 with several")  # fmt: skip
+    add("--keep", metavar="LIST", help="fit these regions only, named as for --drop")
+    add("--add", metavar="LIST", help="fit these as well, though they would be left out")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,12 +115,21 @@ def run(args: argparse.Namespace) -> int:
     outputs = [Output(args.output, rule), Output(summary, rule)]
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
+    if args.masks_out is not None:
+        made_folder(args.masks_out)
+        made = label_paths(args.masks_out, titles_of(paths)).values()
+        outputs += [Output(path, rule) for path in made]
     check_outputs(outputs, paths)
+    doubt = PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
+    if doubt:
+        report(f"warning: {doubt}")
     try:
         pictures, fits, lost = fit_pictures(paths, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
+    if args.masks_out is not None:
+        write_labels(args.masks_out, pictures, titles_of(paths), rule)
     flocs = [(picture, region) for picture in pictures for region in picture.regions]
     several = len(options.radii) > 1
     entries = [
@@ -115,7 +143,7 @@ def run(args: argparse.Namespace) -> int:
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return LOST if lost else 2
     settings = {"method": options.method, "preserve_area": options.preserve_area,
-                "inscribed": options.inscribed}  # fmt: skip
+                "inscribed": options.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:
@@ -134,7 +162,7 @@ def read_options(args):
     if args.pixel_size is None:
         raise UsageError(
             "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
-            "of its side in metres, for example --pixel-size 0.95e-6"
+            "of its side, for example --pixel-size '0.95 um'"
         )
     if args.inscribed and (args.preserve_area or args.method != "pattern"):
         raise UsageError(
@@ -143,17 +171,27 @@ def read_options(args):
         )
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
     endless = args.max_blur.strip() == "inf"
+    threshold = args.threshold
+    if threshold is not None:
+        threshold = number("--threshold", threshold, "a contrast above 0, to 1", 5e-324, 1.0)
+    correction = {
+        key: () if text is None else read_names(f"--{key}", text)
+        for key, text in (("drop", args.drop), ("keep", args.keep), ("add", args.add))
+    }
     segmentation = {
         "flocs": args.flocs,
+        "threshold": threshold,
         "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
         "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
         "min_radius": positive("--min-radius", args.min_radius),
         "max_radius": limit,
         "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
-        "neck": number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+        "neck": None
+        if args.neck is None
+        else number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
     }
     return Options(
-        pixel_size=positive("--pixel-size", args.pixel_size, "a length in metres"),
+        pixel_size=length("--pixel-size", args.pixel_size),
         vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
         radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
         method=args.method,
@@ -164,6 +202,7 @@ def read_options(args):
         background=args.background,
         jobs=whole("--jobs", args.jobs),
         segmentation=segmentation,
+        correction=Correction(**correction),
     )
 
 
@@ -181,10 +220,64 @@ def positive(option, text, meaning="pixels"):
     return number(option, text, f"{meaning}, a number above 0", 5e-324, 1.7e308)
 
 
+def length(option, text):
+    """A length above 0 [m]: "0.95 um", or a number of metres."""
+    hint = ""
+    try:
+        value = read_quantity(text, "m")
+    except ValueError as reason:
+        hint = f" ({reason})" if str(reason) and not is_float(text) else ""
+        value = float(text) if is_float(text) else 0.0
+    if not 0.0 < value < float("inf"):
+        raise UsageError(
+            f"{option} takes a length above 0 such as '0.95 um', or in metres, found {text!r}{hint}"
+        )
+    return value
+
+
+def is_float(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def whole(option, text):
     if not text.strip().isdecimal() or int(text) < 1:
         raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
     return int(text)
+
+
+def made_folder(name):
+    """Make the folder of --masks-out; FileError where that cannot be."""
+    try:
+        Path(name).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"--masks-out {name} could not be made: {error.strerror}; name another folder"
+        ) from error
+
+
+def label_paths(folder, names):
+    """{name of a picture: path of its label image}, all different."""
+    paths: dict[str, Path] = {}
+    for name in names:
+        plain = name.replace(":", "-").replace("/", "-")
+        stem = Path(plain).stem if Path(plain).suffix.lower() in MASK_SUFFIXES else plain
+        path = Path(folder, f"{stem}.png")
+        while path in paths.values():  # a.png and a.tif
+            path = path.with_name(f"{path.stem}'.png")
+        paths[name] = path
+    return paths
+
+
+def write_labels(folder, pictures, titles, rule):
+    """Write the label images of --masks-out, of what is fitted; titles: of all files."""
+    paths = label_paths(folder, dict.fromkeys([*titles, *(each.name for each in pictures)]))
+    for picture in pictures:
+        image = label_image(picture.found.foreground.shape, picture.regions, picture.name)
+        write_file(paths[picture.name], image, rule)
 
 
 def overlay_paths(overlay, names, several):

@@ -4,21 +4,30 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections import Counter
 from typing import Any
+
+import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.report import checked_line, efficiency_lines, format_table
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
+from flocsim.io import trajectory
+from flocsim.io.opening import kind_of
+from flocsim.io.results import sweep_file
 from flocsim.io.results.file import OUTCOMES, read_overview, read_results
+from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import BONDS
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
-APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy")
+APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
+         "warnings", "settling")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -27,11 +36,12 @@ MOST_FAILURES = 10
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
-        help="describe a results file",
-        description="Print what a results file holds: conditions, counts, probabilities with "
-        "95 % intervals, and where it came from.",
+        help="describe a results file, a running study, a library, a trajectory or a sweep",
+        description="Print what a file holds: conditions, counts, probabilities with 95 %% "
+        "intervals, and where it came from. Of a study that still runs or was interrupted, its "
+        "replicates so far, without touching it.",
     )
-    parser.add_argument("results", help="results file that flocsim ensemble wrote")
+    parser.add_argument("results", help="file that flocsim wrote, or is to write")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
@@ -39,11 +49,14 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: Namespace) -> int:
-    if not args.config and is_library(args.results):
-        print(library_text(args.results))
+    journal = journal_of(args.results)
+    if journal is not None:
+        if args.config:
+            raise FileError(f"{journal} holds no config: it is of a run that has not ended")
+        print(unfinished_text(read_unfinished(journal)))
         return 0
     if not args.config:
-        print(results_text(args.results, *read_overview(args.results)))
+        print(text_of(args.results))
         return 0
     results = read_results(args.results, replicates=False)
     if results.run.get("config"):
@@ -51,6 +64,18 @@ def run(args: Namespace) -> int:
     else:
         raise FileError(f"{args.results} holds no config: it was not written by flocsim ensemble")
     return 0
+
+
+def text_of(path):
+    """What a file holds, of whatever kind it is."""
+    kind = kind_of(path)
+    if kind == trajectory.KIND:
+        return trajectory_text(path)
+    if kind == sweep_file.FORMAT:
+        return sweep_text(path)
+    if kind != FORMAT and is_library(path):
+        return library_text(path)
+    return results_text(path, *read_overview(path))
 
 
 def library_text(path):
@@ -71,24 +96,108 @@ def library_text(path):
 
 def results_text(path, results, totals):
     try:
-        facts = conditions(results) + outcomes(results, totals)
+        facts = conditions(results) + sizes(results, totals) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
         if choice := stored(results.run, "accuracy"):
             facts += [("accuracy", visible(line, "")) for line in choice_lines(choice)]
-        facts += origin(results.run)
+        facts += settling(results.run) + origin(results.run)
+        doubts = [visible(line, "") for line in stored(results.run, "warnings")]
         notes = stored(results.run, "failed")
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
     lines += [f"{name:<{width}}  {value}" for name, value in facts]
+    if doubts:
+        lines += ["", *(f"warning: {line}" for line in doubts)]
     if notes:
         shown = [visible(describe_note(note), keep="") for note in notes[:MOST_FAILURES]]
         lines += ["", *(f"failed: {note}" for note in shown)]
     if len(notes) > MOST_FAILURES:
         lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-    return "\n".join([*lines, "", table])
+    return "\n".join([*lines, *efficiency_block(results), "", table])
+
+
+def efficiency_block(results):
+    """The efficiencies, if there are any, behind an empty line."""
+    lines = efficiency_lines(results)
+    return ["", *lines] if lines else []
+
+
+def trajectory_text(path):
+    """What a trajectory file holds."""
+    found = trajectory.read_trajectory(path)
+    moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+    facts = [
+        ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
+        *((f"body {number}", f"N = {len(shape.vertices)}, r_eq {1e6 * shape.equivalent_radius:.4g} "
+           f"µm, moved {1e6 * way:.4g} µm")
+          for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
+    ]  # fmt: skip
+    if len(found.shapes) == 2:
+        apart = 1e6 * trajectory.centre_distance(found.position)
+        facts.append(
+            ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
+             f"{apart[-1]:.4g} at last")
+        )  # fmt: skip
+    for name, value in found.facts.items():
+        if name != "config":
+            told = f"{value:.6g}" if isinstance(value, float) else str(value)
+            facts.append((visible(name.replace("_", " "), ""), visible(told, "")))
+    width = max(len(name) for name, _ in facts)
+    return "\n".join([f"{path}: a trajectory", "", *(f"{n:<{width}}  {v}" for n, v in facts)])
+
+
+def sweep_text(path):
+    """What the joined file of a sweep holds: Pr[A] at every value."""
+    swept, groups = sweep_file.read_sweep(path)
+    table = groups["probabilities"]
+    lines = [f"{path}: a sweep", ""]
+    for name, each in swept.items():
+        unit = "" if each.unit == "1" else f" {each.unit}"
+        values = ", ".join(visible(f"{v:g}" if isinstance(v, float) else str(v), "")
+                           for v in each.values)  # fmt: skip
+        lines.append(f"{visible(each.key, '')} (as {visible(name, '')}): {values}{unit}")
+    rows = [(*swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
+    axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
+    columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
+    for place in np.ndindex(*columns[0].shape):
+        names = [axis[k] for axis, k in zip(axes, place, strict=True)]
+        n, value, low, high = (column[place] for column in columns)
+        told = (f"{value:.3f}", f"[{low:.3f}, {high:.3f}]") if value == value else ("-", "-")
+        words = [visible(f"{each:g}" if isinstance(each, float) else str(each), "")
+                 for each in names]  # fmt: skip
+        rows.append((*words, str(n), *told))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join([*lines, "", *aligned])
+
+
+def unfinished_text(found):
+    """What a run that has not ended has so far; nothing of it is final."""
+    results, last = found.results, found.sessions[-1]
+    reasons = Counter(str(note["why"]) for note in found.notes)
+    planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
+    counts = results.probabilities["n_total"]
+    facts = [
+        ("types", ", ".join(visible(name, "") for name in results.types)),
+        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
+         f"{planned}"),
+        ("numerical error", checked_line(results) or "unknown: none was run again yet"),
+        ("begun", visible(f"{last['date']} by {last['command']}", "")),
+    ]  # fmt: skip
+    if found.unread:
+        facts.append(("damaged", f"{found.unread} bytes of rows, left out"))
+    lines = [f"{found.path}: {found.progress}", ""]
+    lines += [f"{name:<18} {value}" for name, value in facts]
+    shown = reasons.most_common(MOST_FAILURES)
+    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    marked = f"{found.progress}, with 95 % intervals:"
+    return "\n".join([*lines, *efficiency_block(results), "", marked, table])
 
 
 def conditions(results):
@@ -103,6 +212,25 @@ def conditions(results):
     ]
     over = stored(results.run, "overrides")
     return [*facts, ("over the config", json.dumps(over))] if over else facts
+
+
+def sizes(results, totals):
+    """[(name, value)] of the radii of the types, and between which values the replicates were."""
+    known = [
+        f"{visible(name, '')}: {1e6 * i:.4g}, {1e6 * j:.4g}"
+        for name, i, j in zip(
+            results.types, results.radii["r_i"], results.radii["r_j"], strict=True
+        )
+        if i > 0.0 and j > 0.0
+    ]
+    facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
+    units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
+    words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
+    for name, (low, high) in totals.spans.items():
+        low, high = units[name] * low, units[name] * high
+        if f"{low:.4g}" != f"{high:.4g}":
+            facts.append((words[name], f"{low:.4g} to {high:.4g} in the replicates"))
+    return facts
 
 
 def preset(run):
@@ -130,6 +258,15 @@ def outcomes(results, totals):
         steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
         rows.append(("steps", steps))
     return rows
+
+
+def settling(run):
+    """[(name, value)] of the bodies at their terminal speeds, a line for each collision type."""
+    types: dict[str, list[str]] = {}
+    for each in stored(run, "settling"):
+        number = f"{visible(each['body'], '')} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
+        types.setdefault(visible(each["type"], ""), []).append(number)
+    return [("settling", f"{name}: {', '.join(numbers)}") for name, numbers in types.items()]
 
 
 def origin(run):

@@ -1,6 +1,8 @@
-"""`flocsim init`: write a commented example of a config file."""
+"""`flocsim init`: write a commented example of a config file, for each kind of study."""
 
+import re
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from flocsim.io.files import write_file
@@ -73,7 +75,171 @@ tolerance = "1 nm"         # largest error in position of a step
 """
 
 
+SPHERES = """\
+# Spheres alone, for `flocsim ensemble`: seconds. docs/config.md has all keys.
+preset = "si"              # quartz in water, of its real weight
+seed = 1
+replicates = 20            # spheres have no orientation: they differ by rounding alone
+
+[scene]
+pairs = [["5 um", "10 um"], ["10 um", "20 um"]]   # [receiving, approaching] radius
+delta = [0.0, 0.25, 0.5, 0.75, 1.0]               # offsets, as fractions of r_i + r_j
+
+[shapes]
+vertices = [1]             # the equivalent sphere
+
+[forces.van_der_waals]
+hamaker = "1e-20 J"
+"""
+
+PAPER = """\
+# All conditions of Tang et al. (2014), for `flocsim ensemble`: core-hours, see --dry-run.
+preset = "tang2014"        # the paper's values; "tang2014-literal": exactly as printed
+seed = 1
+replicates = 100
+
+[scene]
+types = ["I", "II", "III"] # the paper's sizes
+delta = [0.0, 0.25, 0.5, 0.75, 1.0]
+
+[shapes]
+source = "synthetic"       # flocs that flocsim grows in place of the paper's pictures
+vertices = [1, 4, 16, 64]
+pool = 10
+"""
+
+PICTURES = """\
+# Flocs of your own pictures, for `flocsim ensemble`. First fit them:
+#     flocsim fit PICTURES… --pixel-size "0.95 um" --vertices 4,16,64 -o shapes.h5
+#     flocsim plot shapes.h5
+# docs/images.md says what can be corrected.
+preset = "tang2014"
+seed = 1
+replicates = 100
+
+[scene]
+types = ["I", "III"]
+delta = [0.0, 0.5, 1.0]
+
+[shapes]
+source = "library"
+file = "synthetic"         # ships with flocsim; now write "shapes.h5", your own
+vertices = [1, 4, 16, 64]  # those that were fitted, and 1, the sphere of the same area
+pool = 10                  # each replicate draws its flocs from the ten nearest in size
+# size = "own"             # flocs keep their measured sizes
+"""
+
+FORCE = """\
+# A force of your own, {module}.py beside this file, for `flocsim ensemble`. docs/forces.md.
+preset = "tang2014"
+seed = 1
+replicates = 20
+
+[scene]
+types = ["III"]
+delta = [0.0, 0.5]
+
+[shapes]
+source = "library"
+file = "synthetic"         # ships with flocsim: nothing is grown or fitted
+vertices = [1, 16]
+
+[forces.mine]
+class = "{module}:Mine"
+strength = "0.1 mN/m"
+length = "100 nm"
+"""
+
+FORCE_MODULE = """\
+import attrs
+from flocsim.fields import quantity
+from flocsim.forces import CentreForce
+
+
+@attrs.frozen
+class Mine(CentreForce):
+    strength: float = quantity("N/m", above=0.0)
+    length: float = quantity("m", above=0.0)
+
+    @staticmethod
+    def kernel(pair, strength, length):  # repulsion [N] at a gap of the equivalent spheres
+        return strength * max(length - pair.gap, 0.0)
+"""
+
+SWEEP = """\
+# One study at several values of a key, into one file; more values later with --resume:
+#     flocsim sweep {file} --over forces.van_der_waals.hamaker='"1 zJ"','"10 zJ"','"100 zJ"'
+#     flocsim plot {stem}-sweep.h5
+# --over may be repeated. The study itself runs with `flocsim ensemble`.
+preset = "tang2014"
+seed = 1                   # the same for all values: the replicates are paired
+replicates = 50
+
+[scene]
+types = ["III"]
+delta = [0.0, 0.5]
+
+[shapes]
+source = "library"
+file = "synthetic"         # ships with flocsim: nothing is grown or fitted
+vertices = [1, 16]
+
+[forces.van_der_waals]
+hamaker = "10 zJ"          # replaced by the values of --over
+"""
+
+MEASURED = (
+    ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
+    (
+        """\
+types = ["I", "II", "III"] # the paper's sizes
+# pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
+""",
+        """\
+pairs = "measured"         # two flocs of the library, each at its own size
+# weight = "volume"        # how often each is drawn: "number", all alike; "area", "volume"
+# min_radius = "5 um"      # of the flocs that are drawn, by r_eq; max_radius
+# classes = ["10 um", "20 um"]        # results by size class; or 3: so many of equal weight
+""",
+    ),
+    (
+        """\
+source = "synthetic"       # flocs that flocsim grows
+# source = "library"       # or flocs fitted to images with `flocsim fit`
+# file = "shapes.h5"
+""",
+        """\
+source = "library"         # flocs fitted to images with `flocsim fit`
+file = "synthetic"         # ships with flocsim; now write "shapes.h5", your own
+""",
+    ),
+    ('radius = "1 um"            # spheroradius\n', ""),
+)
+"""(text of EXAMPLE, what a study of measured flocs has in its place)."""
+
+
+def measured() -> str:
+    """The text of a study of flocs at their measured sizes."""
+    text = EXAMPLE
+    for old, new in MEASURED:
+        text = text.replace(old, new)
+    return text
+
+
+KINDS = {
+    "study": (EXAMPLE, "all keys, commented"),
+    "spheres": (SPHERES, "spheres alone"),
+    "paper": (PAPER, "the conditions of Tang et al. (2014)"),
+    "measured": (measured(), "flocs at their measured sizes"),
+    "pictures": (PICTURES, "flocs fitted to pictures"),
+    "force": (FORCE, "a force of your own, its module too"),
+    "sweep": (SWEEP, "several values of a key"),
+}
+"""What there is to begin with: {name: (text, help)}."""
+
+
 def add_parser(subparsers: Any) -> None:
+    kinds = "; ".join(f"{name}: {words}" for name, (_, words) in KINDS.items())
     parser = subparsers.add_parser(
         "init",
         help="write an example config file",
@@ -82,14 +248,28 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
     )
+    parser.add_argument(
+        "--kind", choices=KINDS, default="study", help=f"{kinds} (default: %(default)s)"
+    )
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """Write the file; returns the exit code. UsageError if it exists and is not to be replaced."""
-    rule = data_rule(args.overwrite)
-    check_outputs([Output(args.file, rule)], [])
-    write_file(args.file, EXAMPLE.encode(), rule)
-    print(f"wrote {args.file}; run it with: flocsim ensemble {args.file}")
+    rule, path = data_rule(args.overwrite), Path(args.file)
+    module = re.sub(r"\W", "_", f"{path.stem}_force")
+    module = f"_{module}" if module[0].isdigit() else module
+    names = {"{module}": module, "{file}": path.name, "{stem}": path.stem}
+    text = KINDS[args.kind][0]
+    for name, word in names.items():
+        text = text.replace(name, word)
+    files = {path: text}
+    if args.kind == "force":
+        files[path.with_name(f"{module}.py")] = FORCE_MODULE
+    check_outputs([Output(each, rule) for each in files], [])
+    for each, content in files.items():
+        write_file(each, content.encode(), rule)
+    wrote = " and ".join(map(str, files))
+    print(f"wrote {wrote}; run it with: flocsim ensemble {args.file}")
     return 0

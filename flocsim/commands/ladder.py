@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.commands.trajectory import select, with_one_count
+from flocsim.commands.trajectory import select
 from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
@@ -29,6 +29,7 @@ from flocsim.ensembles.pilot.choice import (
 from flocsim.ensembles.pilot.ladder import DECADES, Job, Trial, at_rung, scene_length
 from flocsim.ensembles.pilot.sample import sample_of
 from flocsim.ensembles.preflight import check_study, inputs_of
+from flocsim.ensembles.studies.replicates import with_one_count
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit
@@ -132,7 +133,10 @@ def distance_at(motion: tuple, instant: float) -> float:
 
 def climb(study: Study, condition: int, tasks: Sequence) -> Iterator[Measured]:
     """Both methods' ladders of a type, from the loosest rung to the tightest."""
-    length, budget = scene_length(study.config, condition), study.config.integrator.max_steps
+    length, budget = (
+        scene_length(study.config, condition, study.flocs),
+        study.config.integrator.max_steps,
+    )
     reference = REFERENCE * DECADES[-1]
     exact = at_rung(Implicit(), reference * length)
     found = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
@@ -201,7 +205,7 @@ def run(args: Namespace) -> int:
     climbed: list[Measured] = []
     panels: dict[str, list[Rung]] = {}
     for condition, tasks in enumerate(sample_of(config, args.count or COUNT)):
-        name = config.scene.conditions[condition][0]
+        name = config.scene.names[condition]
         tell(f"\ntype {name}, {len(tasks)} replicates over all N and delta\n{HEADER}")
         panels[name] = []
         for ladder in climb(study, condition, tasks):

@@ -8,7 +8,8 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.plots.style import FORMATS, save
+from flocsim.io.plots.style import FORMATS, mark_figure, save
+from flocsim.io.plots.sweep import SWEEP_FIGURES
 
 DESCRIPTION = """\
 Draw the figures of a results file, each into a file of its own:
@@ -16,7 +17,32 @@ Draw the figures of a results file, each into a file of its own:
 Bars are Wilson 95 % intervals, thin outer ones with the numerical error on either side.
 Of a shape library that flocsim fit wrote:
 {shapes}
+Of a trajectory file (flocsim trajectory --save, Trajectory.save):
+{motion}
+Of the joined file of flocsim sweep:
+{sweep}
+Of a study that still runs, its figures so far are drawn, marked as unfinished.
 Figures are numbered as in Tang et al. (2014)."""
+
+
+STRIP_FRAMES = 7
+
+
+def strip(trajectory: Any) -> Any:
+    """Frames of the motion, evenly along the way of the bodies against each other."""
+    from flocsim.trajectories.figures import drawn
+
+    return drawn(trajectory, "strip", STRIP_FRAMES)
+
+
+def distance(trajectory: Any) -> Any:
+    """Distance of the two centres against time."""
+    from flocsim.trajectories.figures import drawn
+
+    return drawn(trajectory, "distance", STRIP_FRAMES)
+
+
+MOTION_FIGURES = {"strip": strip, "distance": distance}
 
 
 def listed(figures):
@@ -29,7 +55,12 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "plot",
         help="draw the figures of a results file or a shape library",
-        description=DESCRIPTION.format(results=listed(FIGURES), shapes=listed(POPULATION_FIGURES)),
+        description=DESCRIPTION.format(
+            results=listed(FIGURES),
+            shapes=listed(POPULATION_FIGURES),
+            motion=listed(MOTION_FIGURES),
+            sweep=listed(SWEEP_FIGURES),
+        ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
@@ -46,7 +77,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
-    content, figures = read_content(args.results)
+    content, figures, remark = read_content(args.results)
     foreign = [name for name in names or () if name not in figures]
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
@@ -62,7 +93,10 @@ def run(args: argparse.Namespace) -> int:
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     check_outputs([Output(path, rule) for path in paths.values()], [args.results])
     for name, path in paths.items():
-        save(figures[name](content), path, rule)
+        figure = figures[name](content)
+        if remark:
+            mark_figure(figure, remark)
+        save(figure, path, rule)
         print(path)
     return 0
 
@@ -72,19 +106,33 @@ def label(name):
 
 
 def read_content(path):
-    """What a file holds, Results or ShapeEntries, and {name: function} of its figures."""
+    """What a file holds, {name: function} of its figures, and what each of them has to say."""
+    from flocsim.ensembles.unfinished import journal_of, read_unfinished
+    from flocsim.io import trajectory
+    from flocsim.io.opening import kind_of
+    from flocsim.io.results import sweep_file
     from flocsim.io.results.file import read_results
+    from flocsim.io.results.layout import FORMAT
     from flocsim.io.shapes.library import is_library, read_library
 
-    if is_library(path):
-        return read_library(path), POPULATION_FIGURES
-    return read_results(path, replicates=False), FIGURES
+    if (journal := journal_of(path)) is not None:
+        found = read_unfinished(journal)
+        return found.results, FIGURES, found.progress
+    kind = kind_of(path)
+    if kind == trajectory.KIND:
+        moved = trajectory.read_trajectory(path)
+        return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
+    if kind == sweep_file.FORMAT:
+        return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
+    if kind != FORMAT and is_library(path):
+        return read_library(path), POPULATION_FIGURES, ""
+    return read_results(path, replicates=False), FIGURES, ""
 
 
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (*POPULATION_FIGURES, *FIGURES)
+    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES)
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

@@ -4,8 +4,6 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-import attrs
-
 from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.forces_between import forces_between
@@ -14,9 +12,8 @@ from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.preflight import check_study, inputs_of
-from flocsim.ensembles.study import Study
+from flocsim.ensembles.studies.replicates import chosen, one_count_study
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
@@ -64,16 +61,6 @@ def add_replicate(parser: ArgumentParser) -> None:
     parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
 
 
-def chosen(value, known, option, default):
-    """The place of an option's value among the config's; UsageError where it is not there."""
-    known = list(known)
-    if value is None:
-        value = known[default]
-    if value not in known:
-        raise UsageError(f"{option} must be one of {', '.join(map(str, known))}, found {value}")
-    return known.index(value)
-
-
 def take_scene(args):
     """Split --scene into the three options that it stands for."""
     if args.scene is None:
@@ -93,7 +80,7 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
     if not 2 <= args.frames <= 50:
         raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
-    names = [name for name, _, _ in config.scene.conditions]
+    names = list(config.scene.names)
     condition = chosen(args.type, names, "--type", 0)
     vertices = config.shapes.vertices
     vertex_count = vertices[chosen(args.vertices, vertices, "--vertices", -1)]
@@ -101,21 +88,11 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
     return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
 
 
-def with_one_count(config: Config, vertex_count: int) -> Config:
-    """The config with one number of vertices: the flocs need no fits at the others."""
-    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
-
-
-def one_count_study(config: Config, vertex_count: int) -> Study:
-    """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
-    return Study(with_one_count(config, vertex_count), methods=final_methods(config))
-
-
 def outcome_line(config, place, replicate, row):
     condition, vertices, share = place
     outcome = OUTCOMES[row["outcome"]]
     reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
-    name = config.scene.conditions[condition][0]
+    name = config.scene.names[condition]
     touch = ""
     if row["inside"] <= 1:
         touch = f"collision at {1e3 * row['t_collision']:.4g} ms, "
@@ -136,6 +113,7 @@ def draw(args, encounter, arrays, row, title):
     strip = draw_strip(
         frames.outlines, frames.times, frames.paths, title,
         centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
+        seen_from=0,
     )  # fmt: skip
     written = save_all(strip, args.output, rule)
     if args.distance:
@@ -160,7 +138,7 @@ def save_all(figure, names, rule):
 def default_name(args, config, place):
     """A figure's name that says what it shows: "study-I-64-0.5-17.png"."""
     condition, vertices, share = place
-    name = config.scene.conditions[condition][0]
+    name = config.scene.names[condition]
     return f"{Path(args.config).stem}-{name}-{vertices}-{share:g}-{args.replicate}.png"
 
 

@@ -10,10 +10,11 @@ from typing import Any
 import attrs
 
 from flocsim.commands import ladder
-from flocsim.commands.trajectory import add_replicate, one_count_study, select
+from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.studies.replicates import one_count_study
 from flocsim.errors import FlocsimError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.amplification import end_distance
@@ -100,7 +101,7 @@ def run(args: Namespace) -> int:
     check_study(config)
     system, duration, found = replicate(config, place, args.replicate)
     exact = reference(system, duration)
-    name = config.scene.conditions[place[0]][0]
+    name = config.scene.names[place[0]]
     print(
         f"type {name}, N = {place[1]}, delta = {place[2]:g}, replicate {args.replicate}: "
         f"{OUTCOMES[found['outcome']]} after {1e3 * duration:.4g} ms"

@@ -116,7 +116,8 @@ def complaint(value):
     owner = getattr(value, "__self__", None)
     if module in RANDOM or type(owner).__module__.partition(".")[0] in ("random", "_random"):
         return "which draws random numbers: no run could be repeated; leave them out"
-    if getattr(type(owner), "__name__", "") == "RandomState":
+    makers = (type(value).__module__ or "").partition("._")[0], type(owner).__name__
+    if makers[0] in RANDOM or makers[1] == "RandomState":
         return "which draws random numbers: no run could be repeated; leave them out"
     if module.partition(".")[0] == "numba" and not callable(value):
         return f"a {kind} of numba, which no hash follows; leave it out"

@@ -9,7 +9,8 @@
    they are lowered, to be optimised once, where they end up, instead of each by itself as if Python
    were to call it: that halves the time of compiling.
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
-5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits.
+5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
+   says about an error is without colours.
 6. ``kept_on_disk``: numba's own cache unpickles whatever lies in its folder; ours is checked first.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
    hash of a kernel could tell it.
@@ -47,6 +48,9 @@ NO_COUNTING = {"_nrt": False}
 PYTHON_CALLS = ("numba_gil_ensure", "__excinfo_unwrap_args")
 """How the names begin of what compiled code has in it where it calls Python, or raises an exception
 with numbers in it. Functions that are only linked into others have nothing to do that with."""
+
+COLOURED = ("code", "errmsg", "filename", "highlight", "indicate", "reset")
+"""What numba colours in its messages, where colorama is installed."""
 
 _one_at_a_time = threading.RLock()
 
@@ -324,11 +328,30 @@ def types_remembered():
 @contextlib.contextmanager
 def quick_typing() -> Iterator[None]:
     """Compile in here, one thread at a time, as numba does."""
-    if "quick_typing" in WITHOUT:
+    with _one_at_a_time, plain_errors():
+        if "quick_typing" in WITHOUT:
+            yield
+            return
+        with garbage_waits(), types_remembered():
+            yield
+
+
+@contextlib.contextmanager
+def plain_errors() -> Iterator[None]:
+    """No colours in numba's messages: with colorama it also wraps the standard streams, until the
+    end of the process."""
+    from numba.core.errors import termcolor
+
+    # The class, since numba's modules each hold its one instance.
+    scheme = type(termcolor())
+    coloured = {name: getattr(scheme, name) for name in COLOURED}
+    for name in COLOURED:
+        setattr(scheme, name, lambda self, text: text)
+    try:
         yield
-        return
-    with _one_at_a_time, garbage_waits(), types_remembered():
-        yield
+    finally:
+        for name, method in coloured.items():
+            setattr(scheme, name, method)
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from flocsim.io.json_text import matches
 from flocsim.io.results.schema import REPLICATES, ROW_SIZE
 
 MOST_ROWS = 16_384
-"""Rows of the longest chunk, 1.8 MB."""
+"""Rows of the longest chunk, 2.3 MB."""
 
 ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()])
 """One replicate: its row of the results file."""

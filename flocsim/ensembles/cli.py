@@ -30,7 +30,10 @@ UNSHARED = ("quiet", "run", "command")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
-    parser.add_argument("config", help="config file (TOML); `flocsim init` writes an example")
+    parser.add_argument(
+        "config",
+        help="config file (TOML), - for the standard input; `flocsim init` writes an example",
+    )
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
         help="any value instead of the config's, e.g. --set 'scene.delta=[0.0, 0.5]' or --set "

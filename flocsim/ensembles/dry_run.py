@@ -5,8 +5,11 @@ import time
 from collections import Counter
 from math import inf
 
+import numpy as np
+
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
@@ -18,7 +21,13 @@ from flocsim.ensembles.pilot.forecast import (
 )
 from flocsim.ensembles.pilot.needless import find, words_of
 from flocsim.ensembles.pilot.sample import LADDER, pilot_size
-from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
+from flocsim.ensembles.preflight import (
+    kinds,
+    measured_flocs,
+    pairings,
+    placed_system,
+    sphere_pairs,
+)
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
@@ -30,9 +39,11 @@ MOST_CHOOSING = 60.0
 """Seconds that a dry run spends on what accuracy = "auto" chooses; a longer pilot is left out."""
 
 
-def condition_lines(config):
+def condition_lines(config, flocs):
     """A line for every collision type: sizes, zone, settling of the equivalent spheres."""
-    for name, pair in sphere_pairs(config):
+    facts = settling_facts(config, flocs)
+    spans = {each.name: each.spans for each in pairings(config, flocs)}
+    for name, pair in sphere_pairs(config, flocs):
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         falls = [1e3 * -velocity[1] for velocity, _ in pair.settling]
         yield (
@@ -40,11 +51,24 @@ def condition_lines(config):
             f"D_0 = {1e6 * pair.zone_distance:.4g} um; "
             f"settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time {pair.turn_time:.3g} s"
         )
+        if config.shapes.size == "own":
+            (low_i, high_i), (low_j, high_j) = (np.array(each) * 1e6 for each in spans[name])
+            yield (
+                f"    of measured sizes, r_i {low_i:.4g} to {high_i:.4g} um, r_j {low_j:.4g} to "
+                f"{high_j:.4g} um; delta_max and D_0 are those of each pair"
+            )
+        numbers = [
+            f"body {each['body']} Re = {each['reynolds']:.2g}, St = {each['stokes']:.2g}"
+            for each in facts
+            if each["type"] == name
+        ]
+        largest = "the largest " if config.shapes.size == "own" else ""
+        yield f"    {largest}at terminal speed: {'; '.join(numbers)}"
 
 
-def code_lines(config):
+def code_lines(config, flocs):
     """What is compiled in and what is left out, for polygons and for spheres."""
-    _, pair = next(sphere_pairs(config))
+    _, pair = next(sphere_pairs(config, flocs))
     systems = [placed_system(config, pair.system, shapes) for shapes in kinds(config, pair.shapes)]
     lines = [*force_lines(systems[0]), *machinery_lines(systems[0])]
     for system in systems[1:]:
@@ -100,7 +124,7 @@ def go_on():
 def chosen_study(study, tasks):
     """(the Study by the methods that it will have, lines on how they were chosen, CPU time [s] of
     the choice in the run)."""
-    config, types = study.config, len(study.config.scene.conditions)
+    config, types = study.config, len(study.config.scene.names)
     first = [timed(study, task, False).first for task in tasks[: 2 * types]]
     choosing = LADDER * pilot_size(config) * types * sum(first) / len(first)
     if choosing > MOST_CHOOSING:
@@ -152,9 +176,7 @@ def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float)
     """A Forecast for people."""
     ended = Counter(OUTCOMES[run.outcome] for run in found.runs)
     words = ", ".join(f"{ended[name]} {name}" for name in OUTCOMES if ended[name])
-    conditions = (
-        len(config.scene.conditions) * len(config.shapes.vertices) * len(config.scene.delta)
-    )
+    conditions = len(config.scene.names) * len(config.shapes.vertices) * len(config.scene.delta)
     again = [run for run in found.runs if math.isfinite(run.second)]
     flips = sum(run.flipped for run in again)
     hours, size = found.hours, found.size
@@ -199,14 +221,16 @@ def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
     say as well."""
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
+    measured = measured_flocs(config)
     if shapes.size == "own":
         flocs += ", at the sizes and spheroradii that were measured"
+        flocs += f", drawn by {scene.weight}" if scene.is_measured else ""
     elif shapes.own is None:
         flocs += f", spheroradius {1e6 * shapes.radius:.4g} um"
     if shapes.pairs_alike_in == "error":
         flocs += ", the receiver with the N whose RE is nearest to that of the approaching floc"
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"
-    count = len(scene.conditions) * len(shapes.vertices) * len(scene.delta)
+    count = len(scene.names) * len(shapes.vertices) * len(scene.delta)
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
         f"seed {config.seed}, {ranks} rank(s), results in {config.output.file}",
@@ -216,18 +240,19 @@ def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
         f"  integrator: {chosen_words(config) or f'{config.integrator.label}, {accuracy}'}",
         f"  run again: {checked_words(config)}",
         "collisions:",
-        *condition_lines(config),
+        *condition_lines(config, measured),
         "forces and code:",
-        *code_lines(config),
+        *code_lines(config, measured),
         "  out: trajectories: an ensemble records none (see `flocsim trajectory`)",
         "  out: plots: none is drawn (see `flocsim plot`)",
         *(["  out: MPI: one rank needs none"] if ranks == 1 else []),
         "stiffness:",
         *(
             f"  {name}: {line}"
-            for name, pair in sphere_pairs(config)
+            for name, pair in sphere_pairs(config, measured)
             for line in scale_lines(pair.system)
         ),
+        *(f"warning: {line}" for line in study_doubts(config, measured)),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
         "nothing was run but the pilot (--dry-run)" if pilot else "nothing was run (--dry-run)",
     ]

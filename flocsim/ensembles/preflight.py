@@ -5,28 +5,56 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
+from flocsim.arrays import NOW, ContactView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
+from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.impact import too_deep
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, KernelError
 from flocsim.forces import ContactForce
+from flocsim.forces.codegen import laws_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
 from flocsim.system import System
+from flocsim.trajectories.blame import wrong_answer
+
+CLOSE_GAPS = (1e-9, 1e-12, -1e-12)
+"""Gaps [m] that every two bodies that collide come through."""
+
+CLOSE_OVERLAPS = (1e-12, 1e-10)
+""" [m] The same of contacts, at rates of either sign."""
 
 
-def sphere_pairs(config: Config) -> Iterator[tuple[str, Encounter]]:
-    """(name, Encounter) of the equivalent spheres of every collision type."""
-    for name, radius_i, radius_j in config.scene.conditions:
+def measured_flocs(config: Config) -> list[Floc]:
+    """The flocs whose own sizes a study has; none where flocs are resized."""
+    return read_flocs(config.shapes) if config.shapes.size == "own" else []
+
+
+def pairings(config: Config, flocs: Sequence[Floc] | None = None) -> tuple[Pairing, ...]:
+    """Who meets whom in a config's study; ``flocs``, where measured ones are read already."""
+    return pairings_of(config, measured_flocs(config) if flocs is None else flocs)
+
+
+def sphere_pairs(
+    config: Config, flocs: Sequence[Floc] | None = None, which: str = "radii"
+) -> Iterator[tuple[str, Encounter]]:
+    """(name, Encounter) of the equivalent spheres of every collision type.
+
+    ``which`` of flocs of measured sizes: "radii", those that stand for all, "fastest" or "largest"
+    of a Pairing; ``flocs`` as in `pairings`.
+    """
+    for pairing in pairings(config, flocs):
+        radius_i, radius_j = getattr(pairing, which)
         zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
-        yield name, make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
+        yield pairing.name, make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
 
 
 def check_study(config: Config) -> None:
@@ -37,16 +65,18 @@ def check_study(config: Config) -> None:
             "a collision needs a contact force, found none among "
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
-    least = min(min(radii) for _, *radii in config.scene.conditions)
+    flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
+    least = min(min(each.radii) for each in pairings(config, flocs))
     resized = config.shapes.own is None and config.shapes.size == "scene"
     if resized and max(config.shapes.vertices) > 1 and config.shapes.radius >= least:
         raise ConfigError(
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
         )
-    for name, pair in sphere_pairs(config):
+    for name, pair in sphere_pairs(config, flocs):
         check_approach(config, name, pair)
         check_compilable(pair.system)
+        check_numbers(pair.system)
     if not isinstance(config.integrator.check_share, str) and (
         config.integrator.check_share > 0.0 and exact_method(config.integrator.method) is None
     ):
@@ -55,15 +85,43 @@ def check_study(config: Config) -> None:
             f"{config.integrator.label} has no parameter `tolerance` or `step` that could be made "
             "smaller for a second run: give it one, or leave check_share out"
         )
-    flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
     check_impacts(config, flocs)
 
 
 def check_compilable(system: System) -> None:
-    """KernelError where a kernel calls what compiled code cannot, as print."""
+    """KernelError where a kernel calls what compiled code cannot, as print, or does not compile."""
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
     refuse_interpreter(advance, system.fillings(OBSERVER))
+    if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
+        system.laws()
+
+
+def check_numbers(system: System) -> None:
+    """KernelError where a force gives no number at the start or where two bodies touch."""
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    i, j = system.bodies
+    radii = i.shape.equivalent_radius, j.shape.equivalent_radius
+    reduced = radii[0] * radii[1] / sum(radii)
+    mass = j.mass if i.fixed else i.mass * j.mass / (i.mass + j.mass)
+    pairs = [
+        PairView(0.0, gap, rate, sum(radii) + gap, *radii, reduced, mass)
+        for gap in CLOSE_GAPS for rate in (-1e-4, 1e-4)
+    ]  # fmt: skip
+    contacts = [
+        ContactView(overlap, rate, 0.0, 0.0, mass, *radii)
+        for overlap in CLOSE_OVERLAPS for rate in (-1e-4, 1e-4)
+    ]  # fmt: skip
+    bodies = [body_view(scene, work, 0.0, NOW, body) for body in range(2)]
+    views = {"body": bodies, "centre": pairs, "surface": pairs, "contact": contacts}
+    for name, force in system.pieces.used.items():
+        pieces = laws_of([force], system.fluid)
+        if words := wrong_answer(force, pieces, views, system.fluid):
+            raise KernelError(
+                f"{name}: {words}, where every collision comes: bound what it divides by, or takes "
+                "a root, power or logarithm of, as in max(pair.gap, 1e-10)"
+            )
 
 
 def check_approach(config, name, pair):
@@ -80,11 +138,12 @@ def check_approach(config, name, pair):
 def check_impacts(config: Config, flocs: Sequence[Floc]) -> None:
     """ConfigError where bodies meet so fast that they leave the contact law: of the worst pair."""
     found = []
-    for name, pair in sphere_pairs(config):
-        for shapes in kinds(config, pair.shapes):
+    for name, pair in sphere_pairs(config, flocs, "fastest"):
+        spheres = pair.shapes
+        for shapes in kinds(config, spheres):
             radii = [shape.radius for shape in shapes]
-            what = "the spheres" if shapes is pair.shapes else "the outlines, their spheroradii"
-            if flocs and config.shapes.size == "own" and shapes is not pair.shapes:
+            what = "the spheres" if shapes is spheres else "the outlines, their spheroradii"
+            if flocs and config.shapes.size == "own" and shapes is not spheres:
                 measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
                 radii = [float(np.median(measured))] * 2
             found.append(too_deep(name, pair, radii, what))
@@ -102,7 +161,8 @@ def stand_in(shape, options):
     """A polygon about as large as a sphere: what matters here is that it has edges."""
     if options.own is not None:
         return options.own.scaled(shape.radius / options.own.equivalent_radius)
-    radius = options.radius
+    # Measured flocs have spheroradii of their own.
+    radius = options.radius if options.size == "scene" else min(options.radius, 0.5 * shape.radius)
     angles = np.arange(6) * np.pi / 3.0
     hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
     return SpheroPolygon((shape.radius - radius) * hexagon, radius)

@@ -7,7 +7,9 @@ import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.estimates.statistics import HOOK
+from flocsim.errors import visible
 from flocsim.io.confidence import wilson
+from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.schema import Results
 
@@ -57,6 +59,24 @@ def format_table(
             lines.append(f"type {types[place[0]]}")
         lines.append(align(row, widths))
     return "\n".join(lines)
+
+
+def efficiency_lines(results: Results) -> list[str]:
+    """A table of efficiencies, the aggregations per approach integrated over delta; none where
+    delta does not reach from 0 to 1."""
+    planar, axial = (
+        efficiency(results.probabilities, results.delta, each) for each in (False, True)
+    )
+    if planar is None or axial is None:
+        return []
+    lines = ["efficiency: aggregations per approach over delta, in the plane and axially [95 %]"]
+    for t, name in enumerate(results.types):
+        for v, count in enumerate(results.vertices):
+            if np.isfinite(planar[0][t, v]):
+                told = [f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]"
+                        for e, lo, hi in (planar, axial)]  # fmt: skip
+                lines.append(f"type {visible(name, '')}, N = {count}: {'   '.join(told)}")
+    return lines if len(lines) > 1 else []
 
 
 def undecided_line(results: Results) -> str:

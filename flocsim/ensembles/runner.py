@@ -17,6 +17,7 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
@@ -124,7 +125,9 @@ def run_to_file(
                 joint.accuracy,
             )  # fmt: skip
         resources.enter_context(start.resources)
-        for remark in [*remarks, *start.remarks]:
+        # Once nothing else stands in the way: what is refused is refused in one line.
+        doubts = [] if quiet else study_doubts(config, joint.study.flocs)
+        for remark in [*remarks, *start.remarks, *(f"warning: {line}" for line in doubts)]:
             progress.warn(remark)
         ended = lead(joint.study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):
@@ -374,7 +377,7 @@ def results_of(
     config = study.config
     probabilities, pooled, differences = tables_of(sums)
     return Results(
-        types=tuple(name for name, _, _ in config.scene.conditions),
+        types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=replicates,
@@ -385,6 +388,7 @@ def results_of(
         pooled=pooled,
         differences=differences,
         count=count,
+        radii=study.radii,
     )
 
 
@@ -406,6 +410,8 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",
+        "warnings": storable(json.dumps(study_doubts(config, study.flocs))),
+        "settling": storable(json.dumps(settling_facts(config, study.flocs))),
     }
 
 

@@ -16,14 +16,15 @@ from flocsim.ensembles.collision.encounter import (
     run_encounter,
 )
 from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
-from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs
+from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
+from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
-from flocsim.io.results.schema import NOT_APPLICABLE
+from flocsim.io.results.schema import NOT_APPLICABLE, RADII
 
 CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
 """Column of a second run → the same of the first."""
@@ -39,7 +40,7 @@ def methods_of(config: Config) -> dict[str, Integrator]:
             'integrator.accuracy = "auto" needs the choice of a pilot: give Study the methods of '
             "flocsim.ensembles.pilot.choice.final_methods, or the config a name and a tolerance"
         )
-    return {name: config.integrator.method for name, _, _ in config.scene.conditions}
+    return dict.fromkeys(config.scene.names, config.integrator.method)
 
 
 def flocs_of(config: Config) -> list[Floc]:
@@ -52,8 +53,9 @@ def flocs_of(config: Config) -> list[Floc]:
 class Study:
     """Every replicate of a config. All that is random follows from (seed, replicate).
 
-    ``flocs`` are grown or read unless given; ``zones`` has D_0 [m] of every collision type (flocs
-    of measured sizes have their own); ``methods`` the Integrator of every type, which a pilot has
+    ``flocs`` are grown or read unless given; ``pairings`` say who meets whom in every collision
+    type, ``zones`` has D_0 [m] of their radii (flocs of measured sizes have their own);
+    ``methods`` the Integrator of every type, which a pilot has
     to choose where the config says accuracy = "auto" (flocsim.ensembles.pilot; UsageError without),
     and is the config's otherwise.
     """
@@ -65,6 +67,7 @@ class Study:
     methods: dict[str, Integrator] = attrs.field(
         default=attrs.Factory(lambda self: methods_of(self.config), takes_self=True)
     )
+    pairings: tuple[Pairing, ...] = attrs.field(init=False)
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
@@ -74,28 +77,31 @@ class Study:
     def __attrs_post_init__(self):
         config = self.config
         self.exact = {name: exact_method(method) for name, method in self.methods.items()}
+        self.floc_pool = pool_of(config.shapes, self.flocs)
+        self.pairings = pairings_of(config, self.flocs, self.floc_pool)
         self.zones = {
-            name: zone_distance(config.zone, config.forces, radius_i, radius_j)
-            for name, radius_i, radius_j in config.scene.conditions
+            each.name: zone_distance(config.zone, config.forces, *each.radii)
+            for each in self.pairings
         }
-        shapes = config.shapes
-        self.floc_pool = FlocPool(
-            self.flocs, shapes.radius, shapes.pool, shapes.size == "own",
-            shapes.pairs_alike_in == "error",
-        )  # fmt: skip
 
     def by_methods(self, methods: dict[str, Integrator]) -> "Study":
         """The same study by other methods; the shapes that have been made are shared."""
         other = Study(self.config, flocs=self.flocs, methods=methods)
-        other.floc_pool = self.floc_pool
+        other.floc_pool, other.pairings = self.floc_pool, self.pairings
         return other
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
         """(types, vertices, delta, replicates): how many there are of each."""
         scene = self.config.scene
-        counts = (len(scene.conditions), len(self.config.shapes.vertices), len(scene.delta))
+        counts = (len(scene.names), len(self.config.shapes.vertices), len(scene.delta))
         return (*counts, self.config.replicates)
+
+    @property
+    def radii(self) -> dict[str, np.ndarray]:
+        """{r_i, r_j: (types,)} [m] that stand for the collision types."""
+        columns = zip(*(each.radii for each in self.pairings), strict=True)
+        return {name: np.array(values) for name, values in zip(RADII, columns, strict=True)}
 
     @property
     def size(self) -> int:
@@ -107,13 +113,12 @@ class Study:
         """Places of the flocs of i and j that a replicate's random numbers choose."""
         if vertices == 1 and not self.floc_pool.own_size:
             return NO_FLOC, NO_FLOC
-        _, radius_i, radius_j = self.config.scene.conditions[condition]
-        return self.floc_pool.choose(numbers, radius_i, radius_j)
+        return self.pairings[condition].choose(numbers)
 
     def encounter(
         self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
     ) -> Encounter:
-        name, *radii = self.config.scene.conditions[condition]
+        name, radii = self.pairings[condition].name, self.pairings[condition].radii
         flocs = self.choose_flocs(condition, vertices, numbers)
         key = (name, vertices, *flocs)
         if key not in self.encounters:
@@ -158,14 +163,13 @@ class Study:
     def conditions(self) -> tuple[Condition, ...]:
         """All conditions, in the order of the results file."""
         scene, vertices = self.config.scene, self.config.shapes.vertices
-        names = [name for name, _, _ in scene.conditions]
-        return tuple(Condition(*each) for each in product(names, vertices, scene.delta))
+        return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
 
     @property
     def places(self) -> tuple[tuple[int, int, float], ...]:
         """(place of the collision type, N, share of δ_max) of every condition."""
         scene, vertices = self.config.scene, self.config.shapes.vertices
-        return tuple(product(range(len(scene.conditions)), vertices, scene.delta))
+        return tuple(product(range(len(scene.names)), vertices, scene.delta))
 
     def run(
         self, condition: int, vertices: int, share: float, replicate: int,
@@ -186,7 +190,7 @@ class Study:
         floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
         row |= {"floc_i": floc_i, "floc_j": floc_j}
         row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
-        exact = self.exact[self.config.scene.conditions[condition][0]]
+        exact = self.exact[self.pairings[condition].name]
         checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
         if record is not None or exact is None or not checked:
             return row
@@ -218,7 +222,7 @@ class Study:
         """What stands for the kinds of compiled code that the study needs."""
         vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
         first: dict[type, int] = {}
-        for place, (name, _, _) in enumerate(self.config.scene.conditions):
+        for place, name in enumerate(self.config.scene.names):
             first.setdefault(type(self.methods[name]), place)
         return [(place, n) for place in first.values() for n in vertices]
 

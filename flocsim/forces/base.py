@@ -90,10 +90,18 @@ class ContactForce(Force):
     ``slip_limit(contact, …)`` [m]: the largest elastic displacement that the contact can hold; and
     ``events(contact, …) → (number, …)``, of any unit: each changes its sign at a kink of the law
     (a clip, a threshold), and steps of controlled error end there.
+
+    ``contact.overlap`` is never below 0: where a step is tried beyond the end of a contact, it is
+    0. ``goes_on_apart = True`` hands negative overlaps over, to a law that goes on smoothly there.
     """
 
     slip_limit: ClassVar[Any] = None
     events: ClassVar[Any] = None
+
+    @property
+    def goes_on_apart(self) -> bool:
+        """Whether the law is one for negative overlaps, too, without a kink at 0."""
+        return False
 
     @property
     def slides(self) -> bool:

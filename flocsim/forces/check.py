@@ -19,6 +19,7 @@ from flocsim.compiler.fingerprint import globals_read, tell
 from flocsim.compiler.reads import names_in, refuse_closure, where
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.forces.kernel_code import made_by, wrong_return
 
 SAMPLE_BODIES = (
     BodyView(1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6),
@@ -60,8 +61,11 @@ def require_plain(force, kernel):
     if kernel.__name__ == "<lambda>":
         raise refusal(force, kernel, "is a lambda; write it with `def`")
     refuse_closure(kernel)
-    words = why_untold(kernel)
-    if words:
+    if words := made_by(kernel):
+        raise refusal(
+            force, kernel, f"{words}: compiled kernels allocate nothing; write its numbers out"
+        )
+    if words := why_untold(kernel):
         raise KernelError(f"{name}: {words}")
 
 
@@ -142,10 +146,13 @@ def results(
     """What a kernel returns for the samples, those beyond its arithmetic left out."""
     for view in samples:
         try:
-            yield kernel(view, *arguments)
+            result = kernel(view, *arguments)
         except Exception as error:
             if not is_arithmetic(error):
                 raise refusal(force, kernel, failure(view, error)) from None
+            continue
+        refuse_complex(force, kernel, view, result)
+        yield result
 
 
 def failure(view, error):
@@ -160,6 +167,26 @@ def failure(view, error):
     return f"fails in {failing_line(error)}: {what}"
 
 
+def asked_at(view: Any) -> str:
+    """Where a force was asked, in words."""
+    if hasattr(view, "gap"):
+        return f"a gap of {view.gap:.3g} m"
+    if hasattr(view, "overlap"):
+        return f"an overlap of {view.overlap:.3g} m"
+    return f"t = {view.time:.3g} s and an angle of {view.angle:.3g} rad"
+
+
+def refuse_complex(force, kernel, view, result):
+    """KernelError for complex numbers, which uncompiled code has where compiled code has nan."""
+    for part in result if isinstance(result, tuple) else (result,):
+        if isinstance(part, complex):
+            raise refusal(
+                force, kernel,
+                f"gives no real number at {asked_at(view)}: what is below zero has no power with a "
+                "fractional exponent; bound its base, as in max(x, 0.0)",
+            )  # fmt: skip
+
+
 def are_numbers(result):
     """Whether a result is a tuple of numbers."""
     return isinstance(result, tuple) and all(isinstance(part, Real) for part in result)
@@ -169,11 +196,18 @@ def check_results(force, fluid, kernel, samples, *parts):
     """KernelError unless a kernel can be called and returns the named parts, each a number."""
     require_plain(force, kernel)
     arguments = kernel_arguments(force, fluid, kernel)
+    wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
     for result in results(force, kernel, samples, arguments):
         several = are_numbers(result) and len(result) == len(parts)
         if not (several if len(parts) > 1 else isinstance(result, Real)):
-            wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
             raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
+    check_code(force, kernel, len(parts), wanted)
+
+
+def check_code(force, kernel, parts, wanted):
+    """KernelError for returns of other numbers in branches where no sample may come."""
+    if words := wrong_return(kernel, parts):
+        raise refusal(force, kernel, f"{words}; it must return {wanted}")
 
 
 class Watched:
@@ -247,6 +281,8 @@ def check_events(force, fluid):
                 force, force.events,
                 f"returns {result!r}; it must return a tuple of numbers, always as many",
             )  # fmt: skip
+    parts = len(found[0]) if found else None
+    check_code(force, force.events, parts, "a tuple of numbers, always as many")
 
 
 def event_count(force: ContactForce, fluid: Fluid) -> int:

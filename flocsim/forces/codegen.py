@@ -28,13 +28,14 @@ from flocsim.forces.differences import (
     changed_body,
     changed_contact,
     contact_change,
+    pressed_contact,
 )
 from flocsim.forces.smoothing import smoothness
 from flocsim.laws import LAWS
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
-CHANGES = body_change, changed_body, contact_change, changed_contact
+CHANGES = body_change, changed_body, contact_change, changed_contact, pressed_contact
 
 ROOM = 64
 """Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
@@ -193,11 +194,12 @@ def write_contact_laws(source, forces):
     """Contact forces, the limit of their tangential displacement, and their events; how many."""
     terms, limits, events = [], [], []
     for force in forces:
-        terms.append(("", source.call(force, force.kernel, "contact")))
+        view = "contact" if force.goes_on_apart else "pressed_contact(contact)"
+        terms.append(("", source.call(force, force.kernel, view)))
         if force.slides:
-            limits.append(source.call(force, force.slip_limit, "contact"))
+            limits.append(source.call(force, force.slip_limit, view))
         if force.has_events:
-            call = source.call(force, force.events, "contact")
+            call = source.call(force, force.events, view)
             events.append((event_count(force, source.fluid), call))
     if terms:
         source.functions.append(sum_function("contact_force", "contact", terms, 2))

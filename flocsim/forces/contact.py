@@ -66,6 +66,11 @@ class Contact(ContactForce):
         return math.inf if self.friction == "none" else float(self.friction)
 
     @property
+    def goes_on_apart(self) -> bool:
+        """Springs and dashpots do; the kernel of a subclass may not."""
+        return type(self).kernel is Contact.kernel
+
+    @property
     def slides(self) -> bool:
         """Whether friction limits ξ, or a subclass with a limit of its own."""
         own = type(self).slip_limit is not Contact.slip_limit

@@ -38,3 +38,14 @@ def changed_contact(view, axis, by):
         view.slip + by * (axis == 2), view.slip_rate + by * (axis == 3),
         view.effective_mass, view.radius_i, view.radius_j,
     )  # fmt: skip
+
+
+def pressed_contact(view):
+    """A ContactView without what is no overlap, as an own law of contact sees it.
+
+    Steps are tried beyond the end of a contact, where the two surfaces are apart.
+    """
+    return ContactView(
+        max(view.overlap, 0.0), view.overlap_rate, view.slip, view.slip_rate,
+        view.effective_mass, view.radius_i, view.radius_j,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Stokes drag."""
+"""Drag: of Stokes, and of Schiller and Naumann where the flow around a body is not slow."""
 
 import math
 from collections.abc import Callable
@@ -6,8 +6,14 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.body import Fluid
-from flocsim.fields import flag
+from flocsim.fields import choice, flag
 from flocsim.forces.base import BodyForce
+
+STOKES_UP_TO = 1.0
+"""Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
+
+SCHILLER_NAUMANN_UP_TO = 800.0
+"""Reynolds number up to which the law of Schiller and Naumann holds, within about 5 %."""
 
 
 def flow_at(flow, x, y):
@@ -16,19 +22,46 @@ def flow_at(flow, x, y):
     return u_x + g_xx * x + g_xy * y, u_y + g_yx * x + g_yy * y, 0.5 * (g_yx - g_xy)
 
 
+def reynolds_number(speed: float, radius: float, viscosity: float, density: float) -> float:
+    """Re = 2 r ρ_f |v − u|/γ of a speed against the fluid [m/s]; r [m], γ [Pa s], ρ_f [kg/m³]."""
+    return 2.0 * radius * density * speed / viscosity
+
+
+def inertial_factor(reynolds):
+    """1 + 0.15 Re^0.687: how many times Stokes's drag a sphere has (Schiller and Naumann)."""
+    return 1.0 + 0.15 * reynolds**0.687
+
+
 @attrs.frozen
 class StokesDrag(BodyForce):
-    """Drag −6πγ r_eq (v − u), and torque −8πγ r_eq³ (ω − Ω) where ``rotational``.
+    """Drag −6πγ r_eq (v − u) f, and torque −8πγ r_eq³ (ω − Ω) where ``rotational``.
 
-    Viscosity γ and the background flow u, Ω are the fluid's.  Source: Tang et al. (2014), eq. 4;
-    the rotational drag of a sphere is an addition, without it nothing would stop a spin.
+    ``law`` "stokes": f = 1, for Reynolds numbers up to about 1. "schiller_naumann":
+    f = 1 + 0.15 Re^0.687 for Re up to 800, with Re = 2 r_eq ρ_f |v − u|/γ of the equivalent sphere
+    (its diameter and its own speed against the flow); the torque stays Stokes's. Viscosity γ,
+    density ρ_f and the background flow u, Ω are the fluid's.  Sources: Tang et al. (2014), eq. 4;
+    Schiller and Naumann (1933), as in Clift, Grace and Weber (1978), Table 5.2. The rotational drag
+    of a sphere is an addition, without it nothing would stop a spin.
     """
 
     rotational: bool = flag(default=True, help="drag torque on spinning bodies")
+    law: str = choice(
+        "stokes",
+        "schiller_naumann",
+        default="stokes",
+        help="schiller_naumann: times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re up to 800",
+    )
+
+    @property
+    def serves_up_to(self) -> float:
+        """The Reynolds number up to which the law holds."""
+        return STOKES_UP_TO if self.law == "stokes" else SCHILLER_NAUMANN_UP_TO
 
     def kernel_in(self, fluid: Fluid) -> Callable:
         """Still water needs no flow, and no derivative by the place."""
-        return self.kernel if any(fluid.flow) else self.still
+        if self.law == "stokes":
+            return self.kernel if any(fluid.flow) else self.still
+        return self.inertial if any(fluid.flow) else self.inertial_still
 
     @staticmethod
     def kernel(body, viscosity, flow, rotational):
@@ -43,5 +76,24 @@ class StokesDrag(BodyForce):
     def still(body, viscosity, rotational):
         """Force and torque on the equivalent sphere in still water."""
         translation = 6.0 * math.pi * viscosity * body.radius
+        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+        return -translation * body.vx, -translation * body.vy, -rotation * body.spin
+
+    @staticmethod
+    def inertial(body, viscosity, density, flow, rotational):
+        """The same in the flow, by the law of Schiller and Naumann."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        vx, vy = body.vx - u, body.vy - v
+        reynolds = reynolds_number(math.hypot(vx, vy), body.radius, viscosity, density)
+        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
+        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+        return -translation * vx, -translation * vy, -rotation * (body.spin - turning)
+
+    @staticmethod
+    def inertial_still(body, viscosity, density, rotational):
+        """The same in still water, by the law of Schiller and Naumann."""
+        speed = math.hypot(body.vx, body.vy)
+        reynolds = reynolds_number(speed, body.radius, viscosity, density)
+        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         return -translation * body.vx, -translation * body.vy, -rotation * body.spin

@@ -38,6 +38,9 @@ class Status(IntEnum):
     PAUSED = 8
     NOT_FINITE = 9
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.reason}"
+
     @property
     def reason(self) -> str:
         """What happened and what to do, in one line."""

@@ -42,6 +42,7 @@ PLACES = {
     ".gif": (gif_remark, 1),
     ".svg": (markup_remark, 0),
     ".md": (markup_remark, 0),
+    ".html": (markup_remark, 0),
     ".pdf": (pdf_remark, 0),
 }
 

@@ -81,7 +81,7 @@ class PlainStream(io.TextIOBase):
         return self.stream.fileno()
 
     def isatty(self) -> bool:
-        return self.stream.isatty()
+        return not self.stream.closed and self.stream.isatty()
 
     def writable(self) -> bool:
         return True

@@ -136,7 +136,7 @@ def test_the_ends_of_what_is_stated(folder):
         "--size", "5 um", "40 um", "--tolerance", "1e-11", "1 um", "--count", "1",
         "--stiffness", "1 N/m", "1e3",
     )  # fmt: skip
-    radii = [pair[1:] for pair in config.scene.conditions]
+    radii = [radii for _, radii in config.scene.given]
     assert [pair[1] for pair in radii] == [5e-6, 40e-6]
     assert all(pair[0] / pair[1] == pytest.approx(16.41 / 23.02, rel=5e-3) for pair in radii)
     assert {case.method.tolerance for case in found} == {1e-11, 1e-6}

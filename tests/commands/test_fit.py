@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import fit, fit_pictures, info, plot
+from flocsim.commands import fit, info, plot
+from flocsim.commands.fitting import pictures as fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
-from flocsim.io.shapes.library import read_library
+from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.real_images import real_image
 
 
@@ -49,6 +50,20 @@ def test_pictures_become_a_library(tmp_path, frame, capsys):
     table = next(line for line in printed.out.splitlines() if line.split()[0] == "16")
     mean = np.mean([entry.fits[16].relative_error for entry in entries])
     assert float(table.split()[-1]) == pytest.approx(mean, abs=0.006)
+
+
+def test_a_pixel_size_with_its_unit(tmp_path, frame):
+    options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
+    assert run(frame, "--pixel-size", "0.95 um", *options) == 0
+    assert [entry.pixel_size for entry in read_library(tmp_path / "s.h5")] == [0.95e-6]
+
+
+def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
+    options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
+    assert run(frame, "--pixel-size", "8.6", *options) == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("flocsim: warning: --pixel-size = 8.6 m is implausible: the side of a")
+    assert line.removeprefix("flocsim: warning: ") == read_settings(tmp_path / "s.h5")["warning"]
 
 
 def test_only_the_largest_flocs(tmp_path, frame, capsys):
@@ -151,6 +166,109 @@ def test_masks_are_taken_as_they_are(tmp_path, capsys):
     assert (tmp_path / "o.png").exists()
 
 
+def test_masks_among_pictures_are_left_out_in_one_line(tmp_path, frame, capsys):
+    mask = np.zeros((40, 50), np.uint8)
+    mask[5:12, 5:20] = mask[20:35, 25:45] = 255
+    labels = mask.astype(np.uint16)
+    labels[5:12, 5:20] = 2
+    Image.fromarray(mask).save(frame / "a_mask.png")
+    Image.fromarray(labels).save(frame / "a_labels.tif")
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(frame, *options) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "2 files of masks or labels among the pictures: a_labels.tif, a_mask.png" in line
+    assert {entry.image for entry in read_library(tmp_path / "s.h5")} == {"a.png"}
+    assert run(frame / "a_mask.png", *options, "--overwrite") == 2
+    assert "fit them with --masks" in capsys.readouterr().err
+
+
+def test_a_photograph_given_as_a_mask_is_refused_and_the_masks_are_fitted(tmp_path, frame, capsys):
+    noise = np.random.default_rng(1).integers(0, 255, (60, 60)).astype(np.uint8)
+    Image.fromarray(noise).save(frame / "noise.png")
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "--masks", "-o", tmp_path / "s.h5")
+    assert run(frame, *options) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "noise.png: is a photograph, not a mask" in line
+
+
+QUICK = ("--pixel-size", "1e-6", "--vertices", "4")
+
+
+def flocs_of(library):
+    """{name: (area, vertices)} of a library's flocs."""
+    entries = read_library(library)
+    return {each.floc_id: (each.area, each.fits[4].vertices.tolist()) for each in entries}
+
+
+def test_label_images_are_read_back_as_the_same_flocs(tmp_path, frame):
+    (frame / "b.bmp").write_bytes(b"no picture")
+    out = ("--masks-out", tmp_path / "labels")
+    assert run(frame, *QUICK, "-o", tmp_path / "s.h5", *out) == 0
+    assert [path.name for path in (tmp_path / "labels").iterdir()] == ["a.png"]
+    again = ("--masks", "--min-radius", "1", "-o", tmp_path / "again.h5")
+    assert run(tmp_path / "labels", *QUICK, *again) == 0
+    assert flocs_of(tmp_path / "s.h5") == flocs_of(tmp_path / "again.h5")
+    with Image.open(tmp_path / "labels/a.png") as picture:
+        assert picture.mode == "I;16" and set(np.unique(picture)) == {0, 1, 2, 3}
+    with pytest.raises(UsageError, match=r"labels/a\.png exists already"):
+        run(frame, *QUICK, "-o", tmp_path / "more.h5", *out)
+    with pytest.raises(UsageError, match="which is read: name another"):
+        run(frame, *QUICK, "-o", tmp_path / "more.h5", "--masks-out", frame, "--overwrite")
+
+
+def test_an_edited_label_image_counts_and_numbers_stay(tmp_path, frame):
+    """One floc left, with another's number; a second one painted in."""
+    options = ("--keep", "3", "--masks-out", tmp_path / "labels")
+    assert run(frame, *QUICK, *options, "-o", tmp_path / "s.h5") == 0
+    assert list(flocs_of(tmp_path / "s.h5")) == ["a.png#3"]
+    masks = (tmp_path / "labels", *QUICK, "--masks", "--overwrite", "-o", tmp_path / "m.h5")
+    assert run(*masks) == 0
+    assert flocs_of(tmp_path / "m.h5") == flocs_of(tmp_path / "s.h5")
+    with Image.open(tmp_path / "labels/a.png") as picture:
+        labels = np.array(picture)
+    labels[100:120, 100:130] = 9
+    Image.fromarray(labels).save(tmp_path / "labels/a.png")
+    assert run(*masks) == 0
+    assert {k: v[0] for k, v in flocs_of(tmp_path / "m.h5").items() if k[-1] == "9"} == {
+        "a.png#9": 600
+    }
+
+
+def test_regions_are_dropped_kept_and_added_by_their_numbers(tmp_path, frame, capsys):
+    (frame / "b.png").write_bytes((frame / "a.png").read_bytes())
+    found = {}
+    for words in ("", "--drop b.png#1", "--keep a.png#2,b.png#1", "--add a.png#3 --drop a.png#1"):
+        small = ("--min-radius", "6", "--overwrite", "-o", tmp_path / "s.h5")
+        assert run(frame, *QUICK, *small, *words.split()) == 0
+        found[words] = [entry.floc_id for entry in read_library(tmp_path / "s.h5")]
+    assert list(found.values()) == [
+        ["a.png#1", "a.png#2", "b.png#1", "b.png#2"],
+        ["a.png#1", "a.png#2", "b.png#2"],
+        ["a.png#2", "b.png#1"],
+        ["a.png#2", "a.png#3", "b.png#1", "b.png#2"],
+    ]
+    with open(tmp_path / "s.csv", newline="") as table:
+        rows = {(r["picture"], r["floc"]): r["left_out_because"] for r in csv.DictReader(table)}
+    assert rows["a.png", "1"] == "dropped" and rows["a.png", "3"] == ""
+    assert rows["b.png", "3"] == "too small"
+    for words, told in {
+        "--drop 1": "there are 2 pictures", "--keep c.png#1": "no picture is called 'c.png'",
+        "--add a.png#9": "no such region, its last is 3", "--drop a.png": "takes flocs by",
+    }.items():  # fmt: skip
+        with pytest.raises(UsageError, match=told):
+            run(frame, *QUICK, *words.split(), "--overwrite", "-o", tmp_path / "s.h5")
+
+
+def test_a_threshold_of_ones_own(tmp_path, frame, capsys):
+    options = (*QUICK, "--overwrite", "-o", tmp_path / "s.h5")
+    areas = {}
+    for threshold in ("0.2", "0.6"):
+        assert run(frame, *options, "--threshold", threshold) == 0
+        assert f"threshold {threshold}" in capsys.readouterr().out
+        areas[threshold] = sum(entry.area for entry in read_library(tmp_path / "s.h5"))
+    assert areas["0.2"] > 1.02 * areas["0.6"]
+
+
 def test_areas_are_kept_on_request(tmp_path, frame):
     options = ("--pixel-size", "1e-6", "--vertices", "4", "--preserve-area")
     assert run(frame, *options, "-o", tmp_path / "s.h5") == 0
@@ -222,6 +340,9 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--pixel-size", "0"),
         ("--pixel-size", "nan"),
         ("--pixel-size", "one"),
+        ("--pixel-size", "-1 um"),
+        ("--pixel-size", "1 kg"),
+        ("--pixel-size", "inf"),
         ("--radius", "-1"),
         ("--min-radius", "inf"),
         ("--vertices", "4,,8"),
@@ -234,6 +355,9 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--neck", "1.5"),
         ("--max-blur", "0"),
         ("--saturated", "1"),
+        ("--threshold", "0"),
+        ("--threshold", "1.5"),
+        ("--drop", "a"),
     ],
 )
 def test_wrong_numbers_are_named(frame, option, value):
@@ -269,7 +393,7 @@ def test_an_interrupt_leaves_no_file(tmp_path, frame, capsys, monkeypatch):
 def test_a_real_frame(tmp_path, capsys):
     options = ("--pixel-size", "0.95e-6", "--vertices", "4,16", "--max-flocs", "4")
     assert run(real_image("flocpy/024.png"), *options, "-o", tmp_path / "s.h5") == 0
-    assert "024.png: 17 dark flocs" in capsys.readouterr().out
+    assert "024.png: 12 dark flocs" in capsys.readouterr().out
     for entry in read_library(tmp_path / "s.h5"):
         errors = [entry.fits[n].relative_error for n in (1, 4, 16)]
         assert errors == sorted(errors, reverse=True)

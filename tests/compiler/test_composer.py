@@ -12,7 +12,7 @@ from flocsim import Body, Sphere, System
 from flocsim.compiler import composer, disk_cache
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.numba_internals import call_by_address
+from flocsim.compiler.numba_internals import COLOURED, call_by_address
 from flocsim.errors import KernelError
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators.loop.driver import advance
@@ -282,3 +282,24 @@ def test_a_cache_folder_that_cannot_be_written_is_said_once_and_costs_no_result(
         warnings.simplefilter("error")
         assert compose(entry, {})(1.0) == 0.0
     assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+def refused_by_the_compiler(x):
+    return x.colour
+
+
+def test_an_error_of_the_compiler_has_no_colours(monkeypatch):
+    """As numba writes them where colorama is installed."""
+
+    def colour(self, text):
+        return f"\x1b[1m{text}\x1b[0m"
+
+    scheme = type(numba.core.errors.termcolor())
+    for name in COLOURED:
+        monkeypatch.setattr(scheme, name, colour)
+    with pytest.raises(KernelError) as caught:
+        compose(refused_by_the_compiler, {})(1.0)
+    line = refused_by_the_compiler.__code__.co_firstlineno + 1
+    assert f"test_composer.py:{line}: " in str(caught.value)
+    assert "\x1b" not in str(caught.value)
+    assert scheme.code is colour

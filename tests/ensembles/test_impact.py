@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.impact import depth, rounded_up
 from flocsim.ensembles.preflight import check_study
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, KernelError
 from flocsim.fields import quantity
 from flocsim.forces import ContactForce
 from tests.helpers.small_study import run_command, small_config, write_small
@@ -122,9 +122,13 @@ def min_mass(config):
     return next(mass for _, _, mass in pairs_of(next(sphere_pairs(config))[1].system))
 
 
-@pytest.mark.parametrize("law", [Sticky(), Singular()])
-def test_a_law_that_cannot_be_judged_is_left_alone(tmp_path, law):
-    check_study(with_law(small_config(tmp_path, HEAVY), law))
+def test_a_law_that_cannot_be_judged_is_left_alone(tmp_path):
+    check_study(with_law(small_config(tmp_path, HEAVY), Sticky()))
+
+
+def test_a_law_that_gives_no_number_is_refused_as_that(tmp_path):
+    with pytest.raises(KernelError, match="gives inf at an overlap of"):
+        check_study(with_law(small_config(tmp_path, HEAVY), Singular()))
 
 
 def test_the_command_refuses_before_it_runs(tmp_path):

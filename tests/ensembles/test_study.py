@@ -33,7 +33,7 @@ def test_conditions_are_in_the_order_of_the_results_file(study):
 def test_a_row_has_all_columns_and_names_its_flocs(study):
     row = study.run(1, 4, 1.0, 2)
     assert set(row) == set(REPLICATES)
-    chosen = study.floc_pool.choose(draws(1, 2), *study.config.scene.conditions[1][1:])
+    chosen = study.floc_pool.choose(draws(1, 2), *study.pairings[1].radii)
     assert (row["floc_i"], row["floc_j"]) == chosen
     sphere = study.run(1, 1, 1.0, 2)
     assert (sphere["floc_i"], sphere["floc_j"]) == (-1, -1)

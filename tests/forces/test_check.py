@@ -195,7 +195,7 @@ WRONG = {
     NoReturn: ("kernel", "returns None"),
     NoReturnInOneBranch: ("kernel", "returns None"),
     TwoParts: ("kernel", r"must return \(fx, fy, torque\)"),
-    List: ("kernel", r"must return \(normal, tangential\)"),
+    List: ("kernel", "makes a list in {file}:{body}"),
     WrongLimit: ("slip_limit", "must return one number, the largest slip"),
     WrongSlope: ("slope", "returns 'minus k'.*slope"),
     NoParameters: ("kernel", "TypeError.*0 positional arguments"),

@@ -6,6 +6,7 @@ right, since anyone can make them.
 
 import io
 import json
+import os
 import struct
 import zipfile
 import zlib
@@ -96,11 +97,18 @@ def objects_of(file):
     return found
 
 
+ELSEWHERE = os.devnull
+"""Where hostile files say that their data lie: HDF5 opens it for writing too, so that it must be a
+place in which nothing can be overwritten, whoever runs the tests."""
+
+
 def change_values(rng, file, path):
     """Odd values in a dataset."""
     dataset = file[path]
     if not isinstance(dataset, h5py.Dataset) or dataset.size == 0:
         return
+    if dataset.external or dataset.is_virtual:
+        return  # what is written there would go into another file
     values = dataset[()]
     if dataset.dtype.kind == "O":
         texts = [*ODD_TEXTS, *(each for each in ODD_VALUES if isinstance(each, str))]
@@ -133,11 +141,11 @@ def replace_dataset(rng, file, path):
     elif kind == 2:
         group.create_dataset(name, (2**20, 2**20), "u1", chunks=(2**10, 2**10), compression="gzip")
     elif kind == 3:
-        group.create_dataset(name, (4,), "u1", external=[("/etc/passwd", 0, 4)])
+        group.create_dataset(name, (4,), "u1", external=[(ELSEWHERE, 0, 4)])
     elif kind == 4:
         group[name] = h5py.SoftLink("/" + rng.choice(["replicates", "fits", name, "."]))
     elif kind == 5:
-        group[name] = h5py.ExternalLink("/etc/passwd", "/")
+        group[name] = h5py.ExternalLink(ELSEWHERE, "/")
     elif kind == 6:
         plan = h5py.VirtualLayout(shape=(4,), dtype="f8")
         plan[:] = h5py.VirtualSource("other.h5", "x", shape=(4,))

@@ -59,7 +59,12 @@ def make_results(
     times = np.where(collided, rng.uniform(0.0, 0.1, shape), np.nan)
     again = draw_second_runs((outcome, inside, bond))
     failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
+    zone = rng.uniform(30e-6, 50e-6, shape)
     replicates = {
+        "r_i": rng.uniform(4e-6, 20e-6, shape),
+        "r_j": rng.uniform(4e-6, 20e-6, shape),
+        "D_0": zone,
+        "d_c_over_D_0": lengths[0] / zone,
         "angle_i": rng.uniform(0.0, 2.0 * np.pi, shape),
         "angle_j": rng.uniform(0.0, 2.0 * np.pi, shape),
         "outcome": outcome,

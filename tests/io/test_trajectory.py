@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere, SpheroPolygon
+from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.files import read_sealed
-from flocsim.io.trajectory import DATASETS, write_trajectory
+from flocsim.io.trajectory import DATASETS, is_trajectory, read_trajectory, write_trajectory
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 
@@ -63,3 +64,33 @@ def test_the_same_motion_gives_the_same_sealed_bytes(tmp_path):
 def test_a_file_that_cannot_be_written(tmp_path):
     with pytest.raises(FileError, match="could not be written"):
         written(tmp_path / "no" / "m.h5")
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    times, position, velocity = written(tmp_path / "m.h5", replicate=17, status="FINISHED")
+    found = read_trajectory(tmp_path / "m.h5")
+    assert is_trajectory(tmp_path / "m.h5")
+    for array, again in zip((times, position, velocity), (found.t, found.position, found.velocity),
+                            strict=True):  # fmt: skip
+        np.testing.assert_array_equal(array, again)
+    assert [type(each) for each in found.shapes] == [Sphere, SpheroPolygon]
+    assert found.shapes[1].radius == SHAPES[1].radius
+    assert found.facts == {"replicate": 17, "status": "FINISHED"}
+
+
+def test_info_and_plot_read_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "m.h5", replicate=17)
+    assert main(["info", "m.h5"]) == 0
+    told = capsys.readouterr().out
+    assert "a trajectory" in told and "5 states" in told and "replicate        17" in told
+    assert main(["plot", "m.h5"]) == 0
+    assert capsys.readouterr().out.split() == ["m-strip.png", "m-distance.png"]
+
+
+def test_a_file_with_other_numbers_is_refused(tmp_path):
+    times, position, velocity = motion()
+    position[2, 1, 0] = np.nan
+    write_trajectory(tmp_path / "m.h5", times, position, velocity, SHAPES, {})
+    with pytest.raises(FileError, match="holds no readable trajectory: its arrays"):
+        read_trajectory(tmp_path / "m.h5")

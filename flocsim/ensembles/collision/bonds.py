@@ -39,8 +39,7 @@ from flocsim.ensembles.collision.observed import (
     BODY_J,
     DRIFT_X,
     DRIFT_Y,
-    MOBILITY_I,
-    MOBILITY_J,
+    LOAD,
     REST_ANGLE,
     REST_SINCE,
     REST_TIME,
@@ -96,12 +95,6 @@ def relative_speeds(scene, work, nx, ny):
     return abs(ux * nx + uy * ny), shear + abs(v[NOW, BODY_J, SPIN] - spin) * size
 
 
-def largest_load(observed):
-    """The pull on the bond of a settling doublet in its worst orientation [N]."""
-    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
-    return drift / (observed[MOBILITY_I] + observed[MOBILITY_J])
-
-
 def centre_attraction(scene, work, time):
     """Attraction between the centres [N], 0 without such forces."""
     if not has(scene, CENTRE_FORCE):
@@ -138,7 +131,7 @@ def is_held(scene, work, observed, time, nx, ny, distance):
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     spin = work.motion[NOW, BODY_I, SPIN]
     centrifugal = effective_mass(scene, BODY_I, BODY_J) * spin * spin * distance
-    load = SAFETY * (largest_load(observed) + centrifugal)
+    load = SAFETY * (observed[LOAD] + centrifugal)
     centres = centre_attraction(scene, work, time)
     surfaces = surface_attraction(scene, work, time)
     spheres = len(scene.vertices) == 2
@@ -176,7 +169,7 @@ def is_trapped(scene, work, observed, time, distance):
     if not has(scene, CENTRE_FORCE) or distance >= outer or scene.surface_reach > 0.0:
         return False
     needed = SAFETY * energy(scene, work)
-    load = SAFETY * largest_load(observed)
+    load = SAFETY * observed[LOAD]
     climbed, rung = 0.0, (outer - distance) / RUNGS
     for step in range(RUNGS):
         place = distance + (step + 0.5) * rung
@@ -249,4 +242,4 @@ def bond_of(scene, work, observed, time, gap, nx, ny, distance):
     if not has_rested(scene, work, observed, time, gap, nx, ny, distance):
         return NO_BOND
     attraction = centre_attraction(scene, work, time) + surface_attraction(scene, work, time)
-    return REST if attraction > largest_load(observed) else HOOK
+    return REST if attraction > observed[LOAD] else HOOK

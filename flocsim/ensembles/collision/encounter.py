@@ -8,21 +8,26 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import NOW, Scene, Work, work_of
+from flocsim.arrays import EQUIVALENT_RADIUS, NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.blame import force_to_blame
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, UNABLE, WHY, collided, outcome_of
-from flocsim.ensembles.collision.settling import terminal_motion, turn_time
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided, outcome_of
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
+from flocsim.plausibility.settling import (
+    largest_mobility,
+    least_mobility,
+    terminal_motion,
+    turn_time,
+)
 from flocsim.run import Run
 from flocsim.system import System
+from flocsim.trajectories.blame import UNABLE, force_to_blame
 
 OBSERVER: dict[Callable, Callable] = {
     hooks.awaits_touch: outcomes.has_not_touched,
@@ -42,7 +47,7 @@ class Encounter:
     """Two shapes that meet: everything about them but orientation and displacement.
 
     Made once for each pair of shapes and used for all replicates that draw it. ``zone_distance``
-    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j.
+    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j, alone.
     """
 
     system: System
@@ -79,6 +84,29 @@ class Encounter:
         radius_i, radius_j = (shape.equivalent_radius for shape in self.shapes)
         return turn_time(radius_i, radius_j, self.drift)
 
+    @functools.cached_property
+    def mobilities(self) -> tuple[float, ...]:
+        """The largest of each body on its way between rest and settling [s/kg]: what is left of a
+        velocity dies away at least as fast, and attraction carries it no faster."""
+        return tuple(
+            largest_mobility(self.system, body, math.hypot(*velocity), mobility)
+            for body, (velocity, mobility) in zip(self.system.bodies, self.settling, strict=True)
+        )
+
+    @functools.cached_property
+    def largest_load(self) -> float:
+        """The pull on the bond of a settling doublet in its worst orientation [N].
+
+        |drift|/(µ_i + µ_j); where drag is not linear, at the least mobilities up to the speed of
+        the faster one, which bounds it from above.
+        """
+        fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
+        least = [
+            least_mobility(self.system, body, fastest, mobility)
+            for body, (_, mobility) in zip(self.system.bodies, self.settling, strict=True)
+        ]
+        return math.hypot(*self.drift) / sum(least)
+
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
@@ -89,8 +117,8 @@ class Encounter:
         observed[numbers.ESCAPE] = escape
         observed[numbers.REST_TIME] = rest
         observed[numbers.DRIFT_X : numbers.DRIFT_Y + 1] = self.drift
-        observed[numbers.MOBILITY_I] = self.settling[0][1]
-        observed[numbers.MOBILITY_J] = self.settling[1][1]
+        observed[numbers.MOBILITY_I], observed[numbers.MOBILITY_J] = self.mobilities
+        observed[numbers.LOAD] = self.largest_load
         return observed
 
     def time_limit(self) -> float:
@@ -159,6 +187,7 @@ class Record:
     """Asks run_encounter to keep every step of a replicate."""
 
     run: Run | None = None
+    status: Status | None = None
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
@@ -184,7 +213,7 @@ def run_encounter(
     if status == Status.PAUSED:
         return None
     if record is not None:
-        record.run = run
+        record.run, record.status = run, status
     row = replicate_row(status, angles, run)
     if status in UNABLE and (why := force_to_blame(encounter.system, run)):
         row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
@@ -196,14 +225,19 @@ def replicate_row(status, angles, run):
     observed = run.observed
     outcome, failure = outcome_of(status, run.code, observed)
     touched = collided(observed)
+    zone = observed[numbers.ZONE]
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
+        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
+        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
+        "D_0": zone,
         "outcome": outcome,
         "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
         "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
         "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
         "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
+        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
         "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
         "d_c_last": observed[numbers.D_LAST],
         "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,

@@ -31,9 +31,6 @@ UNDECIDED_ENDS = {
 FAILED_ENDS = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
 """Ends in which the model was left, and their reasons."""
 
-UNABLE = (Status.STEP_BUDGET, Status.STALLED, Status.NOT_FINITE)
-"""Ends at which a force may be to blame that gives NaN or infinity."""
-
 WHY = "why"
 """Key of a row, beside the columns, for the words on a failure."""
 
@@ -88,8 +85,8 @@ def run_safely(
         return None, None
     why = row.pop(WHY, "")
     if row["outcome"] != FAILED and not all(math.isfinite(row[name]) for name in ALWAYS_FINITE):
-        flocs = {name: row[name] for name in ("floc_i", "floc_j")}
-        row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | flocs
+        drawn = {name: row[name] for name in ("r_i", "r_j", "D_0", "floc_i", "floc_j")}
+        row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | drawn
     if row["outcome"] == FAILED:
         reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
         return row, make_note(study, place, replicate, reason)
@@ -105,7 +102,7 @@ def failed_row(reason, angles):
 def make_note(study, place, replicate, why):
     """What is needed to run a replicate again, and why one would, as JSON can hold it."""
     condition, vertices, share = place
-    name = study.config.scene.conditions[condition][0]
+    name = study.config.scene.names[condition]
     return {
         "type": name, "vertices": vertices, "delta": share, "replicate": replicate, "why": why,
     }  # fmt: skip

@@ -42,6 +42,18 @@ class Floc:
             return shape.scaled(equivalent_radius / shape.equivalent_radius)
         return resized(shape, equivalent_radius, radius)
 
+    def measured(self, vertices: int) -> Shape:
+        """The shape of N vertices, scaled as a whole to the measured ``size``: a fit of few
+        vertices covers some percent more or less than the floc."""
+        shape = self.shapes[vertices]
+        return shape.scaled(self.measured_size / shape.equivalent_radius)
+
+    @property
+    def measured_size(self) -> float:
+        """The measured r_eq [m] of a floc that has one."""
+        assert self.size is not None, "a floc of a library was measured"
+        return self.size
+
 
 def grow_floc(shapes, seed, index):
     """One synthetic floc, fitted at all the numbers of vertices that the config asks for."""
@@ -121,6 +133,15 @@ class FlocPool:
     by_error: bool = False
     made: dict[tuple, Shape] = attrs.Factory(dict)
 
+    def near(self, radii: Sequence[float]) -> list[float]:
+        """The different sizes [m], ascending, of the flocs that are drawn for bodies of about
+        these radii: two at least."""
+        sizes = [floc.size for floc in self.flocs]
+        orders = [nearest_in_ratio(sizes, radius, None) for radius in radii]
+        found = {sizes[k] for order in orders for k in order[: self.pool]}
+        more = next(sizes[k] for k in orders[1] if {sizes[k]} != found)
+        return sorted(found | {more} if len(found) == 1 else found)
+
     def choose(
         self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
     ) -> tuple[int, int]:
@@ -155,13 +176,22 @@ class FlocPool:
     def shape(self, place: int, vertices: int, equivalent_radius: float) -> Shape:
         """A floc with N vertices in a size, or its own; the equivalent sphere for N = 1."""
         if self.own_size:
-            floc = self.flocs[place]
-            return floc.shapes[vertices] if vertices > 1 else Sphere(floc.size)
+            equivalent_radius = self.flocs[place].measured_size
         key = (place if vertices > 1 else None, vertices, equivalent_radius)
         if key not in self.made:
-            self.made[key] = (
-                self.flocs[place].resized(vertices, equivalent_radius, self.radius)
-                if vertices > 1
-                else Sphere(equivalent_radius)
-            )
+            self.made[key] = self.make(place, vertices, equivalent_radius)
         return self.made[key]
+
+    def make(self, place: int, vertices: int, equivalent_radius: float) -> Shape:
+        """A floc, or the sphere, of an equivalent radius [m]."""
+        if vertices == 1:
+            return Sphere(equivalent_radius)
+        if self.own_size:
+            return self.flocs[place].measured(vertices)
+        return self.flocs[place].resized(vertices, equivalent_radius, self.radius)
+
+
+def pool_of(shapes: ShapesConfig, flocs: Sequence[Floc]) -> FlocPool:
+    """The FlocPool of a config's [shapes]."""
+    by_error = shapes.pairs_alike_in == "error"
+    return FlocPool(list(flocs), shapes.radius, shapes.pool, shapes.size == "own", by_error)

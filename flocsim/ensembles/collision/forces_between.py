@@ -3,17 +3,27 @@
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.settling import lone_view, no_force
+from flocsim.forces.base import PairForce
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators.rhs.views import pair_view
+from flocsim.plausibility.settling import lone_view, no_force
 
 OUTLINES = "contact"
-"""Name of what acts at the outlines: contact, and forces of the surface gap if there are any."""
+"""Name of what acts at the outlines where that is contact alone."""
 SETTLING = "weight and drag"
 NAMES = {"VanDerWaals": "van der Waals", "DoubleLayer": "double layer"}
 TRUSTED = 1e-2
 """What the balance leaves below this share of all other forces, and below half of their change in
 a step, is its own error."""
+
+
+def outline_name(encounter: Encounter) -> str:
+    """The name of what acts at the outlines: contact, and the forces of the surface gap that add up
+    with it there, by their names."""
+    acting = encounter.system.pieces.used.values()
+    pairs = [each for each in acting if isinstance(each, PairForce)]
+    surface = [type(each).__name__ for each in pairs if each.acts_on == "surfaces"]
+    return " + ".join([OUTLINES, *(NAMES.get(name, name) for name in surface)])
 
 
 def geometry(position, velocity, shapes):
@@ -58,9 +68,10 @@ def forces_between(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(instants (k − 1,) [s], {name: force on body j [N]}), means over the steps of the motion.
 
-    Along the line of centres, above 0 where it pushes apart. What acts at the outlines follows
-    from the balance of momentum, m_j Δv_j/Δt less all other forces: exact for a step's mean up to
-    the curvature of those others within a step; NaN where no more than that error is left.
+    Along the line of centres, above 0 where it pushes apart. What acts at the outlines follows,
+    all of it together under the name of `outline_name`, from the balance of momentum, m_j Δv_j/Δt
+    less all other forces: exact for a step's mean up to the curvature of those others within a
+    step; NaN where no more than that error is left.
     ``times`` (k,) [s], ``position`` and ``velocity`` (k, 2, 3), as Record.arrays has them.
     """
     around = geometry(position, velocity, encounter.shapes)
@@ -74,5 +85,5 @@ def forces_between(
     left = inertia - sum(means.values())
     error = TRUSTED * sum(np.abs(each) for each in means.values())
     error += sum(0.5 * np.abs(np.diff(force)) for force in named.values())
-    means[OUTLINES] = np.where(np.abs(left) > error, left, np.nan)
+    means[outline_name(encounter)] = np.where(np.abs(left) > error, left, np.nan)
     return 0.5 * (times[1:] + times[:-1]), means

@@ -1,12 +1,13 @@
 """The numbers of the observer of a collision: what it is given, and what it finds."""
 
 (
-    ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J,
+    ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J, LOAD,
     COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION, BOND,
     REST_SINCE, REST_X, REST_Y, REST_ANGLE, OBSERVED_SIZE,
-) = range(20)  # fmt: skip
+) = range(21)  # fmt: skip
 """Columns of `observed`. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
-relative to i [m/s], mobilities [s/kg]. Found: flags, centre distances [m], time [s], the kind of
+relative to i [m/s], largest mobilities [s/kg], the largest load that settling can put on a bond
+[N]. Found: flags, centre distances [m], time [s], the kind of
 bond (bonds.py), and since when the doublet has been resting in which pose."""
 
 BODY_I, BODY_J = range(2)

@@ -18,13 +18,15 @@ from flocsim.ensembles.config.schema import (
     TOP_KEYS,
     Config,
     contradictions,
+    implied,
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import parse
+from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
+from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
 
 def load_config(
@@ -45,11 +47,13 @@ def load_config(
     preset = table.get("preset")
     if isinstance(preset, str):
         table = lay_over(PRESETS.get(preset, {}), table)
+    table = lay_over(implied(table), table)
     reader = Reader(folder, problems, sources)
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):
-        parts["output"] = attrs.evolve(parts["output"], file=f"{Path(path).stem}.h5")
+        stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
+        parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
     return Config(text=text, folder=folder, overrides=overrides, **parts)
 
 
@@ -75,8 +79,8 @@ class Reader:
             parts[name] = self.table(name, table_class, table.get(name, {}))
         forces = self.forces(table.get("forces", {}))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
-        if not self.problems.at("preset", "bodies", "fluid"):
-            for place, text in contradictions(parts["bodies"], parts["fluid"]):
+        if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
+            for place, text in contradictions(parts):
                 self.problems.note(place, text)
         return parts
 
@@ -122,9 +126,14 @@ class Reader:
 
     def library(self, name):
         path = self.folder / name
+        if str(name) == NAME_OF_SHIPPED and not os.path.lexists(path):
+            return SHIPPED
         if not os.path.isfile(path):
             what = "is no ordinary file" if os.path.exists(path) else "does not exist"
-            text = f"{path} {what}; name a library that `flocsim fit` wrote"
+            text = (
+                f"{path} {what}; name a library that `flocsim fit` wrote, or "
+                f'"{NAME_OF_SHIPPED}", the one that ships with flocsim'
+            )
             self.problems.note(("shapes", "file"), text)
         return path
 

@@ -22,7 +22,9 @@ takes, its default and its meaning. (This page is made from the schema by
 
 - **Quantities** are numbers in SI units, or strings with a unit, converted exactly:
   `radius = 1e-6` is `radius = "1 um"`. Units multiply by a space or `*`, divide by `/`, and have
-  whole exponents: `"0.89 mPa s"`, `"1.2 g/cm^3"`, `"1.2 g cm-3"`. Another dimension is an error.
+  exponents: `"0.89 mPa s"`, `"1.2 g/cm^3"`, `"1.2 g cm-3"`, `"3 Pa^0.5"`, `"3 m^(1/2)"`. An energy
+  may be in kT at a stated temperature: `"4 kT@293K"`. Another dimension is an error. The same texts
+  stand in Python: `VanDerWaals(hamaker="5 zJ")`, `Sphere("5 um")`, `system.run("20 ms")`.
 - **Nothing is guessed.** Unknown keys are errors, `2.7` and `3.0` are no integers, `true` is no
   number, and there is no `nan` and no `inf`. All errors are told at once, with file and line.
 - **Presets** lie under the file: every value that the file gives replaces the preset's. Keys that

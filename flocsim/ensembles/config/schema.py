@@ -10,7 +10,8 @@ the one source of flocs that a key goes with; ``beside_class`` marks keys that s
 named.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from flocsim.ensembles.config.own_classes import (
 )
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.values import (
+    count_or,
     list_of,
     number,
     one_of,
@@ -36,6 +38,7 @@ from flocsim.ensembles.config.values import (
     vector,
     whole,
     whole_field,
+    word_or,
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
@@ -58,19 +61,34 @@ def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> A
     )
 
 
+MEASURED = "measured"
+"""Value of `[scene] pairs`, and the name of the one collision type that it makes by itself."""
+
+MOST_CLASSES = 20
+
+
+def of_measured(value: Any) -> Any:
+    """A default where pairs are measured; None elsewhere."""
+    return attrs.Factory(lambda self: value if self.pairs == MEASURED else None, takes_self=True)
+
+
 @attrs.frozen
 class SceneConfig:
     """[scene]: who meets whom, and how the meeting begins and ends."""
 
-    pairs: tuple[tuple[float, float], ...] | None = read_by(
-        list_of(
-            vector(2, "m", above=0.0, at_most=LARGEST_LENGTH),
-            "a list of pairs such as [['16.41 um', '23.02 um']]",
+    pairs: tuple[tuple[float, float], ...] | str | None = read_by(
+        word_or(
+            MEASURED,
+            list_of(
+                vector(2, "m", above=0.0, at_most=LARGEST_LENGTH),
+                "a list of pairs such as [['16.41 um', '23.02 um']], or 'measured'",
+            ),
         ),
-        "a list of pairs [r_i, r_j], each above 0 and at most 0.01",
+        'a list of pairs [r_i, r_j], each above 0 and at most 0.01, or "measured"',
         default=None,
         unit="m",
-        help="equivalent radii (receiving, approaching), instead of `types`",
+        help="equivalent radii (receiving, approaching), instead of `types`; measured: two flocs "
+        "of the library are drawn from all, each at its own size, the faster of the two approaches",
     )
     types: tuple[str, ...] | None = read_by(
         list_of(one_of(tuple(TYPES)), "a list of 'I', 'II', 'III'"),
@@ -79,6 +97,51 @@ class SceneConfig:
         shown='["I", "II", "III"]',
         help="the paper's collision types: (r_i, r_j) = I (16.41, 23.02), "
         "II (4.95, 23.02), III (4.62, 4.95) µm",
+    )
+    weight: str | None = choice(
+        "number",
+        "area",
+        "volume",
+        default=of_measured("number"),
+        shown='"number"',
+        only_measured=True,
+        help="how often a measured floc is drawn: number, each alike; area, in proportion to its "
+        "area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
+        "laser diffraction and Coulter counters give it",
+    )
+    min_radius: float | None = quantity(
+        "m",
+        above=0.0,
+        at_most=LARGEST_LENGTH,
+        default=None,
+        only_measured=True,
+        help="least r_eq of the measured flocs that are drawn; none: of all",
+    )
+    max_radius: float | None = quantity(
+        "m",
+        above=0.0,
+        at_most=LARGEST_LENGTH,
+        default=None,
+        only_measured=True,
+        help="largest r_eq of the measured flocs that are drawn; none: of all",
+    )
+    classes: int | tuple[float, ...] | None = read_by(
+        count_or(
+            whole(1, MOST_CLASSES),
+            list_of(
+                number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH)),
+                "a list of radii such as ['10 um', '20 um'], or a number of classes",
+            ),
+        ),
+        f"a list of distinct radii, each above 0 and at most 0.01, or a number of classes from 1 "
+        f"to {MOST_CLASSES}",
+        default=of_measured(1),
+        shown="1",
+        unit="m",
+        only_measured=True,
+        help="size classes of the measured flocs, each pair of which is a collision type: so many, "
+        "of equal weight (`q1` of the smallest to `q2`, …), or the r_eq between them (`to10um`, "
+        "`10to20um`, `from20um`)",
     )
     delta: tuple[float, ...] = read_by(
         list_of(number("", *number_range(at_least=0.0)), "a list of fractions such as [0.0, 0.5]"),
@@ -126,18 +189,80 @@ class SceneConfig:
         help="simulated time after which a replicate ends undecided",
     )
 
-    @property
-    def conditions(self) -> tuple[tuple[str, float, float], ...]:
-        """(name, r_i, r_j) [-, m, m] of every collision type or pair, in the config's order.
+    def __attrs_post_init__(self):
+        if not self.is_measured:
+            for field in attrs.fields(type(self)):
+                given = getattr(self, field.name)
+                if field.metadata.get("only_measured") and given is not None:
+                    raise ConfigError(
+                        f'{field.name} goes with pairs = "measured", which draws measured flocs: '
+                        "remove it or give that"
+                    )
+            return
+        low, high = self.min_radius or 0.0, self.max_radius or LARGEST_LENGTH
+        if low >= high:
+            raise ConfigError(
+                f"min_radius = {low:g} m is not below max_radius = {high:g} m: no floc is between"
+            )
+        borders = self.classes if isinstance(self.classes, tuple) else ()
+        if list(borders) != sorted(borders) or any(not low < each < high for each in borders):
+            raise ConfigError(
+                "classes must be ascending radii between min_radius and max_radius, found "
+                f"{', '.join(f'{micrometres(each)} um' for each in borders)}"
+            )
+        count = len(self.class_labels)
+        if count > MOST_CLASSES:
+            raise ConfigError(f"classes may be {MOST_CLASSES} at most, found {count}")
 
-        A pair is called "16.41um-23.02um".
+    @property
+    def is_measured(self) -> bool:
+        """Whether pairs are drawn from the measured distribution of a library."""
+        return self.pairs == MEASURED
+
+    @property
+    def given(self) -> tuple[tuple[str, tuple[float, float]], ...]:
+        """(name, (r_i, r_j) [m]) of every collision type or pair of radii, in the config's order.
+
+        A pair is called "16.41um-23.02um". None where pairs are measured.
         """
+        if isinstance(self.pairs, str):
+            return ()
         if self.pairs:
-            return tuple((f"{micrometres(i)}um-{micrometres(j)}um", i, j) for i, j in self.pairs)
-        return tuple((name, *TYPES[name]) for name in self.types or ())
+            return tuple((f"{micrometres(i)}um-{micrometres(j)}um", (i, j)) for i, j in self.pairs)
+        return tuple((name, TYPES[name]) for name in self.types or ())
+
+    @property
+    def class_labels(self) -> tuple[str, ...]:
+        """The names of the size classes of measured flocs, the smallest first."""
+        if not isinstance(self.classes, tuple):
+            return tuple(f"q{place}" for place in range(1, (self.classes or 1) + 1))
+        words = [micrometres(each) for each in self.classes]
+        inner = [f"{low}to{high}um" for low, high in itertools.pairwise(words)]
+        return (f"to{words[0]}um", *inner, f"from{words[-1]}um")
+
+    @property
+    def class_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Places of the two size classes of every pair of them that is a collision type."""
+        places = range(len(self.class_labels))
+        return tuple(itertools.combinations_with_replacement(places, 2))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name of every collision type, pair of radii or pair of size classes, in order."""
+        if not self.is_measured:
+            return tuple(name for name, _ in self.given)
+        labels = self.class_labels
+        if len(labels) == 1:
+            return (MEASURED,)
+        return tuple(f"{labels[a]}-{labels[b]}" for a, b in self.class_pairs)
 
     def only(self, places: Iterable[int]) -> "SceneConfig":
-        """The scene with the collision types, or pairs, at these places alone."""
+        """The scene with the collision types, or pairs, at these places alone.
+
+        Pairs of size classes stay together: there the scene is as it was.
+        """
+        if isinstance(self.pairs, str):
+            return self
         if self.pairs:
             return attrs.evolve(self, pairs=tuple(self.pairs[place] for place in places))
         names = self.types or ()
@@ -221,7 +346,8 @@ class ShapesConfig:
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",
-            "help": 'shape library that `flocsim fit` wrote; with source = "library" only',
+            "help": 'shape library that `flocsim fit` wrote, or "synthetic", the one that ships '
+            'with flocsim (24 grown flocs at N = 4, 8, 16, 32, 64); with source = "library" only',
             "only_for": "library",
         },
     )
@@ -253,7 +379,8 @@ class ShapesConfig:
         default="scene",
         help="scene: every floc is resized to the radius that its collision type asks for; own: it "
         "keeps the size at which it was measured, its spheroradius with it, and is drawn from the "
-        "`pool` flocs nearest to that radius; the faster of the two approaches",
+        '`pool` flocs nearest to that radius, or as `scene.pairs = "measured"` says, which '
+        "implies it; the faster of the two approaches",
         only_for="library",
     )
     pairs_alike_in: str = choice(
@@ -549,8 +676,40 @@ def excluded_by(table: str, given: Collection[str]) -> set[str]:
     return found
 
 
-def contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[tuple[tuple[str, ...], str]]:
-    """(place, what is wrong) of values that do not go together though each is right by itself."""
+def implied(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that follow from others of a config's nested dicts, where they are not given."""
+    scene, shapes = (table.get(name) for name in ("scene", "shapes"))
+    if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
+        return {}
+    if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
+        return {}
+    return {"shapes": {"size": "own"}}
+
+
+def contradictions(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """(place, what is wrong) of values that do not go together though each is right by itself.
+
+    ``parts``: the tables of a config by name.
+    """
+    yield from weight_contradictions(parts["bodies"], parts["fluid"])
+    if parts["scene"].is_measured:
+        yield from measured_contradictions(parts["shapes"])
+
+
+def measured_contradictions(shapes: ShapesConfig) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What of [shapes] does not go with measured pairs."""
+    if shapes.source != "library":
+        text = '"measured" draws flocs that were measured, but shapes.source is no library: give '
+        yield ("scene", "pairs"), text + 'source = "library" and file, which `flocsim fit` wrote'
+    elif shapes.size != "own":
+        text = 'scene.pairs = "measured", which takes every floc at its own size: leave size out'
+        yield ("shapes", "size"), f'"{shapes.size}" does not go with {text}'
+
+
+def weight_contradictions(
+    bodies: BodiesConfig, fluid: Fluid
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What of the bodies' weight does not go with buoyancy."""
     if not fluid.buoyancy:
         return
     if bodies.density is None:

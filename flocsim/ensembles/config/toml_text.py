@@ -3,6 +3,7 @@
 import itertools
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,9 +19,19 @@ MOST_ATTEMPTS = 300
 CLOSERS = ("]", "}", '"""', "'''")
 
 
+STANDARD_INPUT = "-"
+"""Stands for a config that comes through a pipe."""
+
+
 def read_text_file(path: str | os.PathLike) -> str:
-    """The text of the file, its line ends as "\\n"; ConfigError of one line where there is none."""
+    """The text of the file, its line ends as "\\n"; ConfigError of one line where there is none.
+
+    "-" is the standard input.
+    """
     try:
+        if str(path) == STANDARD_INPUT:
+            found = sys.stdin.buffer.read(LARGEST_FILE + 1)
+            return found.decode("utf-8-sig").replace("\r\n", "\n")
         if not Path(path).exists():
             raise ConfigError(f"{path}: there is no such file; `flocsim init {path}` writes one")
         if not Path(path).is_file():

@@ -13,9 +13,9 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.config.problems import Misfit, misfit, suggestion
-from flocsim.ensembles.config.quantities import kind_of, read_quantity
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
+from flocsim.fields.quantities import kind_of, read_quantity
 
 Reader = Callable[[Any], Any]
 
@@ -160,6 +160,28 @@ def list_of(
         if findings:
             raise Misfit(*findings)
         return tuple(items.values())
+
+    return read
+
+
+def word_or(word: str, read_other: Reader) -> Reader:
+    """A reader of one word, or of what the other reader takes."""
+
+    def read(value):
+        if not isinstance(value, str):
+            return read_other(value)
+        if value != word:
+            raise misfit(f"{word!r} or a list", value, suggestion(value, (word,)))
+        return value
+
+    return read
+
+
+def count_or(read_count: Reader, read_list: Reader) -> Reader:
+    """A reader of a number, or of a list."""
+
+    def read(value):
+        return read_list(value) if isinstance(value, list | tuple) else read_count(value)
 
     return read
 

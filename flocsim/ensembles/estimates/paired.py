@@ -58,11 +58,22 @@ def newcombe(
         np.asarray(each, dtype=float) for each in (both, here, there, neither)
     )
     n = both + here + there + neither
+    phi = correlation(both, here, there, neither)
+    return between(both + here, n, both + there, n, phi)
+
+
+def between(
+    successes: ArrayLike, trials: ArrayLike, others: ArrayLike, of: ArrayLike, phi: ArrayLike = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(difference, low, high) of successes/trials − others/of, 95 %, of a correlation ``phi``.
+
+    0 for independent samples: Newcombe, Stat. Med. 17 (1998) 873–890, method 10. NaN where either
+    has no trials.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = (both + here) / n, (both + there) / n
-        one_low, one_high = wilson(both + here, n)
-        other_low, other_high = wilson(both + there, n)
-        phi = correlation(both, here, there, neither)
+        one, other = np.true_divide(successes, trials), np.true_divide(others, of)
+        one_low, one_high = wilson(successes, trials)
+        other_low, other_high = wilson(others, of)
         down = joined(one - one_low, other_high - other, phi)
         up = joined(one_high - one, other - other_low, phi)
         return one - other, one - other - down, one - other + up

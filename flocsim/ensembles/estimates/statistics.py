@@ -136,16 +136,14 @@ def checked_codes(
     return outcome, inside, bond
 
 
-def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
-    """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
-
-    S and M are a replicate's successes and trials over all displacements; sums are over
-    replicates. Codes are (type, vertices, delta, replicate).
-    """
+def trials_of(
+    outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """{probability: (whether a replicate counts in it, whether as a success)} from codes."""
     aggregated = np.isin(outcome, AGGREGATED)
     within = np.isin(outcome, INSIDE_CLASSES)
     without = np.isin(outcome, OUTSIDE_CLASSES)
-    estimates = {
+    return {
         "pr_inside": (inside != NOT_APPLICABLE, inside == 1),
         "pr_a_given_inside": (within, within & aggregated),
         "pr_a_given_outside": (without, without & aggregated),
@@ -153,8 +151,16 @@ def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> di
         "pr_sticks": (outcome < DECIDED, aggregated & (bond != HOOK)),
         "pr_hangs": (outcome < DECIDED, aggregated & (bond == HOOK)),
     }
+
+
+def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
+    """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
+
+    S and M are a replicate's successes and trials over all displacements; sums are over
+    replicates. Codes are (type, vertices, delta, replicate).
+    """
     sums = {}
-    for name, (trials, successes) in estimates.items():
+    for name, (trials, successes) in trials_of(outcome, inside, bond).items():
         m = np.sum(trials, axis=2, dtype=np.int64)
         s = np.sum(successes, axis=2, dtype=np.int64)
         terms = (s, m, s * s, s * m, m * m, m > 0)

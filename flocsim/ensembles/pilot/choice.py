@@ -173,7 +173,7 @@ def first_methods(config: Config) -> dict[str, Integrator]:
 
     On these a pilot runs; each of its trials has a method of its own.
     """
-    return {name: config.integrator.method for name, _, _ in config.scene.conditions}
+    return dict.fromkeys(config.scene.names, config.integrator.method)
 
 
 def sampling_error(config: Config) -> float:
@@ -224,7 +224,7 @@ def settled(
     methods: dict[str, Integrator] = {}
     types: list[dict] = []
     for ladder, belief in zip(ladders, known, strict=False):
-        name = config.scene.conditions[ladder.condition][0]
+        name = config.scene.names[ladder.condition]
         taken = cheaper((ladder, belief), others.get(ladder.condition), target)
         tried = tried_of(ladder)
         if ladder.condition in others:
@@ -242,7 +242,7 @@ def implicit_ladders(study, share, target):
     reference = REFERENCE * (adequate(blank, target) or RUNGS[-1])
     ladders = []
     for condition, tasks in enumerate(sample_of(config)):
-        length = scene_length(config, condition)
+        length = scene_length(config, condition, study.flocs)
         ladders.append(Ladder(condition, Implicit(), length, tasks, reference, []))
         ladders[-1].max_steps = config.integrator.max_steps
     jobs = [
@@ -308,8 +308,8 @@ def stable_cost(study, ladder):
 
     Where polygons touch at several points they have to be smaller still: the probe tells.
     """
-    name = study.config.scene.conditions[ladder.condition][0]
-    pair = next(pair for each, pair in sphere_pairs(study.config) if each == name)
+    name = study.config.scene.names[ladder.condition]
+    pair = next(pair for each, pair in sphere_pairs(study.config, study.flocs) if each == name)
     limits = [scale.time for scale in all_scales(pair.system) if scale.limits_steps]
     steps = mean([each.time for each in ladder.exact]) / (STABLE * min(limits)) if limits else 0.0
     return STAGES * WEIGHTS[DormandPrince54] * steps
@@ -367,7 +367,7 @@ def key_of(study: Study) -> str:
     config = study.config
     scene = config.scene
     which = {
-        "types": [name for name, _, _ in scene.conditions], "delta": list(scene.delta),
+        "types": list(scene.names), "delta": list(scene.delta),
         "vertices": list(config.shapes.vertices),
         "replicates": expected_replicates(config.replicates, config.stop),
         "indices": config.replicates, "max_steps": config.integrator.max_steps,
@@ -381,7 +381,7 @@ def recorded_choice(study: Study, records: Iterable[dict]) -> Choice | None:
     The study was made with `first_methods`. Whoever wrote the records: the methods of one that is
     taken are part of the study's identity.
     """
-    key, names = key_of(study), [name for name, _, _ in study.config.scene.conditions]
+    key, names = key_of(study), list(study.config.scene.names)
     for record in records:
         chosen = record.get("types", [])
         if record.get("of") == key and [each["name"] for each in chosen] == names:

@@ -105,7 +105,7 @@ class Forecast:
 
 def in_turn(config: Config, size: int = MOST) -> list[Task]:
     """Tasks of all types in turn, at most so many: any first few are spread over all conditions."""
-    types = len(config.scene.conditions)
+    types = len(config.scene.names)
     lists = sample_of(config, max(size // types, LEAST))
     return [task for tasks in zip(*lists, strict=True) for task in tasks]
 
@@ -133,7 +133,7 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
         row = run_encounter(encounter, driver, angles, task.delta, steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])
         first = clock() - began
-        exact = study.exact[study.config.scene.conditions[task.condition][0]]
+        exact = study.exact[study.config.scene.names[task.condition]]
         if again and exact is not None:
             began = clock()
             found = study.run_again(encounter, angles, task.delta, exact, None) or {}
@@ -153,14 +153,14 @@ def time_replicates(
 
     ``go_on()`` is called before each one, and may raise.
     """
-    least = LEAST * len(study.config.scene.conditions)
+    least = LEAST * len(study.config.scene.names)
     checks = study.config.integrator.check_share != 0.0
     began, runs = time.process_time(), []
     for place, task in enumerate(tasks):
         go_on()
         if place >= least and time.process_time() - began > seconds:
             break
-        again = checks and (place // len(study.config.scene.conditions)) % EVERY == 0
+        again = checks and (place // len(study.config.scene.names)) % EVERY == 0
         runs.append(timed(study, task, again))
     return runs
 
@@ -171,7 +171,7 @@ def pairs_made(study: Study, ranks: int) -> float:
     count = expected_replicates(config.replicates, config.stop)
     numbers = [draws(config.seed, k) for k in range(min(count, 1000))]
     total = 0
-    for condition in range(len(config.scene.conditions)):
+    for condition in range(len(config.scene.names)):
         for vertices in config.shapes.vertices:
             found = {study.choose_flocs(condition, vertices, each) for each in numbers}
             total += min(len(found) * ranks, count * len(config.scene.delta))
@@ -243,9 +243,9 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     checks = cells * count_checks(config.seed, count, config.integrator.check_share)
     fixed = START * ranks + before + setting_up(study, runs, ranks)
-    fixed += EACH * cells * count * len(config.scene.conditions)
+    fixed += EACH * cells * count * len(config.scene.names)
     groups = []
-    for place in range(len(config.scene.conditions)):
+    for place in range(len(config.scene.names)):
         mine = [run for run in runs if run.task.condition == place]
         groups.append(
             Spent(*(np.array(part) for part in zip(*(run[3:5] for run in mine), strict=True)))
@@ -266,7 +266,7 @@ def file_size(study: Study, count: int) -> float:
     config = study.config
     shape = study.shape[:3]
     draft = Results(
-        types=tuple(name for name, _, _ in config.scene.conditions),
+        types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=None,

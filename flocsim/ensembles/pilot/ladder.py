@@ -5,13 +5,18 @@ so the ladder begins at the smallest length of the outlines, rounded to a decade
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
 
 from flocsim.arrays import EVALUATIONS
 from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import Task
+from flocsim.ensembles.preflight import measured_flocs, pairings
 from flocsim.ensembles.study import Study
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.base import Integrator
@@ -54,12 +59,18 @@ class Trial(NamedTuple):
     time: float
 
 
-def scene_length(config: Config, condition: int) -> float:
-    """Length [m] at which the ladder of a collision type begins: a power of ten."""
-    _, *radii = config.scene.conditions[condition]
-    length = CORE * min(radii)
-    if max(config.shapes.vertices) > 1 and config.shapes.own is None:
-        length = min(length, config.shapes.radius)
+def scene_length(config: Config, condition: int, flocs: Sequence[Floc] | None = None) -> float:
+    """Length [m] at which the ladder of a collision type begins: a power of ten.
+
+    ``flocs``: those of the study, where they have been read.
+    """
+    shapes, known = config.shapes, measured_flocs(config) if flocs is None else flocs
+    length = CORE * min(pairings(config, known)[condition].radii)
+    if max(shapes.vertices) > 1 and shapes.size == "own":
+        measured = [each.radius for floc in known for each in floc.shapes.values()]
+        length = min(length, float(np.median(measured)))
+    elif max(shapes.vertices) > 1 and shapes.own is None:
+        length = min(length, shapes.radius)
     return float(f"1e{round(math.log10(length))}")
 
 

@@ -13,6 +13,7 @@ import attrs
 
 from flocsim.ensembles.collision.encounter import Encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.forecast import Timed
 from flocsim.ensembles.preflight import sphere_pairs
@@ -58,10 +59,13 @@ class Finding(NamedTuple):
     why: str = ""
 
 
-def stokes_number(config: Config) -> float:
-    """Largest τ v/(r_i + r_j) of the collision types: relaxation time, relative settling speed."""
+def stokes_number(config: Config, flocs: Sequence[Floc] | None = None) -> float:
+    """Largest τ v/(r_i + r_j) of the collision types: relaxation time, relative settling speed.
+
+    ``flocs``: those of the study, where they have been read.
+    """
     numbers = []
-    for _, pair in sphere_pairs(config):
+    for _, pair in sphere_pairs(config, flocs, "fastest"):
         times = [each.time for each in body_scales(pair.system) if each.limits_steps]
         numbers += [each / pair.turn_time for each in times]
     return max(numbers, default=0.0)
@@ -84,7 +88,9 @@ def without_inertia(system):
     return attrs.evolve(system, integrator=method)
 
 
-def parts_of(config: Config, methods: Sequence[object]) -> Iterator[Part | Finding]:
+def parts_of(
+    config: Config, methods: Sequence[object], flocs: Sequence[Floc] | None = None
+) -> Iterator[Part | Finding]:
     """The parts that may be left out; a Finding for those that cannot, or need not be tried."""
     contacts = [force for force in config.forces if isinstance(force, ContactForce)]
     for place, (name, force) in enumerate(zip(config.force_names, config.forces, strict=True)):
@@ -95,7 +101,7 @@ def parts_of(config: Config, methods: Sequence[object]) -> Iterator[Part | Findi
             continue
         part = Part(name, without_force(place))
         try:
-            for _, pair in sphere_pairs(config):
+            for _, pair in sphere_pairs(config, flocs):
                 attrs.evolve(pair, system=part.left_out(pair.system))
         except FlocsimError:
             yield Finding(name, why="the pair would not settle towards each other")
@@ -103,7 +109,7 @@ def parts_of(config: Config, methods: Sequence[object]) -> Iterator[Part | Findi
         yield part
     if all(isinstance(each, Overdamped) for each in methods):
         return
-    number = stokes_number(config)
+    number = stokes_number(config, flocs)
     if number > LARGEST_STOKES:
         yield Finding(INERTIA, why=f"it matters at a Stokes number of {number:.2g}")
     else:
@@ -114,7 +120,7 @@ def find(
     study: Study, runs: Sequence[Timed], go_on: Callable[[], None], seconds: float = SECONDS
 ) -> list[Finding]:
     """A Finding for every force of a study, and for inertia, from replicates that were run."""
-    parts = list(parts_of(study.config, list(study.methods.values())))
+    parts = list(parts_of(study.config, list(study.methods.values()), study.flocs))
     tried = sum(isinstance(part, Part) for part in parts)
     return [
         tried_without(study, runs, part, go_on, seconds / tried) if isinstance(part, Part) else part

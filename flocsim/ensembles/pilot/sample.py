@@ -48,7 +48,7 @@ def pilot_size(config: Config) -> int:
 
     All types together at most MOST, and so many that the ladder costs SHARE of the study.
     """
-    types = len(config.scene.conditions)
+    types = len(config.scene.names)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     replicates = expected_replicates(config.replicates, config.stop)
     found = int(min(MOST / types, SHARE * cells * replicates / LADDER))
@@ -76,7 +76,7 @@ def sample_of(config: Config, size: int | None = None) -> list[list[Task]]:
             )
             for place in range(size)
         ]
-        for condition in range(len(config.scene.conditions))
+        for condition in range(len(config.scene.names))
     ]
 
 

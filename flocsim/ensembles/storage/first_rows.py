@@ -29,7 +29,7 @@ def stored_rows(study: Study, store: RowStore) -> Rows:
     """The same rows as a journal or an older results file has them, where it does."""
     scene, found = study.config.scene, {}
     for kind in study.kinds:
-        condition = Condition(scene.conditions[kind[0]][0], kind[1], scene.delta[0])
+        condition = Condition(scene.names[kind[0]], kind[1], scene.delta[0])
         place = store.conditions.index(condition)
         if any(first == 0 < stop for first, stop in store.intervals(place)):
             values = (store.read(place, name, 0, 1)[0] for name in COLUMNS)
@@ -50,7 +50,7 @@ def difference(study: Study, ranks: Sequence[Rows], arithmetic: Sequence[str], s
                 "processor, another C library or numpy): give the job machines of one kind"
             )
     for kind in study.kinds:
-        name, n = scene.conditions[kind[0]][0], kind[1]
+        name, n = scene.names[kind[0]], kind[1]
         which = f"replicate 0 of type {name}, N = {n}, delta {scene.delta[0]:g}"
         for rank, rows in enumerate(ranks):
             if rows.get(kind) != ranks[0].get(kind):

@@ -33,8 +33,8 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
-    "run.py", "compiler",
+    "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
+    "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
     "ensembles/collision", "ensembles/study.py",
 )  # fmt: skip
@@ -60,7 +60,7 @@ def identity_of(study: Study) -> dict:
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
         facts |= settings(f"forces.{name}", force)
-    facts |= type_facts(config) | floc_facts(study) | kernel_facts(study)
+    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study)
     return json.loads(json.dumps(facts))
 
 
@@ -100,10 +100,11 @@ def plain(value):
     return value if isinstance(value, str | int | float | None) else repr(value)
 
 
-def type_facts(config):
+def type_facts(study):
     """Radii and zone of the collision types, and the numbers that the forces hand to kernels."""
-    facts = {f"types.{name}": list(radii) for name, *radii in config.scene.conditions}
-    for name, pair in sphere_pairs(config):
+    config = study.config
+    facts = {f"types.{each.name}": list(each.radii) for each in study.pairings}
+    for name, pair in sphere_pairs(config, study.flocs):
         pieces = pair.system.pieces
         numbers = [
             *pieces.parameters,
@@ -143,9 +144,9 @@ def own_shape_facts(study):
     if config.shapes.own is not None and study.flocs:
         [floc] = study.flocs
         [n] = floc.shapes
-        for name, *radii in config.scene.conditions:
-            shapes = [floc.resized(n, radius, config.shapes.radius) for radius in radii]
-            facts[f"flocs.{n} at the sizes of {name}"] = digest(
+        for each in study.pairings:
+            shapes = [floc.resized(n, radius, config.shapes.radius) for radius in each.radii]
+            facts[f"flocs.{n} at the sizes of {each.name}"] = digest(
                 np.concatenate([shape_numbers(each) for each in shapes])
             )
     return facts
@@ -168,7 +169,7 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 def kernel_facts(study):
     """Fingerprints of the code that is compiled for spheres and for polygons, by every method."""
     config = study.config
-    _, pair = next(sphere_pairs(config))
+    _, pair = next(sphere_pairs(config, study.flocs))
     facts = {}
     methods = {type(each): each for each in study.methods.values()}.values()
     for shapes, method in product(kinds(config, pair.shapes), methods):

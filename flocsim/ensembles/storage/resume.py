@@ -34,10 +34,11 @@ from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.opening import UNREADABLE
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.provenance import now
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import BLOCK, UNREADABLE, opened, read_scalar
+from flocsim.io.results.file import BLOCK, opened, read_scalar
 from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
@@ -179,13 +180,23 @@ def begin(
         session = {
             "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
             "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": start.rule,
-            "accuracy": start.accuracy,
+            "accuracy": start.accuracy, "asked": asked_of(study),
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
         start.resources.close()
         raise
     return start
+
+
+def asked_of(study: Study) -> dict:
+    """What a study consists of, for those who look into its journal."""
+    config = study.config
+    return {
+        "types": list(config.scene.names),
+        "vertices": list(config.shapes.vertices), "delta": list(config.scene.delta),
+        "replicates": config.replicates,
+    }  # fmt: skip
 
 
 def recorded_choices(journal: Journal) -> list[dict]:

@@ -20,6 +20,11 @@ CHOICE = {
 }  # fmt: skip
 """What a pilot has chosen, as `flocsim.ensembles.pilot.choice.Choice` says."""
 
+SETTLED = {
+    "type": str, "body": str, "radius": float, "speed": float, "reynolds": float, "stokes": float,
+}  # fmt: skip
+"""A body at its terminal speed: flocsim.plausibility.reynolds.Settled."""
+
 FORMS: dict[str, tuple[Any, Any]] = {
     # name in the group ``run``: (pattern, what it is where there is none)
     "identity": ({}, {}),
@@ -28,6 +33,8 @@ FORMS: dict[str, tuple[Any, Any]] = {
     "cpus": ([CPU], []),
     "overrides": ({}, {}),
     "accuracy": (CHOICE, {}),
+    "warnings": ([str], []),
+    "settling": ([SETTLED], []),
 }
 
 

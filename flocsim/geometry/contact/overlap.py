@@ -11,6 +11,9 @@ from flocsim.geometry.shapes.cores import (
     inside_polygon,
 )
 
+TOUCHING = 1e-12
+"""Gap [m] below which outlines are shown as touching."""
+
 
 def distance_between(a: np.ndarray, b: np.ndarray) -> float:
     """Smallest distance [m] between a core point of one and the core of the other."""
@@ -33,7 +36,10 @@ def overlap_fault(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float
 
 
 def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
-    """Middles (c, 2) [m] of the overlaps of two placed cores (N, 2) with their radii."""
+    """Middles (c, 2) [m] of the overlaps of two placed cores (N, 2) with their radii.
+
+    A gap of less than TOUCHING counts: a step that ends at a first touch ends on either side of it.
+    """
     found = []
     for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):
         if len(core) == 1 < len(points):
@@ -43,5 +49,5 @@ def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: flo
         normal = away / np.maximum(distance, 1e-300)[..., None]
         feet = points[:, None] - away
         middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
-        found.append(middle[distance < radius + other])
+        found.append(middle[distance < radius + other + TOUCHING])
     return np.concatenate(found)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.errors import ShapeError
-from flocsim.fields import is_number
+from flocsim.errors import RangeError, ShapeError
+from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
 from flocsim.geometry.shapes.moments import swept_moments
 from flocsim.geometry.shapes.outline import require_simple, swept_rings
@@ -133,9 +133,14 @@ def read_only(array: np.ndarray) -> np.ndarray:
 
 
 def positive_radius(radius: Any) -> float:
-    """``radius`` as a float; ShapeError unless it is a finite number above 0."""
+    """``radius``, a number or a text such as "5 um", as a float; ShapeError unless it is finite
+    and above 0."""
     if isinstance(radius, np.generic):
         radius = radius.item()
+    try:
+        radius = in_unit(radius, "m", "the radius")
+    except RangeError as error:
+        raise ShapeError(str(error)) from None
     if not is_number(radius) or radius <= 0.0:
         raise ShapeError(f"the radius must be a finite number above 0 (metres), found {radius!r}")
     return float(radius)

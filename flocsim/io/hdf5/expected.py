@@ -18,6 +18,9 @@ SCALE_ATTRIBUTES = {
 }
 """Attributes that a dataset may have, and their types."""
 
+GROUP_ATTRIBUTES = {"coordinates": ("text", ())}
+"""Attributes that a group may have: coordinates that are no axis, as xarray looks for them."""
+
 
 @attrs.frozen
 class Column:
@@ -48,7 +51,7 @@ def hold_against(
         if node.type is None:
             if path and path not in groups:
                 raise Unfit(f"there is an unknown group {path}")
-            if path and node.attributes:
+            if path and node.attributes.items() - GROUP_ATTRIBUTES.items():
                 raise Unfit(f"the group {path} has attributes")
         elif name not in groups.get(group, {}):
             raise Unfit(f"there is an unknown dataset {path}")

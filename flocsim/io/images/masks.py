@@ -18,11 +18,18 @@ from flocsim.io.images.limits import (
 )
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import SUFFIXES, read_pixels
+from flocsim.io.images.recognition import check_halves, check_labels
 from flocsim.io.images.regions import EIGHT, Filters, filled, sorted_out
 
 ARRAYS = (".npy", ".npz")
 MOST_BYTES = 8 * MOST_PIXELS
 """Of all masks of a file."""
+
+PLAIN_INSIDE = (1, 255, 65535)
+"""What alone beside 0 means "inside", not one floc of that number."""
+
+LARGEST_KEPT = 2**31 - 1
+"""Labels above this number are numbered anew."""
 
 MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)
 """Endings that are taken for masks when a folder is given."""
@@ -43,6 +50,7 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     pixels = read_pixels(path)
     flat = pixels if pixels.ndim == 2 else pixels[..., :3].max(axis=2)
     if path.suffix.lower() in (".jpg", ".jpeg"):
+        check_halves(path, flat)
         flat = flat > 0.5 * flat.max()
     return [(path.name, _mask(flat, str(path)))]
 
@@ -106,9 +114,12 @@ def _mask(array, name):
     if array.dtype == bool:
         return array.astype(np.int64)
     values = np.unique(array)
-    if len(values) <= 2:
-        return (array > values[0]).astype(np.int64) if len(values) == 2 else (array > 0) * 1
-    if not np.issubdtype(array.dtype, np.integer) or values[0] < 0:
+    is_whole = np.issubdtype(array.dtype, np.integer)
+    if len(values) == 2 and not (is_whole and values[0] == 0):
+        return (array > values[0]).astype(np.int64)
+    if len(values) == 1:
+        return (array > 0).astype(np.int64)
+    if not is_whole or values[0] < 0:
         raise ImageError(
             f"{name}: a mask holds two values, or labels from 0; found {len(values)} values of "
             f"type {array.dtype}"
@@ -117,8 +128,9 @@ def _mask(array, name):
         raise ImageError(f"{name}: holds {len(values)} labels, more than {MOST_LABELS}")
     # Numbered anew from 1: a label may be any number, and a table as long as the largest is made.
     labels = np.searchsorted(values, array) + (values[0] > 0)
+    check_labels(name, labels, len(values))
     check_spread(name, array.shape, find_objects(labels))
-    return labels.astype(np.int64)
+    return labels.astype(np.int64) if values[-1] > LARGEST_KEPT else array.astype(np.int64)
 
 
 def segment_mask(
@@ -126,20 +138,27 @@ def segment_mask(
 ) -> Segmentation:
     """The flocs of a mask or label image as a Segmentation: holes filled, by size only.
 
-    What touches the border stays, and nothing is parted: who gives a mask has decided that.
+    What touches the border stays, and nothing is parted: who gives a mask has decided that. A floc
+    has the number of its label; further parts of one label, and the parts of a mask, are counted.
     """
     from scipy.ndimage import find_objects, label
 
-    labels = label(filled(mask > 0), EIGHT)[0] if mask.max() <= 1 else mask
-    boxes = enumerate(find_objects(labels), start=1)
-    found = [
-        piece
-        for number, box in boxes
-        if box is not None
-        for piece in _pieces(filled(labels[box] == number), box)
-    ]
+    levels, labels = np.unique(mask, return_inverse=True)
+    labels = labels.reshape(mask.shape) + (levels[0] > 0)
+    values: list[int] = levels[levels > 0].tolist()
+    if len(values) < 2:
+        labels, count = label(filled(labels > 0), EIGHT)
+        if count != 1 or values[0] in PLAIN_INSIDE:
+            values = list(range(1, count + 1))
+    found, numbers, spare = [], [], max(values, default=0)
+    for place, box in enumerate(find_objects(labels), start=1):
+        others = (labels[box] != place) & (labels[box] > 0)
+        pieces = list(_pieces(filled(labels[box] == place) & ~others, box))
+        found += pieces
+        numbers += [values[place - 1], *range(spare + 1, spare + len(pieces))]
+        spare += len(pieces) - 1
     filters = Filters(min_radius, max_radius, clear_of_border=False)
-    regions, rejected = sorted_out(found, None, filters)
+    regions, rejected = sorted_out(found, None, filters, numbers)
     return Segmentation(labels > 0, regions, rejected, "masked", float("nan"))
 
 

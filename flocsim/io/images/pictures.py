@@ -29,7 +29,8 @@ class Segmentation:
 
     foreground: (h, w) bool, everything past the threshold, holes filled, rejected regions too;
     regions: the flocs; rejected: the others; flocs: "bright" or "dark"; threshold: the contrast,
-    against the background, that separates the two (0 = background, 1 = full range).
+    against the background, that separates the two (0 = background, 1 = full range); left_whole:
+    regions with necks that were taken for fractal aggregates, and not parted.
     """
 
     foreground: np.ndarray
@@ -37,6 +38,7 @@ class Segmentation:
     rejected: tuple[Rejection, ...]
     flocs: str
     threshold: float
+    left_whole: int = 0
 
     @property
     def foreground_share(self) -> float:
@@ -52,27 +54,30 @@ def segment(
     grey: np.ndarray,
     *,
     flocs: str = "auto",
+    threshold: float | None = None,
     noise_scale: float = 1.0,
     background_degree: int = 6,
     background: np.ndarray | None = None,
     saturated: float = 0.001,
     min_radius: float = 4.0,
     max_radius: float = np.inf,
-    max_blur: float = 0.4,
-    neck: float = 0.5,
+    max_blur: float = 0.25,
+    neck: float | None = None,
 ) -> Segmentation:
     """Separate the flocs of a grey picture from its background.
 
     In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
     space, and of the background; contrast stretch between two thresholds, the median and the top
     `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
-    (find_threshold).  Dark flocs: contrast = 1 − grey/background (light is lost by a factor);
+    (find_threshold); or `threshold`, a contrast above 0 and to 1.  Dark flocs:
+    contrast = 1 − grey/background (light is lost by a factor);
     bright flocs: contrast = grey − background.
 
     Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of
-    the smaller part (0: never).  Rejected are those that touch the border, with r_eq = √(area/π)
-    below `min_radius` or above `max_radius` [px], or whose edge is softer than `max_blur`·r_eq
-    (out of focus; inf: none).
+    the smaller part (0: never; None: 0.5, but never where the picture is one of fractal
+    aggregates, `split_touching`).  Rejected are those that touch the border, with r_eq = √(area/π)
+    below `min_radius` or above `max_radius` [px], or softer than `max_blur`·r_eq along more
+    than half of the outline (out of focus; inf: none).
 
     grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast);
     background: (h, w), for example the median of many frames, or None for a polynomial surface of
@@ -81,7 +86,7 @@ def segment(
     """
     grey = _checked(grey)
     filters = Filters(min_radius, max_radius, max_blur, neck)
-    _check_options(flocs, noise_scale, background_degree, saturated, filters)
+    _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
     light = None
     if background is not None:
@@ -95,10 +100,11 @@ def segment(
     if flocs == "auto":
         flocs = _guess_polarity(smooth, light)
     contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
-    threshold = find_threshold(contrast, noise, saturated)
+    if threshold is None:
+        threshold = find_threshold(contrast, noise, saturated)
     foreground = filled(contrast > threshold)
-    regions, rejected = find_regions(foreground, contrast, filters)
-    return Segmentation(foreground, regions, rejected, flocs, threshold)
+    regions, rejected, whole = find_regions(foreground, contrast, filters)
+    return Segmentation(foreground, regions, rejected, flocs, threshold, whole)
 
 
 def _checked(grey):
@@ -110,8 +116,9 @@ def _checked(grey):
     return grey
 
 
-def _check_options(flocs, noise_scale, background_degree, saturated, filters):
+def _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters):
     allowed = [
+        (threshold is None or 0 < threshold <= 1, "threshold", threshold, "above 0, to 1"),
         (flocs in ("auto", "bright", "dark"), "flocs", flocs, "'auto', 'bright' or 'dark'"),
         (0 <= noise_scale < np.inf, "noise_scale", noise_scale, "at least 0 px"),
         (background_degree in range(13), "background_degree", background_degree, "0 to 12"),
@@ -119,7 +126,12 @@ def _check_options(flocs, noise_scale, background_degree, saturated, filters):
         (0 <= filters.min_radius < np.inf, "min_radius", filters.min_radius, "at least 0 px"),
         (filters.max_radius > 0, "max_radius", filters.max_radius, "above 0 px"),
         (filters.max_blur > 0, "max_blur", filters.max_blur, "a share of r_eq above 0"),
-        (0 <= filters.neck <= 1, "neck", filters.neck, "a share from 0 to 1"),
+        (
+            filters.neck is None or 0 <= filters.neck <= 1,
+            "neck",
+            filters.neck,
+            "a share from 0 to 1",
+        ),
     ]
     for right, name, found, wanted in allowed:
         if not right:

@@ -36,7 +36,11 @@ def read_grey(path: str | Path) -> np.ndarray:
     ones, so that they count as background.  Raises ImageError, naming the file, when it is
     missing, damaged, no picture, or a stack of several.
     """
-    pixels = read_pixels(path)
+    return grey_of(read_pixels(path), path)
+
+
+def grey_of(pixels: np.ndarray, path: str | Path) -> np.ndarray:
+    """What read_grey gives for a file's pixels as they are stored; path: for messages."""
     return _luminance(_to_unit_range(pixels, path), path)
 
 

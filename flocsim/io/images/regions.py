@@ -6,8 +6,16 @@ import numpy as np
 EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""
 
-SHARP = 3.0
+SHARP = 2.0
 """An edge this soft [px] can be the lens and the pixels alone: no floc is left out for it."""
+
+NEAR, REACH = 0.5, (2, 40)
+"""Share of r_eq within which a floc's contrast counts for a place of its outline, and limits [px]
+of that."""
+
+NECK = 0.5
+MANY_PARTS = 4
+"""Flocs that touch by chance are two, rarely three; an aggregate of beads has more necks."""
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
@@ -17,10 +25,11 @@ STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 class Region:
     """One floc: 8-connected, holes filled.
 
-    label: number in the picture, counted from 1 from the top row down; centroid: (x, y) [px],
+    label: number in the picture, counted from 1 from the top row down, or that of a label image
+    that was given; centroid: (x, y) [px],
     x right and y *down*, the first pixel's centre at (0, 0); bbox: (top, left, bottom, right)
     [px], bottom and right exclusive; area [px]; equivalent_radius = √(area/π) [px]; mask: bool
-    array of the bbox widened by one pixel on every side; blur: softness of its edge [px]
+    array of the bbox widened by one pixel on every side; blur: softness of its outline [px]
     (`blur_of`), NaN for a mask that came without a picture.
     """
 
@@ -33,28 +42,25 @@ class Region:
     blur: float = float("nan")
 
 
-@attrs.frozen
-class Rejection:
-    """A region left out: centroid (x, y) [px, y down], area [px], radius [px], reason, blur."""
+@attrs.frozen(eq=False)
+class Rejection(Region):
+    """A region left out, and why; its label counts on from those of the picture's flocs."""
 
-    centroid: tuple[float, float]
-    area: int
-    equivalent_radius: float
-    reason: str
-    blur: float = float("nan")
+    reason: str = ""
 
 
 @attrs.frozen
 class Filters:
     """What a region must meet: radii [px], share of r_eq that its edge may be soft, the border.
 
-    neck: share of the smaller part's width up to which a neck parts two flocs, 0 for never.
+    neck: share of the smaller part's width up to which a neck parts two flocs, 0 for never, None
+    for NECK unless the picture shows fractal aggregates.
     """
 
     min_radius: float = 4.0
     max_radius: float = np.inf
-    max_blur: float = 0.4
-    neck: float = 0.5
+    max_blur: float = 0.25
+    neck: float | None = None
     clear_of_border: bool = True
 
 
@@ -67,33 +73,44 @@ def filled(foreground):
 
 
 def find_regions(foreground, contrast, filters):
-    """(Regions, Rejections) of a bool array; `contrast`, of its shape, tells how sharp they are."""
+    """(Regions, Rejections, number of regions with necks that were left whole) of a bool array.
+
+    `contrast`, of its shape, tells how sharp they are.
+    """
     from scipy.ndimage import find_objects, label
 
     labels, count = label(foreground, EIGHT)
-    if filters.neck > 0:
-        count = split_touching(labels, find_objects(labels), filters.neck, filters.min_radius)
+    whole = 0
+    if filters.neck != 0:
+        count, whole = split_touching(labels, find_objects(labels), filters.neck,
+                                      filters.min_radius)  # fmt: skip
     boxes = list(enumerate(find_objects(labels, count), start=1))
     boxes.sort(key=lambda found: (found[1][0].start, found[1][1].start))
-    return sorted_out([(labels[box] == number, box) for number, box in boxes], contrast, filters)
+    masks = [(labels[box] == number, box) for number, box in boxes]
+    return *sorted_out(masks, contrast, filters), whole
 
 
-def sorted_out(masks, contrast, filters):
-    """(Regions, Rejections) of pairs (bool array, its box in the picture)."""
+def sorted_out(masks, contrast, filters, numbers=None):
+    """(Regions, Rejections) of pairs (bool array, its box in the picture).
+
+    numbers: of each the label; otherwise the flocs are counted, and then what is left out.
+    """
     accepted, rejected = [], []
     shape = None if contrast is None else contrast.shape
-    for mask, box in masks:
+    for place, (mask, box) in enumerate(masks):
         blur = float("nan") if contrast is None else blur_of(mask, box, contrast)
         size = int(mask.sum()), float(np.sqrt(mask.sum() / np.pi))
         reason = reason_to_reject(box, shape, size[1], blur, filters)
+        bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
+        number = len(accepted) + 1 if numbers is None else numbers[place]
+        about = (number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
         if reason:
-            rejected.append(Rejection(centroid_of(mask, box), *size, reason, blur))
+            rejected.append(Rejection(*about, reason))
         else:
-            number = len(accepted) + 1
-            bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
-            accepted.append(
-                Region(number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
-            )
+            accepted.append(Region(*about))
+    if numbers is None:
+        first = len(accepted) + 1
+        rejected = [attrs.evolve(each, label=first + k) for k, each in enumerate(rejected)]
     return tuple(accepted), tuple(rejected)
 
 
@@ -117,15 +134,18 @@ def centroid_of(mask, box):
 
 
 def blur_of(mask, box, contrast):
-    """Softness of a region's edge [px]: contrast / (√(2π) · gradient at the outline).
+    """Softness [px] that half of a region's outline does not exceed: the median of σ along it.
 
-    The deviation σ of the Gaussian that would make a step as soft as the mean edge is; contrast is
-    the 90th percentile in the region.  A floc in focus has a few pixels, whatever its size.
+    σ = step / (√(2π) · gradient), the deviation of the Gaussian that would make a step so soft.
+    The step is the greatest contrast of the region within NEAR r_eq of the outline's pixel, the
+    gradient the greatest among its neighbours: both local, so that a sharp speck in a soft halo
+    counts for the part of the outline that it makes, and no more.
     """
-    from scipy.ndimage import binary_erosion
+    from scipy.ndimage import binary_erosion, maximum_filter
 
+    reach = int(np.clip(round(NEAR * np.sqrt(mask.sum() / np.pi)), *REACH))
     wide = tuple(
-        slice(max(side.start - 1, 0), min(side.stop + 1, size))
+        slice(max(side.start - 2, 0), min(side.stop + 2, size))
         for side, size in zip(box, contrast.shape, strict=True)
     )
     near = contrast[wide]
@@ -133,27 +153,39 @@ def blur_of(mask, box, contrast):
         return 0.0
     top, left = (side.start - out.start for side, out in zip(box, wide, strict=True))
     edge = mask & ~binary_erosion(mask)
-    slope = np.hypot(*np.gradient(near))[top:, left:][: mask.shape[0], : mask.shape[1]][edge].mean()
-    inside = np.quantile(contrast[box][mask], 0.9)
-    return float(inside / max(np.sqrt(2.0 * np.pi) * slope, 1e-12))
+    steepest = maximum_filter(np.hypot(*np.gradient(near)), size=3)
+    slope = steepest[top:, left:][: mask.shape[0], : mask.shape[1]][edge]
+    inside = np.where(mask, contrast[box], 0.0)
+    step = maximum_filter(inside, size=2 * reach + 1, mode="constant")[edge]
+    return float(np.median(step / np.maximum(np.sqrt(2.0 * np.pi) * slope, 1e-12)))
 
 
 def split_touching(labels, boxes, neck, min_radius):
-    """Part the regions of `labels`, in place, at their necks; returns the highest label.
+    """Part the regions of `labels`, in place, at their necks: (highest label, regions left whole).
 
     A neck parts two bodies if it is at most `neck` times as wide as the largest circle in the
-    smaller of them, and neither would be smaller than `min_radius` [px].
+    smaller of them, and neither would be smaller than `min_radius` [px]. For a neck of None the
+    regions stay whole if most of the area with necks is in those that would become MANY_PARTS or
+    more: then these are fractal aggregates, and so are the smaller ones of the same picture.
     """
-    highest = len(boxes)
+    parted = []
     for number, box in enumerate(boxes, start=1):
         mask = labels[box] == number
         if mask.sum() < 2.0 * np.pi * min_radius**2:
             continue
-        parts = bodies(mask, neck, min_radius)
+        parts = bodies(mask, NECK if neck is None else neck, min_radius)
+        if parts.max() > 1:
+            parted.append((box, parts))
+    areas = [np.count_nonzero(parts) for _, parts in parted]
+    many = [parts.max() >= MANY_PARTS for _, parts in parted]
+    if neck is None and 2 * np.dot(areas, many) > sum(areas):
+        return len(boxes), len(parted)
+    highest = len(boxes)
+    for box, parts in parted:
         for part in range(2, parts.max() + 1):
             highest += 1
             labels[box][parts == part] = highest
-    return highest
+    return highest, 0
 
 
 def bodies(mask, neck, min_radius):

@@ -12,12 +12,28 @@ from flocsim.errors import UsageError
 from flocsim.io.files import Rule, write_file
 from flocsim.io.outputs import redrawn
 from flocsim.io.own_mark import marked
-from flocsim.io.plots.style import BODY_COLOURS, CONTACT_COLOUR, Figure, house_style, new_figure
+from flocsim.io.plots.style import (
+    BODY_COLOURS,
+    CONTACT_COLOUR,
+    Figure,
+    house_style,
+    keep_titles_whole,
+    new_figure,
+)
 
 MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
 PALE = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 """Behind text that lines may cross."""
+
+RING: dict[str, Any] = {
+    "marker": "o", "linestyle": "none", "markersize": 6, "markerfacecolor": "none",
+    "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.2,
+}  # fmt: skip
+"""Of a contact point."""
+
+GRID = 24
+"""Points along a side at which a place for a name is looked for."""
 
 NANO = 1e9
 DECADES = 8
@@ -38,6 +54,7 @@ def draw_strip(
     centre_distance: Sequence[float] | None = None,
     zone_distance: float | None = None,
     contacts: Sequence[np.ndarray] | None = None,
+    seen_from: int | None = None,
 ) -> Figure:
     """A row of frames of a trajectory; returns the matplotlib Figure.
 
@@ -45,7 +62,9 @@ def draw_strip(
     ``times`` (frames,) [s]; ``paths``: per body the (m, 2) path of its centre [m];
     ``centre_distance`` (frames,) d_c [m], written beneath each frame; ``zone_distance`` D_0 [m],
     to say on which side of it d_c lies; ``contacts``: per frame the (c, 2) contact points [m],
-    marked in red. All frames have one scale and are centred on their bodies, in whatever frame of
+    ringed in red. A legend names the bodies (i and j where there are two) and says what the lines
+    are; ``seen_from``: the body that the others are seen from, None for the laboratory. All frames
+    have one scale and are centred on their bodies, in whatever frame of
     reference the outlines and paths are given. Raises UsageError if the lengths disagree.
     """
     contacts = [np.empty((0, 2))] * len(times) if contacts is None else contacts
@@ -54,7 +73,7 @@ def draw_strip(
     centres, half = windows(outlines_per_frame)
     unit, factor = time_unit(times)
     with house_style():
-        figure = new_figure(1.65 * len(times) + 0.1, 2.4 if title else 2.15)
+        figure = new_figure(1.65 * len(times) + 0.1, (2.4 if title else 2.15) + 0.3)
         row = figure.subplots(1, len(times), squeeze=False)[0]
         for number, axes in enumerate(row):
             draw_paths(axes, paths)
@@ -64,8 +83,62 @@ def draw_strip(
             axes.set_title(f"{times[number] * factor:.4g} {unit}", loc="center", fontsize=8)
             axes.set_xlabel(labels[number])
         draw_scale_bar(row[0], centres[0], half)
+        names = body_names(len(outlines_per_frame[0]))
+        name_bodies(row[0], outlines_per_frame[0], names)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+        figure.legend(handles=strip_keys(names, seen_from), loc="outside lower left",
+                      ncols=len(names) + 2 if len(times) > 3 else 2)  # fmt: skip
+        keep_titles_whole(figure)
         return figure
+
+
+def body_names(count):
+    """ "i" and "j" of two bodies; the numbers of more, as in the list that System was given."""
+    return ["i", "j"] if count == 2 else [str(number) for number in range(count)]
+
+
+def name_bodies(axes, frame, names):
+    """Each body's name where it is widest."""
+    for number, (body, name) in enumerate(zip(frame, names, strict=True)):
+        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
+        axes.text(*deepest_inside(max(body, key=len)), name, ha="center", va="center", fontsize=9,
+                  color=colour, weight="bold", zorder=7)  # fmt: skip
+
+
+def deepest_inside(polygon):
+    """Of the points of a grid, that inside a polygon (k, 2) which is farthest from its outline."""
+    from matplotlib.path import Path as Outline
+
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    steps = (np.arange(GRID) + 0.5) / GRID
+    grid = low + (high - low) * np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    inside = grid[Outline(polygon).contains_points(grid)]
+    if not len(inside):
+        return polygon.mean(axis=0)
+    ends = np.roll(polygon, -1, axis=0)
+    points = np.concatenate(
+        [polygon + share * (ends - polygon) for share in (0.0, 0.25, 0.5, 0.75)]
+    )
+    distance = np.hypot(*np.moveaxis(inside[:, None] - points, 2, 0)).min(axis=1)
+    return inside[np.argmax(distance)]
+
+
+def strip_keys(names, seen_from):
+    """The keys of a strip's legend: bodies, the ways of their centres, contacts."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    shown = list(enumerate(names))[: len(BODY_COLOURS)]
+    keys = [
+        Patch(facecolor=(BODY_COLOURS[number], 0.3), edgecolor=BODY_COLOURS[number],
+              label=f"body {name}")
+        for number, name in shown
+    ]  # fmt: skip
+    seen = "" if seen_from is None else f", seen from {names[seen_from]}"
+    keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
+                       label=f"way of a body's centre in the whole run{seen}"))  # fmt: skip
+    keys.append(Line2D([], [], **RING, label="contact"))
+    return keys
 
 
 def draw_distance(
@@ -90,6 +163,7 @@ def draw_distance(
         axes.set_title(title)
         axes.margins(x=0.02, y=0.12)
         draw_zone(axes, zone_distance)
+        keep_titles_whole(figure)
         return figure
 
 
@@ -120,7 +194,8 @@ def draw_forces(
             axes.plot(time, push, color=colour, linewidth=1.1, label=name)
             axes.plot(time, pull, color=colour, linewidth=1.1, linestyle=(0, (3, 1.5)))
         if collision is not None and np.isfinite(collision):
-            axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":")
+            axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":",
+                         label="first touch")  # fmt: skip
         if largest > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
@@ -129,6 +204,7 @@ def draw_forces(
         axes.set_title(title)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
                     alignment="left")  # fmt: skip
+        keep_titles_whole(figure)
         return figure
 
 
@@ -177,6 +253,7 @@ def picture_of(frames, place, motion, zone_distance, title):
         graph.set_ylabel("centre distance $d_c$ [µm]")
         draw_zone(graph, zone_distance)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+        keep_titles_whole(figure)
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
     return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
@@ -269,8 +346,7 @@ def draw_paths(axes, paths):
 
 def draw_contacts(axes, points):
     points = np.asarray(points, dtype=float).reshape(-1, 2)
-    ring = {"markerfacecolor": "none", "markeredgecolor": CONTACT_COLOUR, "markeredgewidth": 1.2}
-    axes.plot(points[:, 0], points[:, 1], "o", markersize=6, zorder=5, **ring)
+    axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 
 
 def frame_axes(axes, centre, half):

@@ -26,6 +26,7 @@ from flocsim.io.plots.style import (
     type_title,
     vertex_positions,
 )
+from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.file import CLASSES, Results
 from flocsim.io.results.schema import BONDS
 
@@ -46,6 +47,7 @@ BOND_WORDS = {
     "hook": "hook: hangs by its shape",
     "rest": "rest: sticks as it lies",
 }
+DELTA_LABEL = r"displacement $\delta\,/\,\delta_{\max}$"
 LABELS = {
     "pr_inside": r"$\Pr[C(d_c<D_0)]$",
     "pr_a_given_inside": r"$\Pr[A\mid C(d_c<D_0)]$",
@@ -145,7 +147,70 @@ def overview(results: Results) -> Figure:
         return figure
 
 
-def panel_grid(count, legend_width=LEGEND_WIDTH):
+def against_delta(results: Results) -> Figure:
+    """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
+    with house_style():
+        figure, panels = panel_grid(len(results.types), x_label=DELTA_LABEL)
+        colours = graded_colours(len(results.vertices))
+        order = np.argsort(results.delta)
+        for number, axes in enumerate(panels):
+            set_probability_axis(axes)
+            axes.set_xlim(-0.05, 1.05)
+            for index, colour in enumerate(colours[: len(results.vertices)]):
+                bands = [results.probabilities["pr_a" + end][number, index][order] for end in ENDS]
+                places = results.delta[order] + 0.12 * dodge(index, len(results.vertices))
+                draw_bars(axes, places, bands, index, colour)
+            note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
+            axes.set_title(type_title(number, results.types[number]))
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS["pr_a"])
+        words = ["sphere" if count == 1 else str(count) for count in results.vertices]
+        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "vertices $N$" + BARS)
+        return figure
+
+
+def efficiencies(results: Results) -> Figure:
+    """Efficiency: the probability of aggregation integrated over delta, in the plane and axially.
+
+    docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
+    """
+    with house_style():
+        figure, panels = panel_grid(len(results.types), legend_width=1.9)
+        words = [
+            r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
+        ]  # fmt: skip
+        colours = [CLASS_COLOURS["A"], CLASS_COLOURS["C"]]
+        for number, axes in enumerate(panels):
+            set_vertex_axis(axes, results.vertices)
+            set_probability_axis(axes)
+            for index, axial in enumerate((False, True)):
+                found = efficiency(results.probabilities, results.delta, axial)
+                if found is None:
+                    note_if_empty(axes, np.array([np.nan]), "delta does not\nreach from 0 to 1")
+                    continue
+                bands = [*(each[number] for each in found), np.zeros(len(results.vertices))]
+                draw_line(axes, results.vertices, bands, index, 2, colours[index])
+            axes.set_title(type_title(number, results.types[number]))
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel("efficiency $E$")
+        add_line_legend(
+            panels[:PANELS_PER_ROW][-1], words, colours, "aggregations per approach\n(bars: 95 %)"
+        )
+        return figure
+
+
+def add_line_legend(axes, words, colours, title):
+    """A legend of lines by their words."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=word)
+        for index, (word, colour) in enumerate(zip(words, colours, strict=False))
+    ]
+    place_legend(axes, handles, title)
+
+
+def panel_grid(count, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
     """A figure with ``count`` equal panels, at most three a row, and room for a legend."""
     columns = min(count, PANELS_PER_ROW)
     rows = -(-count // PANELS_PER_ROW)
@@ -155,7 +220,7 @@ def panel_grid(count, legend_width=LEGEND_WIDTH):
         axes.set_visible(False)
     for axes in grid[max(count - columns, 0) : count]:
         axes.xaxis.set_tick_params(labelbottom=True)
-        axes.set_xlabel("vertices $N$")
+        axes.set_xlabel(x_label)
     return figure, list(grid[:count])
 
 
@@ -223,9 +288,14 @@ def draw_line(axes, vertices, bands, index, count, colour):
     """
     order = np.argsort(vertices)
     places = vertex_positions(vertices)[order] + dodge(index, count)
-    value, low, high, numerical = (np.asarray(band)[order] for band in bands)
+    draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour)
+
+
+def draw_bars(axes, places, bands, index, colour):
+    """A line of points with bars at these places: value, low, high, numerical error."""
+    value, low, high, numerical = bands
     reach = np.clip([value - low, high - value], 0.0, None)
-    size, width = (2.2, 0.8) if len(order) > CROWDED else (4.0, 1.2)
+    size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
                   marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
                   elinewidth=0.6 * width)  # fmt: skip
@@ -284,5 +354,7 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "6": figure_6,
     "8": figure_8,
     "bonds": bonds,
+    "delta": against_delta,
+    "efficiency": efficiencies,
     "overview": overview,
 }

@@ -1,30 +1,22 @@
-"""Figures of fitted flocs: sizes (Fig. 2) and errors (Fig. 3) of a library, outlines on pictures.
+"""Figures of fitted flocs: sizes (Fig. 2) and errors (Fig. 3) of a library.
 
 A figure of a shape library is a function of its entries that stands in POPULATION_FIGURES, under
 the name that `flocsim plot` gives it; the first line of its docstring is the command's help.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flocsim.errors import visible
-from flocsim.geometry.shapes.outline import swept_rings
-from flocsim.io.images.regions import Region, Rejection
 from flocsim.io.plots.style import (
     Figure,
     house_style,
     new_figure,
-    plain,
     set_vertex_axis,
     vertex_positions,
 )
 from flocsim.io.shapes.fit_report import CLASS_LIMIT
 from flocsim.io.shapes.library import ShapeEntry
-
-if TYPE_CHECKING:
-    from flocsim.geometry.fit.fit import Fit
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
@@ -33,14 +25,6 @@ DODGE = 0.06
 
 PANEL_SIZE = (2.6, 2.3)
 MARGIN = 0.75
-
-OUTLINE_COLOUR = "#d55e00"
-REJECTED_COLOUR = "#56b4e9"
-REASONS = {"too small": "·"}
-"""Shorter words: the small are many."""
-
-LONGEST_SIDE = 12.0
-"""Longer side of the drawing [inch]."""
 
 
 def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
@@ -114,39 +98,3 @@ POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
     "2": figure_2,
     "3": figure_3,
 }
-
-
-def draw_overlay(
-    grey: np.ndarray,
-    flocs: "Iterable[tuple[Region, Fit]]",
-    title: str,
-    rejected: Iterable[Rejection] = (),
-) -> Figure:
-    """A figure of the picture with the outline of every floc, and why others are left out.
-
-    grey: (h, w) in [0, 1]; title: one line. Returns the figure, for flocsim.io.plots.style.save.
-    """
-    from matplotlib import figure as matplotlib_figure
-
-    # The picture fills the figure, but for a strip for the title.
-    height, width = (size * LONGEST_SIDE / max(grey.shape) for size in grey.shape)
-    strip = 0.3
-    with house_style():
-        figure = matplotlib_figure.Figure(figsize=(max(width, 4.0), max(height, 2.0) + strip))
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0 - strip / figure.get_figheight()))
-        axes.imshow(grey, cmap="gray", interpolation="nearest")
-        axes.set_axis_off()
-        axes.set_title(plain(visible(title, keep="")))
-        for region, fit in flocs:
-            top, left = region.bbox[:2]
-            # The mask has a margin of one pixel, and the fit's y counts upwards.
-            rings = [ring * (1.0, -1.0) + (left - 1, top - 1)
-                     for ring in swept_rings(fit.vertices, fit.radius)]  # fmt: skip
-            for ring in rings:
-                axes.plot(*ring.T, color=OUTLINE_COLOUR, linewidth=0.8)
-            corner = np.max(rings[0][:, 0]), np.min(rings[0][:, 1])
-            axes.annotate(str(region.label), corner, color=OUTLINE_COLOUR, fontsize=7)
-        for each in rejected:
-            axes.annotate(REASONS.get(each.reason, each.reason), each.centroid,
-                          color=REJECTED_COLOUR, fontsize=6, ha="center", va="center")  # fmt: skip
-    return figure

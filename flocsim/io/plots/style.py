@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,8 @@ CONTACT_COLOUR = "#D7191C"
 MARKERS = "osD^vPX*"
 MOST_LABELS = 8
 """More labels of vertex counts than this would run into each other."""
+LEAST_LETTERS = 8
+"""Of a line of a title that is broken."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -78,6 +81,49 @@ def new_figure(width: float, height: float) -> Figure:
     figure = matplotlib_figure.Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def keep_titles_whole(figure: Figure) -> None:
+    """Break the lines of titles that are wider than the room they have; what fits stays as it is.
+
+    The room of a panel's title ends where the next panel of its row begins, or the figure.
+    """
+    figure.canvas.draw()  # places are known only then
+    width = figure.bbox.width
+    panels = [(axes, axes.get_window_extent()) for axes in figure.axes if axes.get_visible()]
+    wrapped = False
+    for text in [figure._suptitle] if figure._suptitle else []:
+        wrapped |= wrap(text, width - text.get_window_extent().x0 - 4.0)
+    for axes, box in panels:
+        beside = [o.x0 for _, o in panels if o.x0 > box.x1 and o.y0 < box.y1 and o.y1 > box.y0]
+        for title in (axes.title, axes._left_title, axes._right_title):
+            room = min([width, *beside]) - box.x0 - 4.0
+            wrapped |= wrap(title, room)
+    if wrapped:
+        figure.canvas.draw()
+
+
+def wrap(text, room):
+    """Break a text into lines that fit a room [pixels], at other resolutions too, where letters are
+    rounded to other widths; whether it was too wide."""
+    found = text.get_window_extent().width if text.get_text() else 0.0
+    room *= 0.95
+    if found <= room:
+        return False
+    lines = text.get_text().splitlines()
+    fitting = int(max(map(len, lines)) * room / found) + 1
+    while found > room and fitting > LEAST_LETTERS:
+        fitting -= 1
+        parts = [part for line in lines for part in textwrap.wrap(line, fitting)]
+        text.set_text("\n".join(parts))
+        found = text.get_window_extent().width
+    return True
+
+
+def mark_figure(figure: Figure, words: str) -> None:
+    """Say something of the whole figure, in red above it: that its results are unfinished."""
+    before = f"\n{figure._suptitle.get_text()}" if figure._suptitle else ""
+    figure.suptitle(words + before, x=0.01, ha="left", fontsize=9, color=CONTACT_COLOUR)
 
 
 def graded_colours(count):
@@ -150,5 +196,6 @@ def save(figure: Figure, path: str | Path, rule: Rule = redrawn) -> None:
     suffix = checked_format(path)
     picture = io.BytesIO()
     with house_style():
+        keep_titles_whole(figure)
         figure.savefig(picture, format=suffix, metadata=METADATA[suffix])
     write_file(path, marked(picture.getvalue(), f".{suffix}"), rule)

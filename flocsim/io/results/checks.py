@@ -18,6 +18,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     OUTCOMES,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
     Results,
@@ -26,6 +27,7 @@ from flocsim.io.results.schema import (
 
 TYPE, VERTICES, DELTA = (Column(kind, (axis,)) for kind, axis in zip(
     ("text", "i8", "f8"), AXES, strict=True))  # fmt: skip
+SIZES = {name: Column(kind, ("type",)) for name, (kind, _, _) in RADII.items()}
 STUDY = {"type": TYPE, "vertices": VERTICES, "delta": DELTA}
 OPTIONAL = ("pooled", "differences", "flocs")
 MOST_CONDITIONS = 1_000_000
@@ -53,8 +55,9 @@ def check_structure(nodes: Mapping[str, Node]) -> None:
     groups = {
         "probabilities": {
             name: Column(kind, (*AXES, *tail_of(name))) for name, (kind, _, _) in TABLE.items()
-        } | STUDY | {axis: Column("text", (len(words),)) for axis, words in LAST_AXES.items()},
-        "pooled": columns_of(POOLED, AXES[:2]) | {"type": TYPE, "vertices": VERTICES},
+        } | STUDY | SIZES
+        | {axis: Column("text", (len(words),)) for axis, words in LAST_AXES.items()},
+        "pooled": columns_of(POOLED, AXES[:2]) | {"type": TYPE, "vertices": VERTICES} | SIZES,
         "differences": columns_of(DIFFERENCES, (len(AXES), len(EVENTS), *AXES))
         | STUDY
         | {"against": Column("text", (len(AXES),)), "event": Column("text", (len(EVENTS),))},
@@ -80,6 +83,9 @@ def check_coordinates(file: Any) -> None:
         for axis in {*AXES} & group.keys():
             if group[axis][()].tolist() != first[axis][()].tolist():
                 raise ValueError(f"{group.name.strip('/')}/{axis} is not probabilities/{axis}")
+    for name in RADII if "pooled" in file else ():
+        if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
+            raise ValueError(f"pooled/{name} is not probabilities/{name}")
     lists = {f"probabilities/{axis}": words for axis, words in LAST_AXES.items()}
     for path, words in (lists | {"differences/event": EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
@@ -94,6 +100,8 @@ def check_tables(results: Results) -> None:
     refuse(np.any(results.vertices < 1), "vertices below 1")
     refuse(not np.isfinite(results.delta).all(), "delta that are no numbers")
     refuse(np.unique(results.delta).size < results.delta.size, "delta that are the same")
+    for name, values in results.radii.items():
+        refuse(np.any(values <= 0.0) or np.any(np.isinf(values)), f"{name} that are no radii")
     table = results.probabilities
     for name in TABLE:
         if name.startswith("n_"):
@@ -158,9 +166,16 @@ def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -
     ended = outcome != FAILED
     for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
         refuse_row(ended & ~np.isfinite(column(name)), name)
+    for name in ("r_i", "r_j", "D_0"):
+        values = column(name)
+        refuse_row(ended & ~((values > 0.0) & np.isfinite(values)), name)
     touched = ended & (inside != NOT_APPLICABLE)
     for name in ("d_c_collision", "d_c_max", "t_collision"):
         refuse_row(touched & ~np.isfinite(column(name)), name)
+    with np.errstate(invalid="ignore", over="ignore"):
+        expected = column("d_c_over_D_0") * column("D_0")
+        apart = np.abs(expected - column("d_c_collision"))
+        refuse_row(touched & ~(apart <= ROUNDING * expected), "d_c_over_D_0")
 
 
 CODED = ("outcome", "failure", "steps", "rejected")

@@ -23,9 +23,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, UsageError
-from flocsim.io.files import Rule, checked_sealed, keep
-from flocsim.io.hdf5.structure import structure_of
+from flocsim.errors import FileError
+from flocsim.io.files import Rule, keep
+from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results.checks import (
     CODED,
     check_codes,
@@ -42,6 +42,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     OUTCOMES,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
     Results,
@@ -54,6 +55,7 @@ __all__ = [
     "REPLICATES",
     "TABLE",
     "Results",
+    "first_of_each",
     "read_overview",
     "read_results",
     "same_data",
@@ -118,6 +120,7 @@ def results_in(file, replicates):
         pooled=read_group(file, "pooled", POOLED),
         differences=read_group(file, "differences", DIFFERENCES),
         count=len(rows["replicate"]),
+        radii={name: table[name][()] for name in RADII},
     )
     check_tables(results)
     if results.replicates is not None:
@@ -134,9 +137,13 @@ def read_scalar(dataset):
     return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
 
 
+SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
+
+
 @attrs.define
 class Totals:
-    """How many replicates had each outcome and each reason, and what steps they took."""
+    """How many replicates had each outcome and each reason, what steps they took, and between
+    which values (NaN: none) the columns of SPANNED lie."""
 
     outcomes: np.ndarray
     failures: np.ndarray
@@ -144,6 +151,14 @@ class Totals:
     steps: int = 0
     most_steps: int = 0
     rejected: int = 0
+    spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
+
+    def span(self, name: str, values: np.ndarray) -> None:
+        """Take the values of a column into its span."""
+        known = values[np.isfinite(values)]
+        if known.size:
+            low, high = self.spans.get(name, (np.inf, -np.inf))
+            self.spans[name] = min(low, float(known.min())), max(high, float(known.max()))
 
     def add(
         self, outcome: np.ndarray, failure: np.ndarray, steps: np.ndarray, rejected: np.ndarray
@@ -163,7 +178,28 @@ def totals_in(rows, reasons):
         columns = {name: rows[name][part] for name in CODED}
         check_codes(columns, reasons)
         totals.add(*columns.values())
+        for name in SPANNED:
+            totals.span(name, rows[name][part])
     return totals
+
+
+def first_of_each(path: str | Path) -> dict[str, tuple[int, int, int, int]]:
+    """{outcome: place (type, vertices, delta, replicate)} of its first replicate, where it has one.
+
+    Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
+    """
+    with opened(path) as file:
+        outcome, vertices = file["replicates/outcome"], file["replicates/vertices"][()]
+        order = np.argsort(-vertices, kind="stable")
+        found: dict[str, tuple[int, int, int, int]] = {}
+        types, _, deltas, count = outcome.shape
+        for v, t, d in ((v, t, d) for v in order for t in range(types) for d in range(deltas)):
+            for first in range(0, count, BLOCK):
+                codes = outcome[t, v, d, first : first + BLOCK]
+                for code, row in zip(*np.unique(codes, return_index=True), strict=True):
+                    if code < len(OUTCOMES):
+                        found.setdefault(OUTCOMES[code], (t, int(v), d, first + int(row)))
+        return found
 
 
 def parts_of(shape):
@@ -183,39 +219,21 @@ def opened(path: str | Path) -> Iterator[Any]:
 
     And once its structure was found to be one that flocsim writes: HDF5 sees no other.
     """
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            nodes = structure_of(data, size)
-            known = nodes[""].attributes
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                if known.get("format") != ("text", ()) or file.attrs["format"] != FORMAT:
-                    raise FileError(
-                        f"{path} is not a results file: name one that flocsim ensemble wrote"
-                    )
-                version = read_version(file, known)
-                if version != SCHEMA_VERSION:
-                    raise FileError(
-                        f"{path} has results of schema version {version}, this flocsim reads "
-                        f"{SCHEMA_VERSION}: read it with the version that wrote it"
-                    )
-                check_structure(nodes)
-                check_coordinates(file)
-                yield file
-        except FileError:
-            raise
-        except UNREADABLE as error:
-            reason = " ".join(str(error).split())
-            raise FileError(f"{path} holds no readable results: {reason}; run it again") from error
-
-
-UNREADABLE = (
-    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
-    OverflowError, IndexError, EOFError,
-)  # fmt: skip
-"""What h5py raises for what it cannot read."""
+    with opened_file(
+        path, lambda reason: f"{path} holds no readable results: {reason}; run it again"
+    ) as (file, nodes):
+        known = nodes[""].attributes
+        if text_of(file, nodes, "format") != FORMAT:
+            raise FileError(f"{path} is not a results file: name one that flocsim ensemble wrote")
+        version = read_version(file, known)
+        if version != SCHEMA_VERSION:
+            raise FileError(
+                f"{path} has results of schema version {version}, this flocsim reads "
+                f"{SCHEMA_VERSION}: read it with the version that wrote it"
+            )
+        check_structure(nodes)
+        check_coordinates(file)
+        yield file
 
 
 def read_version(file, known):

@@ -19,6 +19,7 @@ from flocsim.io.results.schema import (
     FLAGS,
     LAST_AXES,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
     Results,
@@ -26,7 +27,7 @@ from flocsim.io.results.schema import (
 )
 
 FORMAT = "flocsim results"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 
 class SparseImage(io.RawIOBase):
@@ -99,8 +100,10 @@ def frame_of(results: Results) -> Frame:
         study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
         lists = {axis: list(words) for axis, words in LAST_AXES.items()}
         write_group(file, "probabilities", results.probabilities, TABLE, AXES, study | lists)
+        write_radii(file["probabilities"], results)
         if results.pooled:
             write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)
+            write_radii(file["pooled"], results)
         if results.differences:
             axes = ("against", "event", *AXES)
             more = {"against": list(AXES), "event": list(EVENTS)}
@@ -127,6 +130,13 @@ def write_group(file, name, arrays, schema, axes, coordinates):
     for variable, about in schema.items():
         dataset = group.create_dataset(variable, data=arrays[variable])
         annotate(dataset, about, group, (*axes, *lasts.get(variable, ())))
+
+
+def write_radii(group, results):
+    """The radii of the types, coordinates that are no axis: xarray looks for the attribute."""
+    for name, about in RADII.items():
+        annotate(group.create_dataset(name, data=results.radii[name]), about, group, AXES[:1])
+    group.attrs["coordinates"] = " ".join(RADII)
 
 
 def annotate(dataset, about, group, axes):

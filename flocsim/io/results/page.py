@@ -10,6 +10,7 @@ from flocsim.io.results.schema import (
     DIFFERENCES,
     FLAGS,
     POOLED,
+    RADII,
     REPLICATES,
     TABLE,
 )
@@ -51,8 +52,29 @@ GROUPS = (
      "the axis `against` (so 0 there itself). The same replicates in both: Newcombe's paired "
      "interval (method 10).", DIFFERENCES),
     ("replicates", "(type, vertices, delta, replicate): every single collision. `flocsim "
-     "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again.", REPLICATES),
+     "trajectory CONFIG --scene TYPE,N,DELTA --replicate K` runs any of them again. Radii and D_0 "
+     "are those of the pair: with `scene.pairs = \"measured\"`, or `shapes.size = \"own\"`, each "
+     "replicate has its own, the same at all N and δ; so has δ_max, which follows from the two "
+     "outlines and angles.", REPLICATES),
 )  # fmt: skip
+
+EFFICIENCY = """\
+## The efficiency over the displacements
+
+`flocsim info` and the figure `efficiency` of `flocsim plot` add up the probability P(δ) that an
+approach ends aggregated, misses among the approaches, undecided and failed ones left out, over
+its sideways offset δ (a share of δ_max), linear between the simulated ones:
+
+- in the plane: E = ∫₀¹ P dδ, of all approaches within the width 2 δ_max;
+- axially symmetric: E = ∫₀¹ P 2δ dδ, of all approaches within the area π δ_max². Where P is 1 up
+  to y_c and 0 beyond, it is (y_c/δ_max)², the collision efficiency of two settling bodies
+  (Pruppacher and Klett 1997, *Microphysics of Clouds and Precipitation*, ch. 14.4; Han and Lawler
+  1991, *J. Hydraul. Eng.* 117, 1269).
+
+The bounds are the same sums of Wilson's 95 % bounds at each δ, as wide as where all err together.
+There is none where `scene.delta` does not reach from 0 to 1. The numbers follow from the table
+`probabilities` (`flocsim.io.results.efficiency`).
+"""
 
 NUMERICAL = """\
 ## The numerical error of a probability
@@ -85,6 +107,9 @@ compares);
 `kernel_fingerprint`; versions of flocsim, Python, numpy, numba and h5py; `platform`, `processor`,
 `hostname`, `date`, `command`; `ranks`, `sessions` (runs that it took), `history` (JSON: date and
 command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];
+`warnings` (JSON: lines on what was implausible), `settling` (JSON: type, body i or j, its
+equivalent `radius` [m], terminal `speed` [m/s], `reynolds` = 2 r ρ_f v/γ and `stokes` = τ v/r, the
+same at every N);
 `cpus` (JSON: every kind of CPU that rows were computed on: what LLVM calls it, what numba compiled
 for, the instructions that numpy used, the C library); `failed` (JSON: up to 1000 failed replicates
 with reasons).
@@ -103,7 +128,9 @@ def results_page() -> str:
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
-    return "\n".join([*parts, NUMERICAL + RUN, "## Coordinates\n", coordinates()])
+    return "\n".join(
+        [*parts, NUMERICAL + EFFICIENCY + "\n" + RUN, "## Coordinates\n", coordinates()]
+    )
 
 
 def table(schema):
@@ -126,7 +153,12 @@ def codes(name):
 
 def coordinates():
     rows = [[f"`{name}`", text] for name, (_, text) in COORDINATES.items()]
-    return markdown_table(["axis", "meaning"], rows) + "\n"
+    sizes = [[f"`{name}` [m]", text] for name, (_, _, text) in RADII.items()]
+    return (
+        f"{markdown_table(['axis', 'meaning'], rows)}\n\n"
+        "Beside `type`, in `probabilities` and `pooled`, its radii as numbers:\n\n"
+        f"{markdown_table(['coordinate', 'meaning'], sizes)}\n"
+    )
 
 
 if __name__ == "__main__":

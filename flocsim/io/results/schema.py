@@ -23,6 +23,9 @@ AXES = ("type", "vertices", "delta")
 REPLICATES = {  # name: (dtype, units, long name)
     "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
     "angle_j": ("f8", "rad", "orientation drawn for the approaching body j"),
+    "r_i": ("f8", "m", "equivalent radius of the receiving body i, as run"),
+    "r_j": ("f8", "m", "equivalent radius of the approaching body j, as run"),
+    "D_0": ("f8", "m", "centre distance that bounds the attraction zone of the pair"),
     "outcome": ("u1", "1", "outcome of the approach"),
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
@@ -31,6 +34,7 @@ REPLICATES = {  # name: (dtype, units, long name)
     "checked_inside": ("u1", "1", "centre distance below D_0 at the collision, when run again"),
     "checked_bond": ("u1", "1", "what holds an aggregated pair, when run again"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
+    "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
     "d_c_last": ("f8", "m", "last centre distance"),
     "t_collision": ("f8", "s", "time of the collision"),
@@ -126,7 +130,7 @@ FLAGS = {
     "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
 COORDINATES = {
-    "type": ("1", "collision type or pair of equivalent radii (i/j)"),
+    "type": ("1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("1", "vertices N of each body; 1 is the equivalent sphere"),
     "delta": ("1", "horizontal displacement of the centres as a share of delta_max"),
     "class": (
@@ -143,6 +147,12 @@ COORDINATES = {
     "against": ("1", "compared with the condition that comes first along this axis"),
     "event": ("1", "inside: of all collisions; aggregated: of the decided ones"),
 }
+
+RADII = {
+    "r_i": ("f8", "m", "equivalent radius of body i; of measured flocs the median"),
+    "r_j": ("f8", "m", "equivalent radius of body j; of measured flocs the median"),
+}
+"""Numbers that stand for each collision type, along the axis `type`."""
 
 
 def last_axis(name: str) -> str | None:
@@ -183,7 +193,8 @@ class Results:
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
-    event, type, vertices, delta), or nothing.
+    event, type, vertices, delta), or nothing; ``radii`` {r_i, r_j: (type,)} [m] those of `RADII`,
+    NaN where they are not known.
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
 
@@ -198,11 +209,18 @@ class Results:
     pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
     differences: dict[str, np.ndarray] = attrs.field(factory=dict)
     count: int = 0
+    radii: dict[str, np.ndarray] = attrs.field(
+        default=attrs.Factory(
+            lambda self: {name: np.full(len(self.types), np.nan) for name in RADII},
+            takes_self=True,
+        )
+    )
 
     def __attrs_post_init__(self):
         shape = self.shape
         shapes = {name: (*shape, *tail_of(name)) for name in TABLE}
         self.check("probabilities", TABLE, shapes)
+        self.check("radii", RADII, dict.fromkeys(RADII, shape[:1]))
         if self.pooled:
             self.check("pooled", POOLED, dict.fromkeys(POOLED, shape[:2]))
         if self.differences:

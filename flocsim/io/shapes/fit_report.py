@@ -27,8 +27,12 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
-    share = 100 * found.foreground_share
-    return f"{visible(name, keep='')}: {', '.join(parts)}; foreground {share:.2f} %"
+    if found.left_whole:
+        parts.append(f"{found.left_whole} taken for fractal aggregates and not parted (--neck)")
+    about = f"foreground {100 * found.foreground_share:.2f} %"
+    if found.threshold == found.threshold:
+        about += f", threshold {found.threshold:.4g}"
+    return f"{visible(name, keep='')}: {', '.join(parts)}; {about}"
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
@@ -101,7 +105,7 @@ def summary_text(
                       if region.label in fitted]  # fmt: skip
             table.writerow([*row, *(errors or [""] * len(pairs))])
         for region in picture.found.rejected:
-            row = [picture.name, "", region.reason, *_facts(region, pixel_size)]
+            row = [picture.name, region.label, region.reason, *_facts(region, pixel_size)]
             table.writerow([*row, *[""] * len(pairs)])
     return text.getvalue()
 

@@ -20,9 +20,9 @@ for every N, so that between conditions nothing changes but N.  Every dataset ha
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
 
-import contextlib
 import io
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,12 +33,19 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-from flocsim.io.files import Rule, checked_sealed, keep, seal, write_file
+from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column, hold_against
-from flocsim.io.hdf5.structure import Node, structure_of
+from flocsim.io.hdf5.structure import Node
+from flocsim.io.opening import opened_file, text_of
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
+
+NAME_OF_SHIPPED = "synthetic"
+"""What a config calls the library that ships with flocsim."""
+
+SHIPPED = Path(__file__).with_name("synthetic.h5")
+"""Its place; flocsim.io.shapes.shipped made it."""
 
 KIND = "flocsim shape library"
 SCHEMA_VERSION = 1
@@ -181,7 +188,7 @@ def _write_column(group, name, values, units, long_name):
 def is_library(path: str | Path) -> bool:
     """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
     with opened(path) as (file, nodes):
-        return kind_of(file, nodes) == KIND
+        return text_of(file, nodes, "kind") == KIND
 
 
 def read_settings(path: str | Path) -> dict[str, Any]:
@@ -201,7 +208,7 @@ def read_library(path: str | Path) -> list[ShapeEntry]:
     that holds what cannot be.
     """
     with opened(path) as (file, nodes):
-        if kind_of(file, nodes) != KIND:
+        if text_of(file, nodes, "kind") != KIND:
             raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
         version = nodes[""].attributes.get("schema_version") == ("i8", ()) and int(
             file.attrs["schema_version"]
@@ -216,32 +223,14 @@ def read_library(path: str | Path) -> list[ShapeEntry]:
     return entries
 
 
-def kind_of(file, nodes):
-    """What an open file says that it is; "" where it says nothing."""
-    known = nodes[""].attributes.get("kind")
-    return str(file.attrs["kind"]) if known == ("text", ()) else ""
-
-
-@contextlib.contextmanager
-def opened(path: str | Path) -> Iterator[tuple[Any, dict[str, Node]]]:
+def opened(path: str | Path) -> AbstractContextManager[tuple[Any, dict[str, Node]]]:
     """(open h5py file, its structure), once checksum and structure were found right."""
-    import h5py
-
-    with checked_sealed(path) as (data, size):
-        try:
-            nodes = structure_of(data, size)
-            data.seek(0)
-            with h5py.File(data, "r") as file:
-                yield file, nodes
-        except FileError:
-            raise
-        except (
-            OSError, KeyError, ValueError, TypeError, RuntimeError, IndexError, OverflowError
-        ) as problem:  # fmt: skip
-            reason = " ".join(str(problem).split())
-            raise FileError(
-                f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
-            ) from problem
+    return opened_file(
+        path,
+        lambda reason: (
+            f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
+        ),
+    )
 
 
 def check_structure(nodes: Mapping[str, Node]) -> None:

@@ -63,7 +63,7 @@ class Doublet:
     @property
     def load(self):
         """The greatest pull of settling on the bond [N]."""
-        return bonds.largest_load(self.observed)
+        return self.observed[numbers.LOAD]
 
     def attraction(self):
         return bonds.centre_attraction(self.scene, self.work, 0.0)

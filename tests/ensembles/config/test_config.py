@@ -25,8 +25,10 @@ from flocsim.ensembles.config.schema import (
     ZoneConfig,
     keys_of,
 )
+from flocsim.ensembles.preflight import check_study
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.shapes.sphere import Sphere
+from tests.helpers.small_study import write_star_library
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -54,16 +56,48 @@ def zone_number(config):
 
 
 def test_conditions_are_named_by_type_or_by_radii():
-    assert SceneConfig(types=("III", "I")).conditions == (
-        ("III", 4.62e-6, 4.95e-6),
-        ("I", 16.41e-6, 23.02e-6),
+    assert SceneConfig(types=("III", "I")).given == (
+        ("III", (4.62e-6, 4.95e-6)),
+        ("I", (16.41e-6, 23.02e-6)),
     )
     pairs = ((16.41e-6, 23.02e-6), (1e-6, 100e-6))
-    assert SceneConfig(pairs=pairs).conditions == (
-        ("16.41um-23.02um", *pairs[0]),
-        ("1um-100um", *pairs[1]),
+    assert SceneConfig(pairs=pairs).given == (
+        ("16.41um-23.02um", pairs[0]),
+        ("1um-100um", pairs[1]),
     )
-    assert [name for name, *_ in SceneConfig().conditions] == ["I", "II", "III"]
+    assert SceneConfig(pairs=pairs).names == ("16.41um-23.02um", "1um-100um")
+    assert SceneConfig().names == ("I", "II", "III")
+
+
+def test_size_classes_are_named_by_their_quantile_or_by_their_radii():
+    def names(classes):
+        return SceneConfig(pairs="measured", classes=classes).names
+
+    assert names(1) == ("measured",)
+    assert names(2) == ("q1-q1", "q1-q2", "q2-q2")
+    assert names((10e-6,)) == ("to10um-to10um", "to10um-from10um", "from10um-from10um")
+    assert names((1e-5, 2e-5))[3:] == (
+        "10to20um-10to20um", "10to20um-from20um", "from20um-from20um",
+    )  # fmt: skip
+    assert SceneConfig(pairs="measured").weight == "number"
+    assert SceneConfig().weight is SceneConfig().classes is None
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({"weight": "area"}, 'weight goes with pairs = "measured"'),
+        ({"pairs": ((1e-6, 2e-6),), "max_radius": 1e-6}, 'max_radius goes with pairs = "measured"'),
+        ({"pairs": "measured", "min_radius": 2e-6, "max_radius": 1e-6}, "is not below max_radius"),
+        ({"pairs": "measured", "classes": (2e-5, 1e-5)}, "ascending radii .* found 20 um, 10 um"),
+        ({"pairs": "measured", "min_radius": 2e-5, "classes": (1e-5,)}, "ascending radii between"),
+        ({"pairs": "measured", "classes": 0}, "from 1 to 20"),
+        ({"pairs": "meazured"}, "pairs must be 'measured' or a list"),
+    ],
+)
+def test_what_measured_pairs_cannot_be(words, why):
+    with pytest.raises(ConfigError, match=why):
+        SceneConfig(**words)
 
 
 @pytest.mark.parametrize(
@@ -161,6 +195,19 @@ def test_init_writes_a_config_that_loads(tmp_path, monkeypatch, capsys):
     assert "study.toml" in capsys.readouterr().out
     config = load_config("study.toml")
     assert (config.preset, config.replicates) == ("tang2014", 100)
+
+
+def test_init_writes_a_study_of_measured_flocs(tmp_path):
+    path = tmp_path / "study.toml"
+    assert run_init(str(path), "--kind", "measured") == 0
+    write_star_library(tmp_path / "shapes.h5", vertices=(4, 16, 64))
+    config = load_config(path)
+    assert config.scene.is_measured and config.shapes.size == "own"
+    check_study(config)
+    text = path.read_text().replace("# weight", "weight").replace("# min_radius", "min_radius")
+    path.write_text(text.replace("# classes", "classes"))
+    scene = load_config(path).scene
+    assert (scene.weight, scene.min_radius, len(scene.names)) == ("volume", 5e-6, 6)
 
 
 def test_init_never_overwrites_unasked(tmp_path):

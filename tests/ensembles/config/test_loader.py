@@ -10,7 +10,7 @@ from tests.helpers.small_study import VALID, load_text, problem_lines
 def test_every_value_arrives_in_si_units(tmp_path):
     config = load_text(tmp_path, VALID)
     assert (config.preset, config.seed, config.replicates) == ("tang2014", 3, 20)
-    assert config.scene.conditions == (("I", 16.41e-6, 23.02e-6), ("III", 4.62e-6, 4.95e-6))
+    assert config.scene.given == (("I", (16.41e-6, 23.02e-6)), ("III", (4.62e-6, 4.95e-6)))
     assert (config.scene.delta, config.scene.start_gap) == ((0.0, 0.5), 2e-6)
     assert (config.scene.escape_gap, config.scene.time_limit) == (4e-6, 5.0)
     assert (config.shapes.vertices, config.shapes.radius, config.shapes.pool) == ((1, 4), 1e-6, 5)
@@ -32,7 +32,7 @@ def test_quantities_and_numbers_are_the_same(tmp_path):
     in_units = load_text(tmp_path, 'preset = "si"\n[scene]\npairs = [["16.41 um", "23.02 µm"]]\n')
     in_metres = load_text(tmp_path, 'preset = "si"\n[scene]\npairs = [[16.41e-6, 23.02e-6]]\n')
     assert in_units.scene == in_metres.scene
-    assert in_units.scene.conditions == (("16.41um-23.02um", 16.41e-6, 23.02e-6),)
+    assert in_units.scene.given == (("16.41um-23.02um", (16.41e-6, 23.02e-6)),)
 
 
 def test_order_of_tables_and_keys_does_not_matter(tmp_path):
@@ -97,7 +97,7 @@ def test_a_library_is_found_beside_the_config(tmp_path, monkeypatch):
     text = 'preset = "si"\n[shapes]\nsource = "library"\nfile = "shapes.h5"\n'
     assert problem_lines(tmp_path, text) == [
         "study.toml:4: shapes.file: shapes.h5 does not exist; name a library that "
-        "`flocsim fit` wrote"
+        '`flocsim fit` wrote, or "synthetic", the one that ships with flocsim'
     ]
     (tmp_path / "shapes.h5").touch()
     monkeypatch.chdir("/")

@@ -348,7 +348,7 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
     study = Study(config)
     [floc] = study.flocs
     assert (floc.name, list(floc.shapes)) == ("own:Rod", [2])
-    for condition, (_, *radii) in enumerate(config.scene.conditions):
+    for condition, (_, radii) in enumerate(config.scene.given):
         pair = study.encounter(condition, 2, [0.1, 0.2, 0.3, 0.4])
         assert [shape.equivalent_radius for shape in pair.shapes] == pytest.approx(radii)
         assert [s.length / s.radius for s in pair.shapes] == pytest.approx([6.0, 6.0])

@@ -26,7 +26,7 @@ def reproduce(folder, *words, env=None):
 
 def test_the_study_is_the_papers():
     config = load_config(FOLDER / "study.toml")
-    counts = len(config.scene.conditions), len(config.shapes.vertices), len(config.scene.delta)
+    counts = len(config.scene.names), len(config.shapes.vertices), len(config.scene.delta)
     assert counts == (3, 17, 5)
     assert config.replicates == 1000
     assert config.shapes.radius == 1e-6

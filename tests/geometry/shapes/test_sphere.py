@@ -16,7 +16,14 @@ def test_closed_forms():
     assert sphere.placed_vertices(1.0, 2.0, 0.3).tolist() == [[1.0, 2.0]]
 
 
-@pytest.mark.parametrize("radius", [0, -1e-6, np.nan, np.inf, "1 um", None, True, [1e-6], 1j])
+@pytest.mark.parametrize("radius", ["wide", "1 s", ""])
+def test_a_text_that_is_no_length_is_refused_in_one_line(radius):
+    with pytest.raises(ShapeError, match="the radius") as caught:
+        Sphere(radius)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("radius", [0, -1e-6, np.nan, np.inf, None, True, [1e-6], 1j])
 def test_a_radius_that_is_no_length_is_refused_in_one_line(radius):
     with pytest.raises(ShapeError, match=r"finite number above 0 \(metres\), found") as caught:
         Sphere(radius)

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from flocsim.errors import ImageError
 from flocsim.io.images.masks import read_masks, segment_mask
+from flocsim.io.images.recognition import AGREEING, agreement, is_mask
+from tests.helpers.real_images import real_image
 
 MASK = np.zeros((30, 40), np.uint8)
 MASK[0:10, 3:15] = MASK[15:28, 20:36] = 1
@@ -54,6 +57,23 @@ def test_a_label_in_two_places_is_two_flocs():
         (100, (2, 2, 12, 12)), (130, (2, 15, 12, 28)), (100, (2, 28, 12, 38))
     ]  # fmt: skip
     assert found[1].centroid == (21.0, 6.5)
+    assert [r.label for r in found] == [4, 10, 9]
+
+
+def test_a_floc_keeps_the_number_of_its_label():
+    labels = np.zeros((30, 30), int)
+    labels[2:12, 2:12] = 7
+    assert [r.label for r in segment_mask(labels).regions] == [7]
+    labels[15:25, 15:25] = 3
+    found = segment_mask(labels, min_radius=1)
+    assert sorted((r.label, r.bbox[0]) for r in found.regions) == [(3, 15), (7, 2)]
+    assert [r.label for r in segment_mask((labels > 0) * 255).regions] == [1, 2]
+
+
+def test_a_label_in_a_hole_of_another_is_a_floc_of_its_own():
+    labels = np.zeros((40, 40), int)
+    labels[5:35, 5:35], labels[15:25, 15:25] = 1, 2
+    assert [(r.label, r.area) for r in segment_mask(labels).regions] == [(1, 800), (2, 100)]
 
 
 def test_an_empty_mask_has_no_flocs():
@@ -89,3 +109,48 @@ def test_damaged_and_absent_files_are_told(tmp_path):
         read_masks(tmp_path / "m.npz")
     with pytest.raises(ImageError, match="no such"):
         read_masks(tmp_path / "absent.npy")
+
+
+def photograph(sigma=0.0, shape=(80, 100)):
+    """Grey levels (0 … 255) of two bright flocs on black, with the noise of a camera."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    grey = sum(200.0 * np.exp(-((np.hypot(x - c, y - 40) / 15) ** 4)) for c in (25, 70))
+    grey += 12.0 * np.random.default_rng(1).standard_normal(shape)
+    return np.clip(gaussian_filter(grey, sigma), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("suffix", ["png", "tif", "bmp", "jpg", "npy"])
+@pytest.mark.parametrize("sigma", [0.0, 1.0])
+def test_a_photograph_is_no_mask(tmp_path, suffix, sigma):
+    path = tmp_path / f"photo.{suffix}"
+    grey = photograph(sigma)
+    np.save(path, grey) if suffix == "npy" else Image.fromarray(grey).save(path)
+    with pytest.raises(ImageError, match=r"photo.*is a photograph, not a mask: .* without --masks"):
+        read_masks(path)
+
+
+@pytest.mark.parametrize("side", [5, 9])
+def test_labels_that_cover_everything_are_no_photograph(side):
+    """The least like neighbours that flocs of these sizes can have: squares side by side."""
+    count = 12
+    numbers = np.random.default_rng(2).permutation(count * count).reshape(count, count) + 1
+    labels = np.kron(numbers, np.ones((side, side), int))
+    assert agreement(labels) > AGREEING and is_mask(np.pad(labels, 1).astype(np.uint16))
+
+
+def test_masks_are_told_from_photographs():
+    labels = np.zeros((20, 30), np.uint16)
+    labels[2:12, 2:12], labels[2:12, 12:25] = 300, 7
+    for mask in (labels, MASK, MASK > 0, MASK * 255, np.dstack([MASK * 255] * 3)):
+        assert is_mask(mask)
+    two_levels = np.where(MASK > 0, 40, 200).astype(np.uint8)
+    for picture in (photograph(), two_levels, np.zeros((5, 5), np.uint8), MASK * 0.5):
+        assert not is_mask(picture)
+
+
+@pytest.mark.parametrize(
+    "name", ["safas/clearfloc.png", "flocpy/023.png", "sandi/Stereomicroscope-image1.jpg"]
+)
+def test_real_photographs_are_no_masks(name):
+    with pytest.raises(ImageError, match="is a photograph"):
+        read_masks(real_image(name))

@@ -118,8 +118,28 @@ def test_blurred_flocs_are_rejected_with_the_reason():
     soft = 2.0 * blurred(disks((140, 140, 15), shape=(200, 200)), 10.0)
     found = segment(sharp + soft)
     assert len(found.regions) == 1 and found.rejected_by_reason() == {"out of focus": 1}
-    assert found.regions[0].blur < 3 < found.rejected[0].blur
+    assert found.regions[0].blur < 2 < found.rejected[0].blur
     assert len(segment(sharp + soft, max_blur=np.inf).regions) == 2
+
+
+def test_a_sharp_speck_does_not_vouch_for_the_halo_around_it():
+    """The mean edge would: a tenth of the outline has most of the gradient."""
+    halo = 1.2 * blurred(disks((70, 70, 22), shape=(140, 140)), 8.0)
+    speck = disks((93, 70, 5), shape=(140, 140))
+    found = segment(np.maximum(halo, speck), background=np.zeros((140, 140)), threshold=0.5)
+    assert found.rejected_by_reason() == {"out of focus": 1}
+    (alone,) = segment(speck, background=np.zeros((140, 140)), threshold=0.5).regions
+    assert alone.blur < 2 < found.rejected[0].blur
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 4.0])
+def test_focus_is_relative_to_the_size(scale):
+    """The same floc, the same blur: what is soft is soft at any magnification."""
+    places, shape = (60 * scale, 60 * scale, 18 * scale), (int(120 * scale), int(120 * scale))
+    for share, kept in ((0.12, 1), (0.35, 0)):
+        picture = blurred(disks(places, shape=shape), share * 18 * scale)
+        found = segment(picture, background=np.zeros(shape), threshold=0.4)
+        assert len(found.regions) == kept
 
 
 def test_touching_flocs_are_parted_at_their_neck():
@@ -131,6 +151,27 @@ def test_touching_flocs_are_parted_at_their_neck():
     assert sorted(part.area for part in parts) == pytest.approx([1018 + 35, 1257 + 25], abs=60)
     wide = np.maximum(picture, 0.9 * ((abs(row - 60) <= 14) & (abs(column - 60) < 20)))
     assert len(segment(wide, background=np.zeros((120, 120))).regions) == 1
+
+
+def test_a_chain_of_beads_is_one_aggregate_and_pairs_are_two_flocs():
+    chain = disks(*((20 + 19 * k, 30 + 6 * (k % 2), 10) for k in range(5)), shape=(160, 160))
+    pair = disks((30, 110, 10), (50, 110, 10), shape=(160, 160))
+    dark = {"background": np.zeros((160, 160)), "threshold": 0.4}
+    found = segment(chain, **dark)
+    assert len(found.regions) == 1 and found.left_whole == 1
+    assert len(segment(chain, neck=0.5, **dark).regions) == 5
+    assert len(segment(pair, **dark).regions) == 2 and segment(pair, **dark).left_whole == 0
+    both = segment(np.maximum(chain, pair), **dark)
+    assert len(both.regions) == 2 and both.left_whole == 2  # of one picture, of one kind
+    pairs = disks(*((x, y, 10) for x in (30, 50) for y in (20, 60, 100, 140)), shape=(160, 160))
+    assert len(segment(pairs, **dark).regions) == 8
+
+
+def test_soot_is_not_cut_at_its_necks():
+    grey = read_grey(real_image("soot_tem/201805A_A6_004_half.png"))
+    whole, cut = segment(grey), segment(grey, neck=0.5)
+    assert whole.left_whole == 4 and cut.left_whole == 0
+    assert len(whole.regions) == len(segment(grey, neck=0).regions) < len(cut.regions)
 
 
 def test_a_floc_thicker_in_its_middle_keeps_its_rim():
@@ -267,7 +308,7 @@ def test_camera_frames_with_a_strong_vignette(frame):
     found = segment(read_grey(real_image(f"flocpy/{frame}.png")))
     assert found.flocs == "dark"
     assert 0.026 <= found.foreground_share <= 0.050
-    assert 15 <= len(found.regions) <= 26
+    assert 10 <= len(found.regions) <= 16
 
 
 @pytest.mark.parametrize(
@@ -276,9 +317,9 @@ def test_camera_frames_with_a_strong_vignette(frame):
         ("safas/brightfield_flocs.png", "bright", 4, 6),
         ("safas/clayflocs.png", "dark", 4, 4),
         ("safas/clearfloc.png", "dark", 1, 1),
-        ("safas/darkfield_highgray_mudflocs.png", "dark", 32, 80),
-        ("safas/darkfield_noisy_mudflocs_left.png", "dark", 75, 160),
-        ("sandi/FlocCAM-image2.jpg", "dark", 15, 25),
+        ("safas/darkfield_highgray_mudflocs.png", "dark", 28, 36),
+        ("safas/darkfield_noisy_mudflocs_left.png", "dark", 40, 60),
+        ("sandi/FlocCAM-image2.jpg", "dark", 10, 16),
         ("sandi/Stereomicroscope-image1.jpg", "bright", 12, 25),
         ("soot_tem/201805A_A6_004_half.png", "dark", 5, 45),
     ],

@@ -170,3 +170,32 @@ def test_lengths_of_an_animation_must_agree(tmp_path):
     frames = attrs.evolve(falling(3), contacts=[()])
     with pytest.raises(UsageError, match="as many"):
         write_animation(tmp_path / "a.gif", frames, (frames.times, frames.centre_distance))
+
+
+def test_a_strip_names_bodies_lines_and_contacts():
+    frames = [[[SQUARE], [SQUARE + 3e-6]]] * 4
+    touching = [np.array([[1e-6, 0.0], [2e-6, 0.0]])] * 4
+    paths = [np.zeros((2, 2)), np.ones((2, 2)) * 1e-6]
+    figure = draw_strip(frames, [0.0, 1.0, 2.0, 3.0], paths, contacts=touching, seen_from=0)
+    [legend] = figure.legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert words[:2] == ["body i", "body j"] and words[-1] == "contact"
+    assert words[2] == "way of a body's centre in the whole run, seen from i"
+    assert [text.get_text() for text in figure.axes[0].texts[-2:]] == ["i", "j"]
+    rings = [line for line in figure.axes[2].lines if line.get_marker() == "o"]
+    assert [len(ring.get_xdata()) for ring in rings] == [2]
+
+
+def test_no_title_is_cut(tmp_path):
+    title = (
+        "type 12.5 um, 44.1 um of a long name, N = 64, delta = 0.75, replicate 1234567: undecided"
+    )
+    for figure in (
+        draw_distance([0.0, 1.0], [1e-5, 2e-5], title=title),
+        draw_strip([[[SQUARE]]] * 2, [0.0, 1.0], [], title),
+    ):
+        figure.canvas.draw()
+        texts = [figure._suptitle] if figure._suptitle else [figure.axes[0]._left_title]
+        assert texts[0].get_text().replace("\n", " ") == title
+        assert texts[0].get_window_extent().x1 <= figure.bbox.x1
+        assert texts[0].get_window_extent().y1 <= figure.bbox.y1 + 1.0

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from flocsim.io.plots.shapes import POPULATION_FIGURES, draw_overlay, figure_2, figure_3
+from flocsim.io.plots.shapes import POPULATION_FIGURES, figure_2, figure_3
 from flocsim.io.plots.style import save
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
 
@@ -29,11 +29,6 @@ def test_populations_of_any_size_are_drawn(entries, tmp_path):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             save(draw(entries), tmp_path / f"{name}.png")
-
-
-@pytest.mark.parametrize("name", [r"a$\frac{b.png", "$x^$", "a\x1b[31m\n.png"])
-def test_a_picture_of_any_name_is_drawn(name, tmp_path):
-    save(draw_overlay(np.zeros((20, 30)), [], f"{name}: 0 flocs", []), tmp_path / "o.png")
 
 
 def test_a_floc_counts_once_whatever_its_spheroradii():

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Fluid, Sphere, System
-from flocsim.ensembles.collision.settling import terminal_motion, turn_time
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
+from flocsim.plausibility.settling import terminal_motion, turn_time
 
 G, VISCOSITY = 9.81, 8.9e-4
 

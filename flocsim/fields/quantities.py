@@ -27,11 +27,19 @@ KINDS = {
 NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)(.*)", re.DOTALL
 )
-UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)(?:(?:\^|\*\*)?([+-]?[0-9]))?")
+EXPONENT = r"(?:(?:\^|\*\*)?([+-]?[0-9](?:\.[0-9]{1,3})?)|(?:\^|\*\*)\(([+-]?[0-9])/([1-9])\))?"
+THERMAL = re.compile(
+    r"\s*([*·./]?)\s*k(?:_?[Bb])?T(?![^\W\d_])(?:\s*@\s*([0-9]+\.?[0-9]*)\s*K(?![^\W\d_]))?"
+    + EXPONENT
+)
+UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)" + EXPONENT)
 SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
 
 LONGEST = 100
 """Letters of a number and its unit."""
+
+BOLTZMANN = Decimal("1.380649e-23")
+"""k [J/K], exact by definition."""
 
 # Far more digits than a float has, so that the only rounding is the last one.
 DIGITS = 60
@@ -47,7 +55,8 @@ def read_quantity(text: str, unit: str) -> float:
     """The value of ``text``, a number and its unit, in ``unit`` as a float.
 
     The conversion is decimal: ``read_quantity("16.41 um", "m") == 16.41e-6``. Units multiply by a
-    space, "*" or "·", divide by "/", and have whole exponents: "mPa s", "kg/m^3", "kg m-3", "m²".
+    space, "*" or "·", divide by "/", and have exponents: "mPa s", "kg/m^3", "kg m-3", "m²",
+    "Pa^0.5", "m^(1/2)". An energy may be "4 kT@293K": the temperature is part of the unit.
     ValueError, with the reason, for text that is no quantity or has another dimension.
     """
     if len(text) > LONGEST:
@@ -76,29 +85,44 @@ def factor(written, unit):
     """How many of ``unit`` one of the ``written`` unit is (Decimal)."""
     import pint
 
-    one = registry().Quantity(Decimal(1), parse_unit(written))
+    (scale, one), (per, wanted) = parse_unit(written), parse_unit(unit)
     try:
-        return one.to(parse_unit(unit)).magnitude
+        return registry().Quantity(Decimal(1), one).to(wanted).magnitude * scale / per
     except (pint.PintError, ArithmeticError, TypeError, ValueError) as error:
         raise ValueError("") from error
 
 
 def parse_unit(text):
-    """A product of powers of units. Read here, since pint would evaluate "9**9**9 m"."""
-    import pint
-
+    """(factor, product of powers of units). Read here, since pint would evaluate "9**9**9 m"."""
     units = registry()
-    product = units.Unit("dimensionless")
+    scale, product = Decimal(1), units.Unit("dimensionless")
     place = 1 if re.match(r"1\s*/", text) else 0
     while place < len(text):
-        match = UNIT_FACTOR.match(text, place)
-        if not match or not match[2].isidentifier():
+        match = THERMAL.match(text, place)
+        if match and match[2] is None:
+            raise ValueError("kT needs its temperature, as in 'kT@298.15K'")
+        thermal = Decimal(match[2]) * BOLTZMANN if match else Decimal(1)
+        match = match or UNIT_FACTOR.match(text, place)
+        if not match or not (thermal != 1 or match[2].isidentifier()) or not thermal > 0:
             raise ValueError(f"{text[place:].strip()!r} is no unit")
-        try:
-            one = units.Unit(match[2])
-        except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
-            raise ValueError(f"unknown unit {match[2]!r}") from error
-        exponent = int(match[3] or 1)
-        product = product * one ** (-exponent if match[1] == "/" else exponent)
+        one = units.Unit("joule") if thermal != 1 else unit_of(match[2])
+        exponent = exponent_of(*match.groups()[2:]) * (-1 if match[1] == "/" else 1)
+        scale, product = scale * thermal**exponent, product * one**exponent
         place = match.end()
-    return product
+    return scale, product
+
+
+def unit_of(name):
+    """The unit of a name, as "um"."""
+    import pint
+
+    try:
+        return registry().Unit(name)
+    except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"unknown unit {name!r}") from error
+
+
+def exponent_of(decimal, over, under):
+    """The exponent that is written as a decimal, as "(1/2)", or not at all."""
+    value = Decimal(over) / Decimal(under) if over else Decimal(decimal or 1)
+    return int(value) if value == int(value) else value

@@ -1,7 +1,7 @@
 """Makers of attrs fields that carry their unit and their permitted range.
 
-The range is checked when an object is made, in Python as from a config file; the unit lets the
-config loader read "16.41 um" and refuse "3 kg". Metadata keys: ``allowed`` (what the field takes,
+The range is checked when an object is made, in Python as from a config file; the unit lets both
+read "16.41 um" and refuse "3 kg" (quantities.py). Metadata keys: ``allowed`` (what the field takes,
 in words), ``unit``, ``choices``, ``flag``, ``help``.
 """
 
@@ -13,6 +13,7 @@ from typing import Any
 import attrs
 
 from flocsim.errors import RangeError
+from flocsim.fields.quantities import kind_of, read_quantity
 
 
 def is_number(value: Any) -> bool:
@@ -59,15 +60,50 @@ def may_be_none(default: Any) -> bool:
     return default is None or isinstance(default, attrs.Factory)  # type: ignore[arg-type]
 
 
-def checked_field(check: Callable[[Any], bool], allowed: str, default: Any, **metadata: Any) -> Any:
-    """A field whose values pass ``check``; RangeError says what is ``allowed`` of all others."""
+def in_unit(value: Any, unit: str, name: str) -> Any:
+    """A text such as "16.41 um" as a number of the unit; all else as it is.
+
+    RangeError, with the ``name`` of what it is for, for a text that is no such quantity.
+    """
+    if not isinstance(value, str):
+        return value
+    try:
+        return read_quantity(value, unit)
+    except ValueError as reason:
+        hint = f" ({reason})" if str(reason) else ""
+        raise RangeError(f"{name} must be {kind_of(unit)}, found {value!r}{hint}") from None
+
+
+def checked_field(
+    check: Callable[[Any], bool], allowed: str, default: Any, *, kw_only: bool = False,
+    **metadata: Any,
+) -> Any:  # fmt: skip
+    """A field whose values pass ``check``; RangeError says what is ``allowed`` of all others.
+
+    With a ``unit`` in its metadata it takes texts such as "16.41 um".
+    """
+    unit, words = metadata.get("unit"), metadata.get("choices", ())
+
+    def read(value: Any) -> Any:
+        try:
+            return in_unit(value, unit, "") if unit and value not in words else value
+        except RangeError:
+            return value  # validate, which knows the name, says what is wrong
 
     def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
         if not (check(value) or (value is None and may_be_none(default))):
+            if unit and not words:
+                in_unit(value, unit, attribute.name)
             raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
     metadata = {"allowed": allowed, **metadata}
-    return attrs.field(default=default, validator=validate, metadata=metadata)
+    return attrs.field(
+        default=default,
+        converter=read if unit else None,
+        validator=validate,
+        metadata=metadata,
+        kw_only=kw_only,
+    )
 
 
 def quantity(
@@ -80,7 +116,10 @@ def quantity(
     help: str = "",
     **metadata: Any,
 ) -> Any:
-    """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``."""
+    """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``.
+
+    It takes numbers in that unit, and texts with any of the same dimension: 5e-21 or "5 zJ".
+    """
     check, allowed = number_range(above, at_least, at_most)
     return checked_field(check, allowed, default, unit=unit, help=help, **metadata)
 

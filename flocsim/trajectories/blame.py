@@ -1,4 +1,4 @@
-"""Which force gives no number where a replicate could not go on.
+"""Which force gives no number where a run could not go on.
 
 A method tries shorter and shorter steps where a force is NaN or infinite, and ends as stalled, or
 without any steps left. Looking at every force by itself where the run has ended, and at where it
@@ -13,16 +13,20 @@ import numpy as np
 from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY
 from flocsim.compiler.composer import compose
 from flocsim.compiler.reads import where
-from flocsim.forces.codegen import laws_of
+from flocsim.forces.check import asked_at
+from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
+from flocsim.integrators.base import Status
+from flocsim.integrators.rhs.surface_gap import flag_near, run_end, surface_view
 from flocsim.integrators.rhs.views import body_view, centre_view, contact_view
 from flocsim.run import Run
-from flocsim.system import System
 
 AHEAD = (0.0, *np.geomspace(1e-16, 1e-4, 25))
 """Times [s] behind the end of a run at which forces are looked at, at unchanged velocities."""
+
+UNABLE = (Status.STEP_BUDGET, Status.STALLED, Status.NOT_FINITE)
+"""Ends at which a force may be to blame that gives NaN or infinity."""
 
 LARGEST = 1e100
 """Beyond such an answer, in SI units, the motion overflows."""
@@ -42,16 +46,30 @@ def views_of(system, scene, work, time):
     """{first part of laws' names: [what they are shown]} in the state NOW."""
     views = {
         "body": [body_view(scene, work, time, NOW, body) for body in range(len(system.bodies))],
-        "centre": [centre_view(scene, work, time, NOW, 1, 0)],
+        "centre": [
+            centre_view(scene, work, time, NOW, a, b)
+            for a in range(len(system.bodies))
+            for b in range(a)
+        ],
     }
     if compose(locate, system.fillings(), jit=False)(scene, work):
         rows = range(work.tally[CANDIDATES])
         touching = [row for row in rows if work.geometry[NOW, row, GAP] < 0.0]
         flag_near(scene, work, NOW, 0.0)
-        count = work.tally[CANDIDATES]
-        views["surface"] = [surface_view(scene, work, time, NOW, 0, count)] if count else []
+        views["surface"] = [
+            surface_view(scene, work, time, NOW, first, end) for first, end in runs_of(work)
+        ]
         views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
     return views
+
+
+def runs_of(work):
+    """(first row, row behind the last) of the listed pairs of features of every two bodies."""
+    row = 0
+    while row < work.tally[CANDIDATES]:
+        end = run_end(work, row)
+        yield row, end
+        row = end
 
 
 def family(law):
@@ -85,17 +103,12 @@ def kernel_of(force, law, fluid):
     )
 
 
-def place_of(view):
-    """Where a force was asked, in words."""
-    if hasattr(view, "gap"):
-        return f"a gap of {view.gap:.3g} m"
-    if hasattr(view, "overlap"):
-        return f"an overlap of {view.overlap:.3g} m"
-    return f"t = {view.time:.3g} s and an angle of {view.angle:.3g} rad"
+@np.errstate(all="ignore")
+def wrong_answer(force: Any, pieces: Pieces, views: dict[str, list], fluid: Any) -> str:
+    """ "kernel (file:line) gives nan at …" of a force; "" where all of its answers are numbers.
 
-
-def wrong_answer(force, pieces, views, fluid):
-    """ "kernel (file:line) gives nan at …" of a force; "" where all of its answers are numbers."""
+    ``pieces``, of the force alone; ``views`` {"body", "centre", …: the views to ask for}.
+    """
     parameters = np.array(pieces.parameters, dtype=float)
     for name, law in pieces.laws.items():
         each_event = range(pieces.events) if name == "contact_event" else [None]
@@ -107,13 +120,14 @@ def wrong_answer(force, pieces, views, fluid):
                 if wrong:
                     what = where(kernel_of(force, name, fluid))
                     slope = "a slope of " if name.endswith("derivatives") else ""
-                    return f"{what} gives {slope}{float(wrong[0])} at {place_of(view)}"
+                    return f"{what} gives {slope}{float(wrong[0])} at {asked_at(view)}"
     return ""
 
 
 @np.errstate(all="ignore")
-def force_to_blame(system: System, run: Run) -> str:
-    """The force that gives NaN, or more than LARGEST, where a Run has ended, in words; or ""."""
+def force_to_blame(system: Any, run: Run) -> str:
+    """The force of a System that gives NaN, or more than LARGEST, where a Run has ended, in words;
+    or ""."""
     scene: Any = system.scene(jit=False)
     start = run.work.motion[NOW].copy()
     if not np.isfinite(start).all():

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from flocsim.commands.fit_processes import Lost, workers
+from flocsim.commands.fitting.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
-from flocsim.io.shapes.fit_report import picture_line, warn_of_coarse
+from flocsim.io.images.correction import Correction, check_names, corrected
+from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ LOST = FlocsimError.exit_code
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
+
+MOST_NAMES = 5
+"""Files that one line names."""
 
 
 @attrs.frozen
@@ -45,6 +49,7 @@ class Options:
     background: str
     jobs: int
     segmentation: dict[str, Any]
+    correction: Correction
 
 
 @attrs.frozen(eq=False)
@@ -55,6 +60,13 @@ class Picture:
     name: str
     found: "Segmentation"
     regions: "tuple[Region, ...]"
+
+
+@attrs.frozen
+class MaskFile:
+    """What stands for a file among the pictures that is a mask or a label image."""
+
+    name: str
 
 
 def fit_pictures(
@@ -76,6 +88,7 @@ def fit_pictures(
 
     with workers(options.jobs, compile_fit) as mapped:
         pictures: list[Picture] = []
+        masks_found: list[str] = []
         for task, result in zip(tasks, mapped(find_flocs, tasks), strict=True):
             if isinstance(result, Lost):
                 lose(task[1], result)
@@ -83,10 +96,15 @@ def fit_pictures(
             if isinstance(result, FlocsimError):
                 report(result)
                 continue
+            if isinstance(result, MaskFile):
+                masks_found.append(result.name)
+                continue
             for picture in result:
                 print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
                 warn_of_coarse(picture.name, picture.regions, options.radii)
                 pictures.append(picture)
+        report_masks(masks_found)
+        check_names(options.correction, [(each.name, each.found) for each in pictures])
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
@@ -133,16 +151,32 @@ def report(error):
     print(f"flocsim: {printable(error)}", file=sys.stderr, flush=True)
 
 
+def report_masks(names):
+    """One line on all masks that lay among the pictures."""
+    if names:
+        shown = ", ".join(names[:MOST_NAMES])
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        report(
+            f"{plural(len(names), 'file')} of masks or labels among the pictures: {shown}{more}; "
+            "left out, fit them with --masks"
+        )
+
+
 def find_flocs(task):
-    """[Picture] of (path, name, background, Options), or the error that its file gives."""
+    """[Picture] of (path, name, background, Options), or MaskFile, or the error of its file."""
     path, name, background, options = task
     try:
         if options.masks:
             return masked(path, name, options)
-        from flocsim.io.images.pictures import read_grey, segment
+        from flocsim.io.images.pictures import segment
+        from flocsim.io.images.reading import grey_of, read_pixels
+        from flocsim.io.images.recognition import is_mask
 
-        found = segment(read_grey(path), background=background, **options.segmentation)
-        return [Picture(path, name, found, largest(found.regions, options.max_flocs))]
+        pixels = read_pixels(path)
+        if is_mask(pixels):
+            return MaskFile(name)
+        found = segment(grey_of(pixels, path), background=background, **options.segmentation)
+        return [chosen(path, name, found, options)]
     except FlocsimError as error:
         return error
 
@@ -154,9 +188,14 @@ def masked(path, name, options):
     pictures = []
     for inner, mask in read_masks(path):
         found = segment_mask(mask, **limits)
-        regions = largest(found.regions, options.max_flocs)
-        pictures.append(Picture(path, name + inner[len(path.name) :], found, regions))
+        pictures.append(chosen(path, name + inner[len(path.name) :], found, options))
     return pictures
+
+
+def chosen(path, name, found, options):
+    """A Picture of a Segmentation, corrected as the user wants it."""
+    found = corrected(name, found, options.correction)
+    return Picture(path, name, found, largest(found.regions, options.max_flocs))
 
 
 def largest(regions, count):
@@ -213,13 +252,16 @@ def find_background(paths, options):
     if options.background == "surface" or options.masks:
         return None
     from flocsim.io.images.background import FEWEST_FRAMES, median_frame
-    from flocsim.io.images.pictures import read_grey
+    from flocsim.io.images.reading import grey_of, read_pixels
+    from flocsim.io.images.recognition import is_mask
 
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
-        # A file that cannot be read is reported when its own turn comes.
+        # A file that cannot be read, or is a mask, is reported when its own turn comes.
         with contextlib.suppress(ImageError, MemoryError):
-            frames.append(read_grey(path))
+            pixels = read_pixels(path)
+            if not is_mask(pixels):
+                frames.append(grey_of(pixels, path))
     shapes = {frame.shape for frame in frames}
     if len(frames) < FEWEST_FRAMES or len(shapes) > 1:
         sizes = ", ".join(f"{width} × {height}" for height, width in sorted(shapes))

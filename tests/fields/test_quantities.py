@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.ensembles.config.quantities import KINDS, kind_of, read_quantity
+from flocsim.fields.quantities import KINDS, kind_of, read_quantity
 
 EXACT = [
     ("16.41 um", "m", 16.41e-6),
@@ -38,6 +38,16 @@ EXACT = [
     ("5 Hz", "1/s", 5.0),
     ("90 1/min", "1/s", 1.5),
     ("20 mN/mm", "N/m", 20.0),
+    ("3 Pa^0.5", "Pa^0.5", 3.0),
+    ("1 um^0.5", "m^0.5", 1e-3),
+    ("1 um^(1/2)", "m**(1/2)", 1e-3),
+    ("4 kPa um^-0.5", "Pa m-0.5", 4e6),
+    ("4 mPa/um^(3/2)", "Pa/m^1.5", 4e6),
+    ("4 kT@300K", "J", 4 * 300 * 1.380649e-23),
+    ("4 kT @ 300 K", "J", 4 * 300 * 1.380649e-23),
+    ("4 kBT@300K", "J", 4 * 300 * 1.380649e-23),
+    ("4 k_BT@300K/nm^2", "N/m", 4 * 300 * 1.380649e-5),
+    ("1e20/kT@300K", "1/J", 1e20 / (300 * 1.380649e-23)),
 ]
 
 
@@ -77,6 +87,15 @@ WRONG = {
     "1 degC": "",
     "1 dBm": "",
     "1e9999 m": "no unit",
+    "1 um^0.5": "",
+    "1 m^(1/0)": "no unit",
+    "1 m^(1/2": "no unit",
+    "1 m^0.5.5": "no unit",
+    "4 kT": "kT needs its temperature, as in 'kT@298.15K'",
+    "4 kT@293": "kT needs its temperature",
+    "4 kT@293C": "kT needs its temperature",
+    "4 kT@0K": "no unit",
+    "4 kT@293K": "",
 }
 
 

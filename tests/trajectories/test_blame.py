@@ -1,15 +1,21 @@
 """A force that gives no number costs the replicates that meet it, and is named in them."""
 
+import importlib
 import math
+import sys
 
 import pytest
 
+from flocsim import System
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, run_safely
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
-from flocsim.errors import UsageError
+from flocsim.errors import KernelError, KernelWarning, UsageError
+from flocsim.forces import Contact
+from flocsim.integrators import Implicit
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import load_text, run_command
+from tests.helpers.trial_scenes import head_on
 
 FORCE = """\
 import math
@@ -55,6 +61,9 @@ CASES = {
     "stiff": ("ContactForce", "", "(1e300 * view.overlap, 0.0)", "at an overlap of"),
     "late": ("BodyForce", "", "(math.nan if view.time > 1e-3 else 0.0, 0.0, 0.0)", "t = 0.001 s"),
 }
+
+LATE = "math.nan if view.time > 1e-3 else 0.0"
+"""Of which nothing shows before anything runs."""
 
 
 def write(folder, kind, more, answer):
@@ -103,6 +112,29 @@ def test_a_body_force_without_a_number_at_the_start_is_named_before_anything_run
         check_study(wrong_study(tmp_path))
 
 
+@pytest.mark.parametrize("name", ["near", "surface", "by zero", "contact"])
+def test_no_number_where_all_collide_is_refused_before_anything_runs(tmp_path, name):
+    kind, more, answer, _ = CASES[name]
+    write(tmp_path, kind, more, answer)
+    with pytest.raises(
+        KernelError, match=r"^Wrong: Wrong.kernel \(.*wrong.py:\d+\) gives (nan|inf)"
+    ):
+        check_study(wrong_study(tmp_path))
+
+
+def test_a_run_of_a_system_names_the_force_that_gives_no_number(tmp_path, monkeypatch):
+    write(tmp_path, "SurfaceForce", REACH, "math.nan if view.gap < 5e-8 else 0.0")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "wrong", raising=False)
+    force = importlib.import_module("wrong").Wrong()
+    system = System(head_on(), [force, Contact()], Implicit(1e-9))
+    with pytest.warns(
+        KernelWarning, match=r"ended at t = .* s \(STALLED\): Wrong.kernel \(.*wrong.py:\d"
+    ):
+        assert system.run(until=1e-3).status.name == "STALLED"
+    sys.modules.pop("wrong")
+
+
 def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
     write(tmp_path, "CentreForce", "", "0.0")
     config = load_text(
@@ -115,8 +147,8 @@ def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
 @pytest.mark.parametrize(
     ("answer", "allowed", "words", "said", "kept"),
     [
-        ("math.nan", 1, (), "no replicate has come to an outcome, 3 failed and 0 are und", True),
-        ("math.nan", 0.1, (), "1 replicates have failed, more than stop.failed allows", False),
+        (LATE, 1, (), "no replicate has come to an outcome, 3 failed and 0 are und", True),
+        (LATE, 0.1, (), "1 replicates have failed, more than stop.failed allows", False),
         ("0.0", 1, ("--set", "integrator.max_steps=5"), "0 failed and 3 are undecided: raise int",
          True),
     ],
@@ -135,5 +167,5 @@ def test_a_study_in_which_nothing_is_decided_ends_with_70(
         counts = read_results(tmp_path / "r.h5").probabilities
         assert int(counts["n_failed"].sum() + counts["n_undecided"].sum()) == 3
         table = [line.split() for line in done.stdout.splitlines()]
-        ends = ["0", "0", "3"] if answer == "math.nan" else ["0", "3", "0"]
+        ends = ["0", "0", "3"] if answer == LATE else ["0", "3", "0"]
         assert any(words[-3:] == ends for words in table)  # missed, undecided, failed

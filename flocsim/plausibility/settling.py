@@ -1,4 +1,4 @@
-"""Terminal velocities: where a body's own forces balance."""
+"""Terminal velocities: where a body's own forces balance, and how it yields to others there."""
 
 import math
 from typing import Any
@@ -10,10 +10,15 @@ from flocsim.body import Body
 from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
 from flocsim.forces.codegen import laws_of
-from flocsim.system import System
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
+
+NEARLY_AT_REST = 1e-6
+"""Share of the terminal speed at which a body counts as at rest."""
+
+VANISHING = 0.01
+"""A resistance at rest below this share of that in settling is none: a drag such as v²."""
 
 
 def no_force(view, parameters):
@@ -46,6 +51,53 @@ def derivative(force, body, fluid, parameters, velocity):
     return np.array(columns).T
 
 
+def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> float:
+    """How much the body forces on a body grow with its speed along gravity [kg/s].
+
+    At a ``speed`` [m/s] against the flow at the origin; ``size``: of the difference, by default a
+    thousandth of the speed.
+    """
+    pieces: Any = system.pieces
+    force = pieces.laws.get("body_force", no_force)
+    u, v = system.fluid.velocity
+    size = size or 1e-3 * speed + 1e-9
+    ends = [
+        balance(force, body, system.fluid, pieces.parameters, (u, v - speed + by))[1]
+        for by in (size, -size)
+    ]
+    return float(ends[1] - ends[0]) / (2.0 * size)
+
+
+@np.errstate(all="ignore")
+def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> float:
+    """The largest mobility [s/kg] of a body between rest and its terminal speed [m/s].
+
+    A drag that grows faster than the speed yields most at rest; a linear one alike everywhere.
+    ``mobility`` is that at the terminal speed, which stands where there is no drag at rest. So
+    1/it is the least resistance with which what is left of a velocity dies away.
+    """
+    if not mobility > 0.0:
+        return mobility
+    size = NEARLY_AT_REST * speed + 1e-9
+    try:
+        at_rest = resistance(system, body, 0.0, size)
+    except (ArithmeticError, ValueError):
+        return mobility
+    return max(mobility, 1.0 / at_rest) if at_rest * mobility > VANISHING else mobility
+
+
+@np.errstate(all="ignore")
+def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> float:
+    """The least mobility [s/kg] of a body up to a speed [m/s] that another may impose on it."""
+    if not mobility > 0.0:
+        return mobility
+    try:
+        there = resistance(system, body, speed)
+    except (ArithmeticError, ValueError):
+        return mobility
+    return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
+
+
 def no_number(system, body, velocity):
     """Which body force gives no number at a velocity, or around it, in words."""
     at = f"a velocity of ({velocity[0]:.3g}, {velocity[1]:.3g}) m/s"
@@ -63,7 +115,7 @@ def no_number(system, body, velocity):
 
 
 @np.errstate(all="ignore")
-def terminal_motion(system: System, body: Body) -> tuple[np.ndarray, float]:
+def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
 
     The velocity at which the system's body forces balance; the mobility is the inverse of their
@@ -92,6 +144,16 @@ def terminal_motion(system: System, body: Body) -> tuple[np.ndarray, float]:
         "no terminal velocity: a binary collision starts from steady settling, which needs a drag "
         f"(forces {', '.join(pieces.used) or 'none'} do not balance); add [forces.drag]"
     )
+
+
+def terminal_speed(system: Any, body: Body) -> float:
+    """Speed against the flow at which a body settles alone [m/s]; 0 where it does not."""
+    try:
+        velocity, _ = terminal_motion(system, body)
+    except UsageError:
+        return 0.0
+    u, v = system.fluid.velocity
+    return 0.0 if body.fixed else math.hypot(velocity[0] - u, velocity[1] - v)
 
 
 def turn_time(radius_i: float, radius_j: float, drift: np.ndarray) -> float:

@@ -1,0 +1,35 @@
+"""`flocsim compare a.h5 b.h5`: what one study has more of than another."""
+
+from argparse import Namespace
+from typing import Any
+
+from flocsim.io.results.schema import POOLED_PROBABILITIES, PROBABILITIES
+
+
+def add_parser(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "compare",
+        help="compare two results files: differences of probabilities with 95 %% intervals",
+        description="Print the differences of a probability between two results files, at every "
+        "condition that both have, with 95 %% intervals: of replicates paired where both have "
+        "drawn the same orientations (studies of one seed), of independent samples else. What the "
+        "studies differ in comes first.",
+    )
+    parser.add_argument("first", help="results file that flocsim ensemble wrote")
+    parser.add_argument("second", help="another one")
+    known = "; ".join(f"{name} {PROBABILITIES[name]}" for name in POOLED_PROBABILITIES)
+    parser.add_argument(
+        "--probability", default="pr_a", choices=POOLED_PROBABILITIES,
+        help=f"{known} (default: %(default)s)",
+    )  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def run(args: Namespace) -> int:
+    """Print the comparison; the exit code."""
+    from flocsim.ensembles.studies.compare import compare
+    from flocsim.ensembles.studies.opened import open_results
+
+    comparison = compare(open_results(args.first), open_results(args.second))
+    print(comparison.table(args.probability))
+    return 0

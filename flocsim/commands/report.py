@@ -1,0 +1,55 @@
+"""`flocsim report r.h5`: all that a results file holds on one page for a browser."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from flocsim.commands.reporting.examples import examples_of
+from flocsim.commands.reporting.page import report_page
+from flocsim.ensembles.studies.opened import open_results
+from flocsim.errors import UsageError
+from flocsim.io.files import write_file
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
+from flocsim.io.own_mark import marked
+from flocsim.io.results.file import read_overview
+
+DESCRIPTION = """\
+Write one HTML page that needs no other file: the figures of flocsim plot, the probabilities with
+both errors, warnings, where the results came from, and one replicate of each class (A to D) to
+watch, which is run again for it."""
+
+
+def add_parser(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "report", help="write one HTML page of a results file", description=DESCRIPTION
+    )
+    add = parser.add_argument
+    add("results", help="results file that flocsim ensemble wrote")
+    add("-o", "--output", metavar="FILE.html",
+        help="page to write (default: r.html for r.h5, in the current folder)")  # fmt: skip
+    add("--no-motion", action="store_true", help="run no replicate again: a page without motion")
+    add("--folder", metavar="DIR",
+        help="where the config lay, its shape library and its own modules (default: where the "
+        "results lie)")  # fmt: skip
+    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the page and print its path; returns the exit code."""
+    path = Path(args.output or f"{Path(args.results).stem}.html")
+    if path.suffix.lower() != ".html":
+        raise UsageError(f"--output {path}: a page's name must end in .html")
+    rule = figure_rule(args.overwrite)
+    check_outputs([Output(path, rule)], [args.results])
+    results, totals = read_overview(args.results)
+    examples = []
+    if not args.no_motion:
+        examples = examples_of(open_results(args.results, args.folder))
+    page = report_page(str(args.results), results, totals, examples)
+    write_file(path, marked(page.encode(), ".html"), rule)
+    for example in examples:
+        if example.reason:
+            print(f"class {example.outcome} is not shown in motion: {example.reason}")
+    print(path)
+    return 0

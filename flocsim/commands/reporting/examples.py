@@ -1,0 +1,44 @@
+"""One replicate of each class of a results file, run again to be watched."""
+
+from typing import Any
+
+import attrs
+
+from flocsim.ensembles.studies.opened import StudyResults
+from flocsim.ensembles.studies.replicates import place_of, replicate_of
+from flocsim.errors import FlocsimError
+from flocsim.io.results.file import first_of_each
+from flocsim.io.results.schema import CLASSES
+
+
+@attrs.frozen(eq=False)
+class Example:
+    """A replicate of a class: ``title`` says which, ``trajectory`` is None where it could not be
+    run again, which ``reason`` says; ``zone_distance`` D_0 [m]."""
+
+    outcome: str
+    title: str
+    trajectory: Any = None
+    zone_distance: float = float("nan")
+    reason: str = ""
+
+
+def examples_of(opened: StudyResults) -> list[Example]:
+    """The first replicate of each class that the file has, of its flocs with the most vertices."""
+    found = first_of_each(opened.path)
+    return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
+
+
+def example_of(opened: StudyResults, outcome: str, at: tuple[int, int, int, int]) -> Example:
+    """The Example at one place of the table of replicates."""
+    t, v, d, replicate = at
+    name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
+    title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {replicate}"
+    try:
+        place = place_of(opened.config, name, vertices, delta)
+        study = opened.study_with(vertices)
+        trajectory = replicate_of(replicate, place, study)
+        zone = study.drawn(*place[:2], replicate)[0].zone_distance
+    except FlocsimError as error:
+        return Example(outcome, title, reason=" ".join(str(error).split()))
+    return Example(outcome, title, trajectory, float(zone))

@@ -1,0 +1,215 @@
+"""A collision as a drawing that moves: SVG outlines that a script places, frame by frame.
+
+Lengths in it are µm, y points up, and everything is seen from the receiving body's centroid.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from flocsim.commands.reporting.examples import Example
+from flocsim.commands.reporting.markup import text
+from flocsim.ensembles.collision.snapshots import choose_instants
+from flocsim.geometry.contact.overlap import touching_points
+from flocsim.io.plots.collision import (
+    CONTACT_COLOUR,
+    MICRO,
+    rounded_length,
+    time_unit,
+)
+from flocsim.io.plots.results import CLASS_WORDS
+from flocsim.io.plots.style import BODY_COLOURS
+
+FRAMES = 150
+GRAPH = (46.0, 8.0, 310.0, 262.0)
+"""Left, top, right and bottom of the graph's panel in its drawing of 320 × 320."""
+
+SCRIPT = """
+for (const motion of document.querySelectorAll('.motion[data-frames]')) {
+  const data = JSON.parse(motion.dataset.frames), count = data.t.length;
+  const bodies = motion.querySelectorAll('.body'), rings = motion.querySelector('.contacts');
+  const view = motion.querySelector('.view'), dot = motion.querySelector('.now');
+  const slider = motion.querySelector('input'), words = motion.querySelector('output');
+  const button = motion.querySelector('button');
+  let frame = data.shown, timer = null;
+  function show(k) {
+    frame = k; slider.value = k;
+    view.setAttribute('transform', `translate(${-data.eye[k][0]},${-data.eye[k][1]})`);
+    bodies.forEach((body, n) => {
+      const [x, y, angle] = data.pose[k][n];
+      body.setAttribute('transform', `translate(${x},${y}) rotate(${angle})`);
+    });
+    rings.replaceChildren(...data.contacts[k].map(([x, y]) => {
+      const ring = document.createElementNS('http://www.w3.org/2000/svg', 'circle');
+      ring.setAttribute('cx', x); ring.setAttribute('cy', y); ring.setAttribute('r', data.ring);
+      return ring;
+    }));
+    dot.setAttribute('cx', data.dot[k][0]); dot.setAttribute('cy', data.dot[k][1]);
+    words.textContent = data.words[k];
+  }
+  function stop() { clearTimeout(timer); timer = null; button.textContent = 'Play'; }
+  function step() {
+    const last = frame + 1 >= count;
+    show(last ? 0 : frame + 1);
+    timer = setTimeout(step, frame + 1 >= count ? 1500 : 60);
+  }
+  button.addEventListener('click', () => {
+    if (timer) { stop(); } else { button.textContent = 'Pause'; step(); }
+  });
+  slider.addEventListener('input', () => { stop(); show(Number(slider.value)); });
+  show(frame);
+}
+"""
+
+
+def motion_of(example: Example) -> str:
+    """The HTML of an Example: drawing, graph of d_c, slider; or why there is none."""
+    heading = f"<b>{text(CLASS_WORDS[example.outcome])}</b><br>{text(example.title)}"
+    if example.trajectory is None:
+        return (
+            f"<figure class='motion'><figcaption>{heading}<br>Not shown in motion: "
+            f"{text(example.reason)}</figcaption></figure>"
+        )
+    trajectory = example.trajectory
+    shapes, times = trajectory.shapes, trajectory.t
+    relative = trajectory.position.copy()
+    relative[:, :, :2] -= trajectory.position[:, :1, :2]
+    relative[:, :, :2] *= MICRO
+    touch = float(trajectory.row["t_collision"])
+    size = 0.5 * sum(shape.bounding_radius for shape in shapes)
+    rows = choose_instants(times, trajectory.position, size, FRAMES, touch)
+    shown = int(np.abs(times[rows] - touch).argmin()) if math.isfinite(touch) else 0
+    reaches = [MICRO * shape.bounding_radius for shape in shapes]
+    eyes, half = windows_of(relative[rows], reaches)
+    distance = np.hypot(*(relative[:, 1, :2] - relative[:, 0, :2]).T)
+    unit, factor = time_unit(times)
+    zone = MICRO * example.zone_distance
+    graph, dots = graph_of(times * factor, distance, rows, zone, unit)
+    contacts = [contacts_of(shapes, relative[row]) for row in rows]
+    data = {
+        "t": rounded(times[rows]), "shown": shown, "eye": rounded(eyes), "ring": 0.03 * half,
+        "pose": rounded(relative[rows] * [1.0, 1.0, 180.0 / math.pi]), "dot": rounded(dots),
+        "contacts": [rounded(each) for each in contacts],
+        "words": [
+            f"t = {times[row] * factor:.4g} {unit}, d_c = {distance[row]:.4g} µm" for row in rows
+        ],
+    }  # fmt: skip
+    bodies = drawing_of(shapes, data, half, shown)
+    return (
+        f"<figure class='motion' data-frames='{text(json.dumps(data, ensure_ascii=False))}'>"
+        f"<figcaption>{heading}</figcaption>\n<div class='panels'>{bodies}{graph}</div>"
+        "<div class='controls'><button type='button'>Play</button>"
+        f"<input type='range' min='0' max='{len(rows) - 1}' value='{shown}' aria-label='frame'>"
+        f"<output>{text(data['words'][shown])}</output></div></figure>"
+    )
+
+
+def rounded(values):
+    """Lists of numbers to 6 digits: what a picture shows of them."""
+    return [
+        [*rounded(each)] if np.ndim(each) else float(f"{each:.6g}") for each in np.asarray(values)
+    ]
+
+
+def windows_of(places, reaches):
+    """The middle (f, 2) of both bodies in every frame, and one half width that fits them all."""
+    reach = np.array(reaches)[None, :, None]
+    low, high = (places[:, :, :2] - reach).min(axis=1), (places[:, :, :2] + reach).max(axis=1)
+    return 0.5 * (low + high), 0.52 * float(np.max(high - low))
+
+
+def contacts_of(shapes, places):
+    """Where the outlines of two bodies overlap (c, 2) [µm]."""
+    cores = [
+        shape.placed_vertices(*(place[:2] / MICRO), place[2])
+        for shape, place in zip(shapes, places, strict=True)
+    ]
+    points = touching_points(cores[0], shapes[0].radius, cores[1], shapes[1].radius)
+    return MICRO * np.reshape(points, (-1, 2))
+
+
+def drawing_of(shapes: Sequence, data: dict, half: float, shown: int) -> str:
+    """The bodies, as the frame that is shown first has them, with a scale bar."""
+    bodies = []
+    for shape, colour, (x, y, angle) in zip(
+        shapes, BODY_COLOURS, data["pose"][shown], strict=False
+    ):
+        rings = (MICRO * ring for ring in shape.outline(0.0, 0.0, 0.0))
+        path = " ".join("M" + " ".join(f"{u:.5g},{v:.5g}" for u, v in ring) + "Z" for ring in rings)
+        bodies.append(
+            f"<path class='body' d='{path}' fill='{colour}' fill-opacity='.3' stroke='{colour}' "
+            f"fill-rule='evenodd' stroke-width='{0.006 * half:.3g}' "
+            f"transform='translate({x},{y}) rotate({angle})'/>"
+        )
+    circles = "".join(
+        f"<circle cx='{x}' cy='{y}' r='{data['ring']:.3g}'/>" for x, y in data["contacts"][shown]
+    )
+    eye_x, eye_y = data["eye"][shown]
+    length = MICRO * rounded_length(0.5 * half / MICRO)
+    left, level = -0.94 * half, 0.94 * half
+    bar = (
+        f"<path d='M{left:.5g},{level:.5g}h{length:.5g}' stroke='#111' "
+        f"stroke-width='{0.02 * half:.3g}'/><text x='{left:.5g}' y='{level - 0.03 * half:.5g}' "
+        f"font-size='{0.075 * half:.3g}'>{length:g} µm</text>"
+    )
+    return (
+        f"<svg role='img' aria-label='the two flocs' viewBox='{-half:.5g} {-half:.5g} "
+        f"{2 * half:.5g} {2 * half:.5g}'><g transform='scale(1,-1)'><g class='view' "
+        f"transform='translate({-eye_x},{-eye_y})'>{''.join(bodies)}"
+        f"<g class='contacts' fill='none' stroke='{CONTACT_COLOUR}' "
+        f"stroke-width='{0.009 * half:.3g}'>{circles}</g></g></g>{bar}</svg>"
+    )
+
+
+def graph_of(times, distance, rows, zone, unit):
+    """(SVG of the centre distance against time with D_0, places (f, 2) of its dot)."""
+    left, top, right, bottom = GRAPH
+    levels = [*distance, zone] if math.isfinite(zone) else list(distance)
+    low, high = min(levels), max(levels)
+    margin = 0.08 * (high - low) or 1.0
+    low, high = low - margin, high + margin
+    span = times[-1] - times[0] or 1.0
+    x = left + (right - left) * (times - times[0]) / span
+    y = bottom - (bottom - top) * (distance - low) / (high - low)
+    thin = np.unique(np.concatenate([rows, np.linspace(0, len(times) - 1, 400).astype(int)]))
+    line = " ".join(f"{x[k]:.1f},{y[k]:.1f}" for k in thin)
+    parts = [
+        f"<path d='M{left},{top}V{bottom}H{right}' fill='none' stroke='#555'/>",
+        f"<polyline points='{line}' fill='none' stroke='#999' stroke-width='1.5'/>",
+    ]
+    if math.isfinite(zone):
+        level = bottom - (bottom - top) * (zone - low) / (high - low)
+        parts.append(
+            f"<path d='M{left},{level:.1f}H{right}' stroke='#444' stroke-dasharray='5 3'/>"
+            f"<text x='{right}' y='{level - 4:.1f}' text-anchor='end'>D₀ = {zone:.4g} µm</text>"
+        )
+    for value in ticks_of(low, high):
+        at = bottom - (bottom - top) * (value - low) / (high - low)
+        parts.append(f"<text x='{left - 5}' y='{at + 4:.1f}' text-anchor='end'>{value:g}</text>"
+                     f"<path d='M{left - 3},{at:.1f}h3' stroke='#555'/>")  # fmt: skip
+    for value in ticks_of(times[0], times[-1]):
+        at = left + (right - left) * (value - times[0]) / span
+        parts.append(f"<text x='{at:.1f}' y='{bottom + 16}' text-anchor='middle'>{value:g}</text>"
+                     f"<path d='M{at:.1f},{bottom}v3' stroke='#555'/>")  # fmt: skip
+    middle = 0.5 * (top + bottom)
+    parts += [
+        f"<text x='{0.5 * (left + right)}' y='{bottom + 36}' text-anchor='middle'>"
+        f"time [{unit}]</text>",
+        f"<text transform='translate(12,{middle}) rotate(-90)' text-anchor='middle'>"
+        "centre distance [µm]</text>",
+        f"<circle class='now' r='4' cx='{x[rows[0]]:.1f}' cy='{y[rows[0]]:.1f}' "
+        f"fill='{BODY_COLOURS[0]}'/>",
+    ]
+    svg = (
+        "<svg role='img' aria-label='centre distance against time' viewBox='0 0 320 320' "
+        f"font-size='12'>{''.join(parts)}</svg>"
+    )
+    return svg, np.stack([x[rows], y[rows]], axis=1)
+
+
+def ticks_of(low, high):
+    """Round numbers, three to seven of them, between two."""
+    step = rounded_length((high - low) / 3.0) if high > low else 1.0
+    return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]

@@ -1,0 +1,133 @@
+"""The whole page of a results file: what `flocsim info` and `plot` say of it, and motion."""
+
+import io
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from flocsim.commands.info import conditions, origin, outcomes, settling
+from flocsim.commands.reporting.examples import Example
+from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
+from flocsim.commands.reporting.motion import SCRIPT, motion_of
+from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.pilot.choice import choice_lines
+from flocsim.ensembles.report import checked_line, undecided_line
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.errors import FileError
+from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.style import METADATA, house_style
+from flocsim.io.results.file import Totals
+from flocsim.io.results.schema import CLASSES, POOLED_PROBABILITIES, PROBABILITIES, Results
+
+MOST_FAILURES = 20
+SHOWN = {
+    "pr_inside": "Pr[inside]", "pr_a": "Pr[A]", "pr_sticks": "Pr[A, sticks]",
+    "pr_hangs": "Pr[A, hangs]",
+}  # fmt: skip
+"""The probabilities of a condition that have columns of their own, and their headings."""
+
+ERRORS_TEXT = (
+    "Each probability is followed by its 95 % interval from sampling (Wilson's) and, after ±, by "
+    "the numerical error: the 95 % bound of the share of replicates that would end otherwise if "
+    "they were computed exactly. – where there was no event, ± ? where none was run again."
+)
+
+
+def report_page(path: str, results: Results, totals: Totals, examples: Sequence[Example]) -> str:
+    """The HTML of a results file; FileError where what it says of its run cannot be read."""
+    try:
+        facts = conditions(results) + outcomes(results, totals)
+        facts.append(("numerical error", checked_line(results) or "unknown: none was run again"))
+        if choice := stored(results.run, "accuracy"):
+            facts += [("accuracy", line) for line in choice_lines(choice)]
+        facts += settling(results.run)
+        came_from = origin(results.run)
+        warnings = [str(line) for line in stored(results.run, "warnings")]
+        failed = [describe_note(note) for note in stored(results.run, "failed")]
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable results: {error}; run it again") from error
+    warnings += list(filter(None, [undecided_line(results)]))
+    sections = [("results", "What was run, and what came out", facts_of(facts))]
+    if warnings or failed:
+        more = len(failed) - MOST_FAILURES
+        shown = failed[:MOST_FAILURES] + ([f"and {more} more in run/failed"] if more > 0 else [])
+        content = list_of(warnings, "warnings") + list_of(shown, "failed")
+        sections.append(("warnings", "Warnings", content))
+    sections.append(("figures", "Figures", figures_of(results)))
+    sections.append(("tables", "Probabilities", tables_of(results)))
+    if examples:
+        motions = "\n".join(map(motion_of, examples))
+        told = (
+            "<p>The first replicate of each class, of the flocs with the most vertices, run again "
+            "from the seed. Seen from the receiving floc; frames follow the way, not the time. "
+            "Red rings: outlines overlap there.</p>"
+        )
+        sections.append(("motion", "In motion", f"{told}<div class='motions'>{motions}</div>"))
+    config = str(results.run.get("config", ""))
+    came = facts_of(came_from)
+    if config:
+        lines = "\n".join(map(text, config.splitlines()))
+        came += f"<h3>Config</h3><pre>{lines}</pre>"
+    sections.append(("provenance", "Where it came from", came))
+    return page_of(f"{path}: results of a collision ensemble", sections, SCRIPT)
+
+
+def figures_of(results: Results) -> str:
+    """All figures of `flocsim plot`, that of everything first."""
+    names = sorted(FIGURES, key=lambda name: name != "overview")
+    return "\n".join(figure_of(name, results) for name in names)
+
+
+def figure_of(name: str, results: Results) -> str:
+    """A figure of `flocsim plot` inside the page, its caption being the help of it."""
+    draw = FIGURES[name]
+    picture = io.BytesIO()
+    with house_style():
+        draw(results).savefig(picture, format="svg", metadata=METADATA["svg"])
+    title = f"Figure {name}" if name.isdigit() else name.capitalize()
+    return picture_of(picture.getvalue(), f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}")
+
+
+def tables_of(results: Results) -> str:
+    """The probabilities of every condition, and those pooled over displacements."""
+    table = results.probabilities
+    heads = ["type", "N", "δ/δ_max", "n", "collided", "inside", *SHOWN.values(), *CLASSES,
+             "missed", "undecided", "failed", "run again", "flipped"]  # fmt: skip
+    places = list(np.ndindex(*results.shape))
+    rows = [condition_row(results, table, place) for place in places]
+    firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
+    parts = [f"<p>{text(ERRORS_TEXT)}</p>", table_of(heads, rows, firsts)]
+    if results.pooled:
+        heads = ["type", "N", *(PROBABILITIES[name] for name in POOLED_PROBABILITIES)]
+        places = list(np.ndindex(*results.shape[:2]))
+        rows = [
+            [results.types[t], int(results.vertices[v]),
+             *(with_errors(results.pooled, name, (t, v)) for name in POOLED_PROBABILITIES)]
+            for t, v in places
+        ]  # fmt: skip
+        parts.append("<h3>All displacements pooled</h3>" + table_of(heads, rows))
+    return "\n".join(parts)
+
+
+def condition_row(results, table, place):
+    t, v, d = place
+    counts = [int(table[name][place]) for name in ("n_total", "n_collided", "n_inside")]
+    ends = [int(table[f"n_{name}"][place])
+            for name in ("missed", "undecided", "failed", "checked", "flipped")]  # fmt: skip
+    return [
+        results.types[t], int(results.vertices[v]), f"{results.delta[d]:g}", *counts,
+        *(with_errors(table, name, place) for name in SHOWN),
+        *(int(number) for number in table["n_class"][place]), *ends,
+    ]  # fmt: skip
+
+
+def with_errors(table, name, place):
+    """ "0.600 [0.571, 0.629] ± 0.004": value, sampling interval, numerical error."""
+    value, low, high, numerical = (
+        float(table[name + end][place]) for end in ("", "_low", "_high", "_numerical")
+    )
+    if math.isnan(value):
+        return "–"
+    added = "?" if math.isnan(numerical) else f"{numerical:.3f}"
+    return f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}"

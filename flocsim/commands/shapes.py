@@ -1,0 +1,199 @@
+"""`flocsim shapes`: list the flocs of shape libraries, select some of them, merge libraries."""
+
+import argparse
+import fnmatch
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from flocsim.commands.fit import number
+from flocsim.errors import UsageError, visible
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.shapes.fit_report import plural
+from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
+
+DESCRIPTION = """\
+  flocsim shapes list shapes.h5
+  flocsim shapes select shapes.h5 --min-radius 8e-6 --picture '02*.png' -o large.h5
+  flocsim shapes select shapes.h5 --drop 023.png#7,025.png#1 -o good.h5
+  flocsim shapes merge monday.h5 tuesday.h5 -o mud.h5
+
+r_eq is that of the floc as it was measured: its pixels times the size of a pixel."""
+
+MICRO = 1e6
+
+
+def add_parser(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "shapes",
+        help="list, select and merge the flocs of shape libraries",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    listed = actions.add_parser("list", help="print name, picture, r_eq and errors of every floc")
+    chosen = actions.add_parser("select", help="write the flocs that are asked for to a library")
+    merged = actions.add_parser("merge", help="write the flocs of several libraries to one")
+    for action, run in ((listed, run_list), (chosen, run_select), (merged, run_merge)):
+        action.add_argument("libraries", nargs="+", metavar="LIBRARY",
+            help="shape library that flocsim fit wrote")  # fmt: skip
+        action.set_defaults(run=run)
+    for action in (listed, chosen):
+        add = action.add_argument
+        add("--keep", metavar="LIST", help="these flocs only, by name, with commas between them")
+        add("--drop", metavar="LIST", help="all but these flocs")
+        add("--picture", metavar="NAME",
+            help="flocs of this picture only; * stands for any letters")  # fmt: skip
+        add("--min-radius", metavar="METRES", help="flocs of at least this r_eq")
+        add("--max-radius", metavar="METRES", help="flocs of at most this r_eq")
+    for action in (chosen, merged):
+        add = action.add_argument
+        add("-o", "--output", required=True, metavar="FILE", help="shape library to write")
+        add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+
+
+def run_list(args: argparse.Namespace) -> int:
+    """Print a line for every floc of every library."""
+    for library in args.libraries:
+        entries = selected(read_library(library), args, library)
+        counts = [count for count in entries[0].fits if count > 1] if entries else []
+        heads = ["r_eq um", "pixel um", "r px", *(f"RE% N={count}" for count in counts)]
+        wide = max([len(visible(each.floc_id, keep="")) for each in entries] + [4])
+        print(f"{library}: {plural(len(entries), 'floc')}")
+        print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
+        for each in entries:
+            cells = [
+                f"{MICRO * measured_radius(each):8.4g}", f"{MICRO * each.pixel_size:8.4g}",
+                f"{each.spheroradius:8g}",
+                *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
+            ]  # fmt: skip
+            print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
+    return 0
+
+
+def run_select(args: argparse.Namespace) -> int:
+    """Write the flocs of one library, or of several merged, that meet all that is asked."""
+    rule = data_rule(args.overwrite)
+    check_outputs([Output(args.output, rule)], args.libraries)
+    libraries, settings = read_all(args.libraries)
+    every = merged_entries(libraries)
+    entries = selected(every, args, ", ".join(args.libraries))
+    if not entries:
+        raise UsageError(
+            f"{', '.join(args.libraries)}: none of {plural(len(every), 'floc')} is what was asked "
+            "for, nothing was written; flocsim shapes list names them"
+        )
+    write_library(args.output, entries, settings, rule)
+    print(f"{args.output}: {plural(len(entries), 'floc')} of {len(every)}")
+    return 0
+
+
+def run_merge(args: argparse.Namespace) -> int:
+    """Write the flocs of all libraries to one."""
+    rule = data_rule(args.overwrite)
+    check_outputs([Output(args.output, rule)], args.libraries)
+    libraries, settings = read_all(args.libraries)
+    entries = merged_entries(libraries)
+    write_library(args.output, entries, settings, rule)
+    print(f"{args.output}: {plural(len(entries), 'floc')} of {len(libraries)} libraries")
+    return 0
+
+
+def read_all(paths):
+    """[(path, entries)] of libraries, and the settings on which all of them agree."""
+    libraries = [(path, read_library(path)) for path in paths]
+    first = tuple(libraries[0][1][0].fits)
+    for path, entries in libraries:
+        if tuple(entries[0].fits) != first:
+            raise UsageError(
+                f"{path} has fits at N = {numbers(entries[0].fits)}, {paths[0]} at N = "
+                f"{numbers(first)}: fit both at the same --vertices"
+            )
+    settings = [read_settings(path) for path in paths]
+    keys = dict.fromkeys(key for each in settings for key in each)
+    return libraries, {
+        key: agreed(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
+    }
+
+
+def agreed(values):
+    """The one value of a setting, or all of them in words."""
+    return next(iter(values)) if len(values) == 1 else ", ".join(map(str, values))
+
+
+def numbers(counts):
+    return ", ".join(map(str, counts))
+
+
+def merged_entries(libraries):
+    """The entries of [(path, entries)]; a name that has come before gets its library's in front.
+
+    So does its picture's, or flocs of two pictures of one name would count as of one.
+    """
+    taken: set[str] = set()
+    merged: list[ShapeEntry] = []
+    for path, entries in libraries:
+        front = ""
+        while any(front + each.floc_id in taken for each in entries):
+            front += f"{Path(path).stem}/"
+        for each in entries:
+            merged.append(
+                attrs.evolve(each, floc_id=front + each.floc_id, image=front + each.image)
+            )
+            taken.add(front + each.floc_id)
+    return merged
+
+
+def selected(entries, args, source):
+    """The entries that --keep, --drop, --picture and the limits of r_eq let through."""
+    least, most = (
+        float(unset) if text is None
+        else number(option, text, "a radius in metres, a number above 0", 5e-324, 1.0)
+        for option, text, unset in (
+            ("--min-radius", args.min_radius, 0), ("--max-radius", args.max_radius, "inf"),
+        )
+    )  # fmt: skip
+    keep, drop = (named(option, getattr(args, option), entries, source)
+                  for option in ("keep", "drop"))  # fmt: skip
+    return [
+        each
+        for each in entries
+        if (keep is None or keep & names_of(each))
+        and not (drop and drop & names_of(each))
+        and (args.picture is None or fnmatch.fnmatchcase(each.image, args.picture))
+        and least <= measured_radius(each) <= most
+    ]
+
+
+def named(option, text, entries, source):
+    """The names in a list, all of which flocs have; None for no list.
+
+    A name may stand for a floc at all of its spheroradii: 023.png#7 for "023.png#7 r=2".
+    """
+    if text is None:
+        return None
+    known = set().union(*(names_of(each) for each in entries))
+    names, begun = set(), ""
+    for piece in text.split(","):
+        begun += piece
+        if begun.strip() in known:
+            names.add(begun.strip())
+            begun = ""
+        else:
+            begun += ","  # a name with a comma in it
+    if begun:
+        raise UsageError(
+            f"--{option}: {source} has no floc {begun.rstrip(',')!r}; flocsim shapes list names "
+            "them"
+        )
+    return names
+
+
+def names_of(entry):
+    return {entry.floc_id, entry.floc_id.removesuffix(f" r={entry.spheroradius:g}")}
+
+
+def measured_radius(entry):
+    """r_eq [m] of a floc in its picture."""
+    return entry.equivalent_radius * entry.pixel_size

@@ -1,0 +1,96 @@
+"""`flocsim sweep s.toml --over KEY=1,2,3`: one study at several values of its keys, in one file."""
+
+import os
+import re
+import signal
+from argparse import Namespace
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.errors import UsageError
+from flocsim.interruption import STOPPED
+from flocsim.io.outputs import OVERWRITE_HELP
+from flocsim.io.terminal import tell
+
+DESCRIPTION = """\
+Run a study at every value of a key, or of several (all combinations), and join the results in
+one file whose tables have the keys as their first dimensions. The results of each value lie in
+NAME.parts beside it; --resume goes on there. On a cluster, --dry-run prints a command for each
+value to be run by itself; --resume then joins what they made."""
+
+COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
+"""Commas outside quotes and brackets."""
+
+
+def add_parser(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "sweep", help="run a study at several values of a key", description=DESCRIPTION
+    )
+    add = parser.add_argument
+    add("config", help="config file (TOML)")
+    add(
+        "--over", action="append", required=True, metavar="KEY=VALUE,…",
+        help="a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be repeated",
+    )  # fmt: skip
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="any value instead of the config's; may be repeated")  # fmt: skip
+    add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
+    add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
+    add("--resume", action="store_true", help="go on with a sweep, extend it, or join its parts")
+    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    add("--dry-run", action="store_true", help="print a command for each value, and stop")
+    parser.set_defaults(run=run)
+
+
+def values_of(text: str) -> tuple[str, list[Any]]:
+    """(key, values) of "forces.contact.k_n=1,2" or "…='10 N/m','20 N/m'"."""
+    key, equals, values = text.partition("=")
+    if not equals or not key.strip() or not values.strip():
+        raise UsageError(f"--over {text!r}: write KEY=VALUE,VALUE")
+    found = [parse_setting(f"{key}={value}") for value in COMMAS.split(values) if value.strip()]
+    return ".".join(found[0][0]), [value for _, value in found]
+
+
+def run(args: Namespace) -> int:
+    """Run what is missing and join it; the exit code."""
+    from flocsim.ensembles.studies.study import Study, settings_of
+    from flocsim.ensembles.studies.sweep import planned, sweep
+
+    study = Study(args.config)
+    if args.settings:
+        study = study.with_(nested(map(parse_setting, args.settings)))
+    pairs = [values_of(text) for text in args.over]
+    over = dict(pairs)
+    if len(over) < len(pairs):
+        raise UsageError("--over names one key twice: give all its values at once")
+    output = args.output or f"{Path(args.config).stem}-sweep.h5"
+    if args.dry_run:
+        for path, part in planned(study, over, Path(output)):
+            words = " ".join(f"--set {quoted(f'{k}={v}')}" for k, v in settings_of(part.overrides))
+            tell(f"flocsim ensemble {quoted(args.config)} {words} -o {quoted(str(path))}")
+        return 0
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        sweep(
+            study, over, output, jobs=args.jobs, mode="resume" if args.resume else "new",
+            overwrite=args.overwrite, tell=tell,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        tell("flocsim: stopped; what is finished is kept: go on with --resume")
+        return STOPPED
+    tell(os.fspath(output))
+    return 0
+
+
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """What a batch system's SIGTERM does: as Ctrl-C, so that the part that runs saves its rows."""
+    raise KeyboardInterrupt
+
+
+def quoted(text: str) -> str:
+    """A word as a shell takes it."""
+    import shlex
+
+    return shlex.quote(text)

@@ -1,0 +1,198 @@
+"""Who meets whom: for every collision type, pair of radii or pair of size classes, which two flocs
+a replicate draws, and between which sizes they are.
+
+Of measured flocs, two are drawn independently of each other, each with its weight; two of one size
+settle alike and never meet, so that such pairs are drawn anew. Of two, the larger, which settles
+faster, is j. What is drawn follows from the flocs and two random numbers alone: the flocs lie in
+the order of their sizes, so that a number means the same quantile at any weight.
+"""
+
+import abc
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
+from flocsim.ensembles.config.schema import Config, SceneConfig
+from flocsim.errors import ConfigError
+
+EXPONENTS = {"number": 0, "area": 2, "volume": 3}
+"""Power of r_eq by which a floc's weight grows."""
+
+Span = tuple[float, float]
+"""The least and the largest equivalent radius [m]."""
+
+
+class Pairing(abc.ABC):
+    """One collision type of a study: its ``name``, and ``radii`` (r_i, r_j) [m] that stand for it.
+
+    ``spans``: between which equivalent radii bodies i and j are.
+    """
+
+    name: str
+    radii: tuple[float, float]
+    spans: tuple[Span, Span]
+
+    @abc.abstractmethod
+    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+        """Places of the flocs of i and j for a replicate's random numbers."""
+
+    @property
+    def fastest(self) -> tuple[float, float]:
+        """r_i and r_j [m] of the pair that meets at the highest speed."""
+        return self.spans[0][0], self.spans[1][1]
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The largest r_i and r_j [m]."""
+        return self.spans[0][1], self.spans[1][1]
+
+
+@attrs.frozen(eq=False)
+class TwoSizes(Pairing):
+    """Two bodies of given radii, or of about these where flocs keep their own sizes."""
+
+    name: str
+    radii: tuple[float, float]
+    pool: FlocPool
+
+    @property
+    def spans(self) -> tuple[Span, Span]:  # type: ignore[override]
+        if not self.pool.own_size:
+            return tuple((radius, radius) for radius in self.radii)  # type: ignore[return-value]
+        sizes = self.pool.near(self.radii)
+        return (sizes[0], sizes[-2]), (sizes[1], sizes[-1])
+
+    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+        return self.pool.choose(numbers, *self.radii)
+
+
+@attrs.frozen(eq=False)
+class SizeClass:
+    """Measured flocs of one class: their ``places``, ``sizes`` [m] in ascending order, ``weights``
+    of the sum 1."""
+
+    label: str
+    places: np.ndarray
+    sizes: np.ndarray
+    weights: np.ndarray
+
+    def unlike(self, size: float) -> np.ndarray:
+        """The weights, 0 for flocs of this size."""
+        return np.where(self.sizes == size, 0.0, self.weights)
+
+
+@attrs.frozen(eq=False)
+class TwoClasses(Pairing):
+    """Two flocs drawn from two size classes, or from one; ``radii`` are medians over the pairs."""
+
+    name: str
+    first: SizeClass
+    second: SizeClass
+    radii: tuple[float, float] = attrs.field(init=False)
+    spans: tuple[Span, Span] = attrs.field(init=False)
+
+    def __attrs_post_init__(self):
+        sizes, joint = self.distribution()
+        object.__setattr__(self, "radii", tuple(map(median, sizes, joint)))
+        spans = [(x[w > 0.0].min(), x[w > 0.0].max()) for x, w in zip(sizes, joint, strict=True)]
+        object.__setattr__(self, "spans", tuple(tuple(map(float, each)) for each in spans))
+
+    def distribution(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """(sizes [m], weights) of bodies i and j over all pairs."""
+        if self.first is not self.second:
+            both = (self.first, self.second)
+            return [each.sizes for each in both], [each.weights for each in both]
+        sizes, inverse = np.unique(self.first.sizes, return_inverse=True)
+        weights = np.bincount(inverse, self.first.weights)
+        below = np.cumsum(weights) - weights
+        # Exactly 0 for the largest, which is nobody's smaller partner.
+        above = np.append(np.cumsum(weights[:0:-1])[::-1], 0.0)
+        return [sizes, sizes], [weights * above, weights * below]
+
+    def choose(self, numbers: Sequence[float] | np.ndarray) -> tuple[int, int]:
+        """Two flocs of unlike sizes, as if drawn until they are."""
+        own, other = self.first, self.second
+        chances = own.weights
+        if own is other:
+            _, inverse = np.unique(own.sizes, return_inverse=True)
+            chances = chances * (1.0 - np.bincount(inverse, own.weights)[inverse])
+        one = quantile(chances, numbers[2])
+        two = quantile(other.unlike(own.sizes[one]), numbers[3])
+        pair = int(own.places[one]), int(other.places[two])
+        return pair if own.sizes[one] < other.sizes[two] else pair[::-1]
+
+
+def quantile(weights: np.ndarray, number: float) -> int:
+    """The place at which the running sum of weights passes a share ``number`` in [0, 1) of it."""
+    sums = np.cumsum(weights)
+    place = int(np.searchsorted(sums, number * sums[-1], side="right"))
+    # A product rounded up to the sum itself would be past the last floc that has a weight.
+    return min(place, int(np.flatnonzero(weights)[-1]))
+
+
+def median(values, weights):
+    return float(values[quantile(weights, 0.5)])
+
+
+def size_classes(scene: SceneConfig, flocs: Sequence[Floc]) -> list[SizeClass]:
+    """The classes of ``[scene] pairs = "measured"``; ConfigError for one without flocs."""
+    sizes = np.array([floc.size for floc in flocs], float)
+    low, high = scene.min_radius or 0.0, scene.max_radius or math.inf
+    order = [k for k in np.argsort(sizes, kind="stable").tolist() if low <= sizes[k] <= high]
+    told = f"{len(flocs)} flocs of {in_words(sizes)}"
+    if not order:
+        raise ConfigError(
+            f"scene.min_radius and max_radius leave no floc of the library, which holds {told}"
+        )
+    chosen = sizes[order]
+    weights = (chosen / chosen.max()) ** EXPONENTS[scene.weight or "number"]
+    if isinstance(scene.classes, tuple):
+        number = np.searchsorted(scene.classes, chosen, side="right")
+    else:
+        number = quantile_classes(chosen, weights, scene.classes or 1)
+    classes = []
+    for place, label in enumerate(scene.class_labels):
+        mine = np.flatnonzero(number == place)
+        if len(set(chosen[mine])) < 2:
+            raise ConfigError(
+                f"scene.classes: of {len(order)} flocs of {in_words(chosen)}, class {label} holds "
+                f"{len(mine)}{' of one size' if len(mine) else ''}, which never meet: "
+                "give fewer or wider classes, or a library of more flocs"
+            )
+        share = weights[mine] / weights[mine].sum()
+        classes.append(SizeClass(label, np.array(order)[mine], chosen[mine], share))
+    return classes
+
+
+def in_words(sizes):
+    return f"{1e6 * np.min(sizes):.3g} to {1e6 * np.max(sizes):.3g} um"
+
+
+def quantile_classes(sizes, weights, count):
+    """The class of every size, so that all have the same weight; one size is in one class."""
+    _, inverse = np.unique(sizes, return_inverse=True)
+    each = np.bincount(inverse, weights)
+    middle = (np.cumsum(each) - 0.5 * each) / each.sum()
+    return np.minimum((count * middle).astype(int), count - 1)[inverse]
+
+
+def pairings_of(
+    config: Config, flocs: Sequence[Floc], pool: FlocPool | None = None
+) -> tuple[Pairing, ...]:
+    """The Pairing of every collision type of a config, in its order.
+
+    ``flocs``: all of the study; for bodies of given radii that are only looked at, none. ``pool``:
+    theirs, where there is one.
+    """
+    scene = config.scene
+    pool = pool or pool_of(config.shapes, flocs)
+    if not scene.is_measured:
+        return tuple(TwoSizes(name, radii, pool) for name, radii in scene.given)
+    classes = size_classes(scene, flocs)
+    return tuple(
+        TwoClasses(name, classes[a], classes[b])
+        for name, (a, b) in zip(scene.names, scene.class_pairs, strict=True)
+    )

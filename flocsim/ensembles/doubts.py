@@ -1,0 +1,46 @@
+"""What is implausible in a study, and how its bodies settle: for the terminal and for the file.
+
+Of flocs of measured sizes it looks at the largest of each collision type, which settle fastest.
+``flocs`` are those of the study, where they have been read.
+"""
+
+from collections.abc import Sequence
+
+from flocsim.ensembles.collision.flocs import Floc
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.preflight import pairings, sphere_pairs
+from flocsim.plausibility.doubts import Names, doubts_of
+from flocsim.plausibility.ranges import ROUNDING
+from flocsim.plausibility.reynolds import settled
+
+
+def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[str]:
+    """Lines on a study, by the equivalent spheres of its collision types; none where all is
+    usual."""
+    names = Names(
+        fluid="fluid",
+        body="bodies",
+        forces=tuple(f"forces.{name}" for name in config.force_names),
+        buoyancy="fluid.buoyancy = true",
+        drop="give {} = false",
+    )
+    lines = doubts_of([pair.system for _, pair in sphere_pairs(config, flocs, "largest")], names)
+    options = config.shapes
+    if options.own is None and options.size == "scene" and max(options.vertices) > 1:
+        least = min(min(each.radii) for each in pairings(config, flocs))
+        share = options.radius / least
+        lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
+    return [line for line in lines if line]
+
+
+def settling_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
+    """[{type, body, radius [m], speed [m/s], reynolds, stokes}] of every free equivalent sphere.
+
+    It is the same at every N: a floc settles as the sphere of its area.
+    """
+    found = []
+    for name, pair in sphere_pairs(config, flocs, "largest"):
+        for letter, body in zip("ij", pair.system.bodies, strict=True):
+            if (each := settled(pair.system, body)) is not None:
+                found.append({"type": name, "body": letter, **each._asdict()})
+    return found

@@ -1,0 +1,226 @@
+"""StudyResults: a results file with its arrays, tables and figures, and its replicates anew."""
+
+import functools
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.studies.replicates import (
+    chosen,
+    one_count_study,
+    place_of,
+    recorded_methods,
+    replicate_of,
+)
+from flocsim.ensembles.study import Study
+from flocsim.errors import FileError, UsageError
+from flocsim.fields import is_whole
+from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.outputs import figure_rule
+from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.style import Figure, save
+from flocsim.io.results.file import read_results
+from flocsim.io.results.schema import (
+    AXES,
+    COORDINATES,
+    DIFFERENCES,
+    EVENTS,
+    FLAGS,
+    LAST_AXES,
+    POOLED,
+    RADII,
+    REPLICATES,
+    TABLE,
+    Results,
+    last_axis,
+)
+from flocsim.trajectories.trajectory import Trajectory
+
+GROUPS: dict[str, tuple[dict, tuple[str, ...]]] = {
+    "probabilities": (TABLE, AXES),
+    "pooled": (POOLED, AXES[:2]),
+    "differences": (DIFFERENCES, ("against", "event", *AXES)),
+    "replicates": (REPLICATES, (*AXES, "replicate")),
+}
+"""Groups of a results file: what each holds, and along which axes."""
+
+SIZED = ("probabilities", "pooled")
+"""Groups that have the radii of the types beside them; the replicates have their own."""
+
+
+class StudyResults:
+    """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
+
+    ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
+    ``probabilities``, ``pooled`` and ``differences`` {name: array} its tables, ``replicates`` the
+    same of every single collision, read when asked for; ``run`` where it came from.
+    """
+
+    def __init__(self, results: Results, path: Path, folder: Path) -> None:
+        self.results, self.path, self.folder = results, path, folder
+        self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
+        self.count, self.run = results.count, results.run
+        self.probabilities, self.pooled = results.probabilities, results.pooled
+        self.differences = results.differences
+        self.studies: dict[int, Study] = {}
+
+    @functools.cached_property
+    def replicates(self) -> dict[str, np.ndarray]:
+        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file."""
+        found = read_results(self.path).replicates
+        assert found is not None
+        return found
+
+    @functools.cached_property
+    def config(self) -> Config:
+        """What was run: the config that the file holds, and what was laid over it."""
+        text = str(self.run.get("config", ""))
+        if not text:
+            raise FileError(f"{self.path} holds no config: it was not written by flocsim ensemble")
+        return load_config(self.folder / "study.toml", self.stored("overrides"), Sources(text))
+
+    def stored(self, name: str) -> dict:
+        """What the group ``run`` has as JSON."""
+        try:
+            return stored(self.run, name)
+        except ValueError as error:
+            raise FileError(f"{self.path} holds no readable results: {error}") from error
+
+    def table(self) -> str:
+        """Counts and probabilities of every condition as the command prints them, as text."""
+        lines = [format_table(self.types, self.vertices, self.delta, self.probabilities)]
+        return "\n".join([*lines, *filter(None, [checked_line(self.results)])])
+
+    def labelled(self, group: str = "probabilities") -> Labelled:
+        """The arrays of a group of the file with their axes; UsageError for an unknown one."""
+        if group not in GROUPS:
+            raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
+        schema, axes = GROUPS[group]
+        arrays: Mapping[str, np.ndarray] = getattr(self, group)
+        if not arrays:
+            raise UsageError(f"{self.path} has no group {group}: it was written without")
+        columns = {}
+        for name, (_, units, text) in schema.items():
+            further = (last_axis(name),) if group == "probabilities" and last_axis(name) else ()
+            about = {"units": units, "long_name": text} | self.flags(group, name)
+            columns[name] = Column((*axes, *filter(None, further)), arrays[name], about)
+        used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
+        sizes = {name: self.radius(name) for name in RADII if group in SIZED}
+        return Labelled({axis: self.coordinate(axis) for axis in used} | sizes, columns)
+
+    def radius(self, name: str) -> Column:
+        """The radius r_i or r_j that stands for each type: a coordinate along the types."""
+        _, units, text = RADII[name]
+        return Column(("type",), self.results.radii[name], {"units": units, "long_name": text})
+
+    def flags(self, group: str, name: str) -> dict:
+        """The codes of a column of the replicates, and their words."""
+        if group != "replicates":
+            return {}
+        words = self.results.failures
+        flags = FLAGS | {"failure": (tuple(range(len(words))), words)}
+        if name not in flags:
+            return {}
+        values, meanings = flags[name]
+        return {"flag_values": np.array(values, "u1"), "flag_meanings": " ".join(meanings)}
+
+    def coordinate(self, axis: str) -> Column:
+        """The values along an axis."""
+        known = {
+            "type": np.array(self.types, dtype=object), "vertices": self.vertices,
+            "delta": self.delta, "replicate": np.arange(self.count),
+            "against": np.array(AXES, dtype=object), "event": np.array(EVENTS, dtype=object),
+        } | {name: np.array(words, dtype=object) for name, words in LAST_AXES.items()}  # fmt: skip
+        units, text = COORDINATES[axis]
+        return Column((axis,), known[axis], {"units": units, "long_name": text})
+
+    def to_xarray(self, group: str = "probabilities") -> Dataset:
+        """A group of the file as an xarray Dataset, with units, meanings and flags.
+
+        ``group``: "probabilities", "pooled", "differences" or "replicates". UsageError where
+        xarray is not installed (``pip install 'flocsim[tables]'``).
+        """
+        return self.labelled(group).to_xarray()
+
+    def to_pandas(self, group: str = "probabilities") -> DataFrame:
+        """A group as a pandas DataFrame, a row for each condition (or replicate), codes as words.
+
+        The radii of the types are columns.
+
+        UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
+        """
+        return self.labelled(group).to_pandas(GROUPS[group][1])
+
+    def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
+        """One of the figures of `flocsim plot`, as a matplotlib Figure.
+
+        Written to ``file`` if given. UsageError for an unknown one, which lists them.
+        """
+        if figure not in FIGURES:
+            raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
+        drawn = FIGURES[figure](self.results)
+        if file is not None:
+            save(drawn, Path(file), figure_rule())
+        return drawn
+
+    def replicate(
+        self, replicate: int = 0, type: str | None = None, vertices: int | None = None,
+        delta: float | None = None,
+    ) -> Trajectory:  # fmt: skip
+        """Run one replicate of the file again, and keep its motion.
+
+        Of a collision type (default: the first), with so many vertices (the last) at a displacement
+        (the first). UsageError where the file does not have it, where the config's library or own
+        modules are not where the results lie (``flocsim.open(path, folder=…)`` says where), and
+        where this flocsim would compute something else than the file holds.
+        """
+        if not is_whole(replicate) or not 0 <= replicate < self.count:
+            raise UsageError(
+                f"replicate must be a whole number from 0 to {self.count - 1}, found {replicate!r}"
+            )
+        for value, known, name in (
+            (type, self.types, "type"), (vertices, self.vertices.tolist(), "vertices"),
+            (delta, self.delta.tolist(), "delta"),
+        ):  # fmt: skip
+            chosen(value, known, name, 0)
+        place = place_of(self.config, type, vertices, delta)
+        return replicate_of(int(replicate), place, self.study_with(place[1]))
+
+    def study_with(self, vertices: int) -> Study:
+        """The study of the file with bodies of so many vertices, ready to run replicates again.
+
+        UsageError where this flocsim would compute something else than the file holds.
+        """
+        if vertices not in self.studies:
+            methods = recorded_methods(self.stored("accuracy"))
+            study = one_count_study(self.config, vertices, methods)
+            if unlike := differences(self.stored("identity"), identity_of(study)):
+                raise UsageError(
+                    f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
+                    "files and the kind of machine that it was made with"
+                )
+            self.studies[vertices] = study
+        return self.studies[vertices]
+
+    def __repr__(self) -> str:
+        shape = " × ".join(map(str, self.results.shape))
+        return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
+
+
+def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> StudyResults:
+    """A results file, checked; its table of replicates stays on the disk until it is asked for.
+
+    ``folder``: where the config lay, its shape library and its own modules (default: where the
+    results lie). FileError for a file that is absent, damaged, or of another kind.
+    """
+    place = Path(path)
+    found = read_results(place, replicates=False)
+    return StudyResults(found, place, place.parent if folder is None else Path(folder))

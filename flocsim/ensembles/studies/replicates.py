@@ -1,0 +1,90 @@
+"""One replicate of a study run again, its motion kept as a Trajectory."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+
+from flocsim.arrays import UNTIL
+from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.config.schema import METHODS, Config
+from flocsim.ensembles.pilot.choice import final_methods
+from flocsim.ensembles.study import Study
+from flocsim.errors import UsageError
+from flocsim.fields import is_whole
+from flocsim.integrators.base import Integrator
+from flocsim.io.results.schema import FLAGS
+from flocsim.run import Run
+from flocsim.trajectories.replay import Origin
+from flocsim.trajectories.trajectory import Trajectory
+
+Place = tuple[int, int, float]
+"""(place of the collision type, N, share of δ_max)."""
+
+
+def place_of(config: Config, type: str | None, vertices: int | None, delta: float | None) -> Place:
+    """The condition with these values: by default the first type, the last N, the first δ."""
+    names = list(config.scene.names)
+    return (
+        chosen(type, names, "type", 0),
+        config.shapes.vertices[chosen(vertices, config.shapes.vertices, "vertices", -1)],
+        config.scene.delta[chosen(delta, config.scene.delta, "delta", 0)],
+    )
+
+
+def chosen(value: Any, known: Sequence, option: str, default: int) -> int:
+    """The place of a value among those that there are; UsageError where it is none of them."""
+    known = list(known)
+    if value is None:
+        value = known[default]
+    if value not in known:
+        raise UsageError(f"{option} must be one of {', '.join(map(str, known))}, found {value}")
+    return known.index(value)
+
+
+def with_one_count(config: Config, vertex_count: int) -> Config:
+    """The config with one number of vertices: the flocs need no fits at the others."""
+    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
+
+
+def one_count_study(
+    config: Config, vertex_count: int, methods: dict[str, Integrator] | None = None
+) -> Study:
+    """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
+    return Study(with_one_count(config, vertex_count), methods=methods or final_methods(config))
+
+
+def recorded_methods(record: dict) -> dict[str, Integrator] | None:
+    """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record."""
+    return {
+        each["name"]: METHODS[each["method"]](each["tolerance"]) for each in record.get("types", [])
+    } or None
+
+
+def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
+    """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words."""
+    if not is_whole(replicate) or not replicate >= 0:
+        raise UsageError(f"replicate must be a whole number from 0, found {replicate!r}")
+    began, record = time.perf_counter(), Record()
+    row = study.run(*place, int(replicate), record)
+    assert row is not None and record.run is not None and record.status is not None
+    encounter, angles = study.drawn(*place[:2], int(replicate))
+    driver, max_steps = study.driver(encounter), study.config.integrator.max_steps
+    system, run = encounter.system, record.run
+
+    def fresh() -> Run:
+        return encounter.begin(driver, angles, place[2], max_steps)
+
+    legs = ((run.steps, float(run.clock[UNTIL])),)
+    origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)
+    lasted = time.perf_counter() - began
+    return Trajectory.of(run, record.status, lasted, row=row_in_words(row), origin=origin)
+
+
+def row_in_words(row: dict) -> dict:
+    """A row of the table of replicates with the words of its codes."""
+    words = {name: dict(zip(*flags, strict=True)) for name, flags in FLAGS.items()}
+    found = {name: words[name][value] if name in words else value for name, value in row.items()}
+    return found | {"failure": FAILURES[row["failure"]]}

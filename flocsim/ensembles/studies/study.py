@@ -1,0 +1,146 @@
+"""Study: a config file, or a dict like one, that can be changed, looked at and run."""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.overrides import lay_over, nested
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.config.toml_text import read_text_file
+from flocsim.ensembles.preflight import check_study, inputs_of
+from flocsim.ensembles.studies.opened import StudyResults, open_results
+from flocsim.ensembles.studies.process import run_command
+from flocsim.ensembles.studies.replicates import one_count_study, place_of, replicate_of
+from flocsim.ensembles.studies.text import toml_text, value_text
+from flocsim.errors import ConfigError, UsageError
+from flocsim.fields import is_whole
+from flocsim.io.journal.journal import SUFFIX
+from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.trajectories.trajectory import Trajectory
+
+MODES = ("new", "resume", "restart")
+
+
+class Study:
+    """All that a config file says, from a file or from a dict with the same keys.
+
+    Parameters: ``source``, the path of a TOML file or a nested dict; ``folder``, where a dict's
+    shape library and modules of one's own lie (default: the current one). Every value is checked as
+    in a file: ConfigError with one line per problem.
+
+    >>> study = Study({"preset": "tang2014", "replicates": 10, "shapes": {"vertices": [1]}})
+    >>> study.with_(replicates=20).config.replicates
+    20
+    """
+
+    def __init__(
+        self, source: str | os.PathLike | Mapping[str, Any], folder: str | os.PathLike | None = None
+    ) -> None:
+        if isinstance(source, Mapping):
+            place = Path("." if folder is None else folder) / "study.toml"
+            if not place.parent.is_dir():
+                raise UsageError(f"{place.parent} is not a folder: name one that is there")
+            self._take(place, toml_text(source), {})
+        elif folder is None:
+            self._take(Path(source), read_text_file(source), {})
+        else:
+            raise UsageError("folder goes with a dict; a file's own folder is taken for a file")
+
+    def _take(self, path: Path, text: str, overrides: dict[str, Any]) -> None:
+        self.path, self.text, self.overrides = path, text, overrides
+        self.config: Config = load_config(path, overrides, Sources(text))
+
+    @classmethod
+    def of_text(
+        cls, path: str | os.PathLike, text: str, overrides: Mapping[str, Any] | None = None
+    ) -> "Study":
+        """The Study of a file's text, whatever lies at its path, and of what is laid over it."""
+        study = cls.__new__(cls)
+        study._take(Path(path), text, dict(overrides or {}))
+        return study
+
+    def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> "Study":
+        """A new Study with other values: a nested dict, dotted keys, or top-level keys by name.
+
+        ``study.with_({"forces.contact.k_n": "10 N/m"}, seed=3, scene={"delta": [0.0]})``. Checked
+        like the file; a force is left out by False, as ``{"forces.double_layer": False}``.
+        """
+        found: dict[str, Any] = {}
+        for key, value in {**(changes or {}), **keys}.items():
+            if not isinstance(key, str) or not all(key.split(".")):
+                raise ConfigError(f"keys are words with dots between them, found {key!r}")
+            try:
+                found = lay_over(found, nested([(key.split("."), value)]))
+            except TypeError:
+                raise ConfigError(f"{key} cannot be given here") from None
+        return Study.of_text(self.path, self.text, lay_over(self.overrides, found))
+
+    def run(
+        self, jobs: int = 1, *, output: str | os.PathLike | None = None, mode: str = "new",
+        overwrite: bool = False, quiet: bool = True,
+    ) -> StudyResults:  # fmt: skip
+        """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
+
+        ``jobs`` processes of this machine (without ``if __name__ == "__main__"``);
+        ``output``, instead of the config's file; ``mode``: "new", "resume" (go on, extend, or take
+        finished results as they are) or "restart"; ``overwrite``: keep a file that is in the way
+        under another name; ``quiet=False`` prints what the command prints. What is finished is kept
+        when it is interrupted: go on with ``mode="resume"``. UsageError for a file in the way,
+        FileError where it cannot be written.
+        """
+        if not is_whole(jobs) or jobs < 1:
+            raise UsageError(f"jobs must be a whole number from 1, found {jobs!r}")
+        if mode not in MODES:
+            raise UsageError(f"mode must be one of {', '.join(MODES)}, found {mode!r}")
+        target = Path(self.config.output.file if output is None else output)
+        # The command reads the text from a pipe, and cannot know the file.
+        check_outputs(
+            [Output(target, data_rule(overwrite or mode == "resume"), SUFFIX, WAYS)],
+            inputs_of(self.config, str(self.path)),
+        )
+        words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(int(jobs))]
+        words += [f"--{mode}"] if mode != "new" else []
+        words += ["--overwrite"] if overwrite else []
+        words += ["--quiet"] if quiet else []
+        for key, value in settings_of(self.overrides):
+            words += ["--set", f"{key}={value}"]
+        run_command(words, self.text, self.path.parent, quiet)
+        return open_results(target, self.path.parent)
+
+    def check(self) -> None:
+        """Raise now what would keep the study from running: zone, sizes, forces, library."""
+        check_study(self.config)
+
+    def replicate(
+        self, replicate: int = 0, type: str | None = None, vertices: int | None = None,
+        delta: float | None = None,
+    ) -> Trajectory:  # fmt: skip
+        """Run one replicate and keep its motion.
+
+        Of a collision type (default: the first), with so many vertices (the last of the config) at
+        a displacement δ/δ_max (the first). The Trajectory's ``row`` has what the table of
+        replicates holds of it. UsageError for what the study does not have.
+        """
+        place = place_of(self.config, type, vertices, delta)
+        return replicate_of(replicate, place, one_count_study(self.config, place[1]))
+
+    def __repr__(self) -> str:
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        count = len(scene.names) * len(vertices) * len(scene.delta)
+        over = f", {len(list(settings_of(self.overrides)))} changed" if self.overrides else ""
+        return f"Study({str(self.path)!r}: {count} conditions × {self.config.replicates}{over})"
+
+
+WAYS = 'say mode="resume" to go on or extend, or overwrite=True, which keeps the old one'
+
+
+def settings_of(table: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
+    """(dotted key, TOML text) of every value in nested dicts."""
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value:
+            yield from settings_of(value, (*place, key))
+        elif value is not None:
+            yield ".".join((*place, key)), value_text(value, (*place, key))

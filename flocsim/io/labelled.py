@@ -1,0 +1,97 @@
+"""Labelled arrays as a Dataset of xarray or a DataFrame of pandas, where these are installed."""
+
+import importlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+
+Dataset = Any
+"""An xarray Dataset: no hint may load xarray."""
+
+DataFrame = Any
+"""A pandas DataFrame."""
+
+
+@attrs.frozen(eq=False)
+class Column:
+    """One array: its axes by name, its values, and what they are.
+
+    ``about``: units, long_name, flag_values and flag_meanings, as the file has them.
+    """
+
+    axes: tuple[str, ...]
+    values: np.ndarray
+    about: dict[str, Any] = attrs.Factory(dict)
+
+
+@attrs.frozen(eq=False)
+class Labelled:
+    """Arrays along named axes; ``axes`` {name: Column} has a coordinate for each.
+
+    A coordinate that is no axis itself lies along those that its Column names.
+    """
+
+    axes: dict[str, Column]
+    columns: dict[str, Column]
+    facts: dict[str, Any] = attrs.Factory(dict)
+
+    def to_xarray(self) -> Dataset:
+        """A Dataset with units and meanings; UsageError where xarray is not installed."""
+        xarray = needed("xarray")
+        return xarray.Dataset(
+            {name: (each.axes, each.values, each.about) for name, each in self.columns.items()},
+            {name: (each.axes, each.values, each.about) for name, each in self.axes.items()},
+            self.facts,
+        )
+
+    def to_pandas(self, index: Sequence[str]) -> DataFrame:
+        """A DataFrame with a row for each place along ``index``, and codes as their words.
+
+        A column for each word of any further axis. UsageError where pandas is not installed.
+        """
+        pandas = needed("pandas")
+        labels = [self.axes[name].values for name in index]
+        rows = pandas.MultiIndex.from_product(labels, names=list(index))
+        found = {}
+        further = {name: each for name, each in self.axes.items() if each.axes != (name,)}
+        for name, column in (further | self.columns).items():
+            for label, values in self.spread(name, column, index):
+                found[label] = worded(pandas, column, values)
+        return pandas.DataFrame(found, index=rows)
+
+    def spread(
+        self, name: str, column: Column, index: Sequence[str]
+    ) -> Iterable[tuple[str, np.ndarray]]:
+        """(label, values along the index) of a column, one for each place of its further axes."""
+        further = [axis for axis in column.axes if axis not in index]
+        words = [self.axes[axis].values for axis in further]
+        lengths = [len(self.axes[axis].values) for axis in index]
+        places = [column.axes.index(axis) for axis in further]
+        values = np.moveaxis(column.values, places, range(-len(places), 0))
+        # A column that does not lie along an axis of the index is the same all along it.
+        own = iter(values.shape)
+        shape = [next(own) if axis in column.axes else 1 for axis in index]
+        values = np.broadcast_to(values.reshape(*shape, *own), (*lengths, *map(len, words)))
+        for place in np.ndindex(*map(len, words)):
+            parts = [str(labels[at]) for labels, at in zip(words, place, strict=True)]
+            yield "_".join([name, *parts]), values[(..., *place)].reshape(lengths).ravel()
+
+
+def worded(pandas, column, values):
+    """Codes as a categorical of their words; all else as it is."""
+    if "flag_values" not in column.about:
+        return values
+    codes = np.searchsorted(column.about["flag_values"], values)
+    return pandas.Categorical.from_codes(codes, column.about["flag_meanings"].split())
+
+
+def needed(library: str) -> Any:
+    """A library of the extra `tables`; UsageError with the command that installs it."""
+    try:
+        return importlib.import_module(library)
+    except ImportError:
+        raise UsageError(f"{library} is not installed: pip install 'flocsim[tables]'") from None

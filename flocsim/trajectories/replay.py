@@ -1,0 +1,270 @@
+"""A run gone through again: the state within steps, contacts and forces, from the engine's arrays.
+
+A run is the same each time, so nothing of this has to be kept: it is found when it is asked for.
+Forces are summed by the engine's own functions, uncompiled, for one force at a time.
+"""
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    EDGE_BODY,
+    EDGE_START,
+    FIRST_STAGE,
+    FORCE,
+    GAP,
+    MAX_STEPS,
+    NORMAL_X,
+    NORMAL_Y,
+    NOW,
+    STAGED_AT,
+    STAGED_STEP,
+    START,
+    UNTIL,
+    VERTEX,
+    VERTEX_BODY,
+    Scene,
+    Work,
+    with_capacity,
+)
+from flocsim.body import Body, Fluid
+from flocsim.forces.base import Force
+from flocsim.forces.codegen import laws_of
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.integrators.base import Integrator
+from flocsim.integrators.events.modes import set_closed
+from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.radau.collocation import stage_weights
+from flocsim.integrators.rhs.forces import sum_forces
+from flocsim.integrators.rhs.surface_gap import flag_near
+from flocsim.integrators.rhs.views import contact_view
+from flocsim.laws import CONTACT_FORCE, contact_force, has, law_table
+from flocsim.run import Run
+
+Slips = dict[tuple[int, int, int, int], float]
+"""{(body and core point of the vertex, body and first core point of the edge): ξ [m]}."""
+
+
+@attrs.frozen(eq=False)
+class Origin:
+    """What a Trajectory came from: its scene, a way to begin its run anew, and the run at its end.
+
+    ``begin()`` makes a Run that has yet to take its first step and records nothing; ``legs``: the
+    stretches that it ran, each (steps taken by its end, the time [s] until which it was to run).
+    """
+
+    bodies: tuple[Body, ...]
+    forces: tuple[Force, ...]
+    fluid: Fluid
+    integrator: Integrator
+    begin: Callable[[], Run]
+    ended: Run
+    legs: tuple[tuple[int, float], ...]
+
+    @property
+    def has_stages(self) -> bool:
+        """Whether the method has stages with a cubic through them."""
+        return isinstance(self.integrator, Implicit)
+
+
+@attrs.frozen
+class Contact:
+    """One contact point: two bodies whose outlines overlap there.
+
+    ``bodies``: numbers of the two; ``point`` (x, y) [m], the middle of the overlap; ``normal``, the
+    unit vector from the second to the first; ``overlap`` [m]; ``slip`` [m], the tangential elastic
+    displacement ξ; ``force`` (f_n, f_t) [N] on the first, along the normal and along the tangent,
+    which is the normal turned by +90°.
+    """
+
+    bodies: tuple[int, int]
+    point: tuple[float, float]
+    normal: tuple[float, float]
+    overlap: float
+    slip: float
+    force: tuple[float, float]
+
+
+@attrs.frozen(eq=False)
+class Instant:
+    """Everything at one time: ``work`` has state NOW, its pairs located and flagged."""
+
+    time: float
+    scene: Scene
+    work: Work
+
+    @property
+    def motion(self) -> np.ndarray:
+        """x, y, angle and their rates (n, 6)."""
+        return self.work.motion[NOW]
+
+    def forces(self, scene: Scene) -> np.ndarray:
+        """(n, 3) force and torque on every body [N, N, N m] of a scene with these or other laws."""
+        sum_forces(scene, self.work, self.time, NOW)
+        return self.work.rates[NOW, :, FORCE : FORCE + 3].copy()
+
+    def contacts(self) -> list[Contact]:
+        """All contact points."""
+        work, found = self.work, []
+        for row in range(work.tally[CANDIDATES]):
+            if work.candidates[row, CLOSED] == 1:
+                a, b = (int(work.candidates[row, place]) for place in (VERTEX_BODY, EDGE_BODY))
+                geometry = work.geometry[NOW, row]
+                dx, dy = contact_point(work, row, a)
+                force = (0.0, 0.0)
+                if has(self.scene, CONTACT_FORCE):
+                    force = contact_force(self.scene, contact_view(self.scene, work, NOW, row))
+                found.append(
+                    Contact(
+                        (a, b),
+                        (float(work.motion[NOW, a, 0] + dx), float(work.motion[NOW, a, 1] + dy)),
+                        (float(geometry[NORMAL_X]), float(geometry[NORMAL_Y])),
+                        float(-geometry[GAP]), float(work.slip[NOW, row]),
+                        (float(force[0]), float(force[1])),
+                    )
+                )  # fmt: skip
+        return found
+
+
+class Replay:
+    """A run gone through again, forwards."""
+
+    def __init__(self, origin: Origin) -> None:
+        self.origin, self.run, self.leg = origin, origin.begin(), 0
+        self.run.counts[MAX_STEPS] = np.iinfo(np.int64).max
+        self.run.clock[UNTIL] = origin.legs[0][1]
+        self.scene = self.scene_of(origin.forces)
+
+    def scene_of(self, forces: Sequence[Force]) -> Scene:
+        """The run's scene with the laws of these of its forces, uncompiled."""
+        pieces = laws_of(forces, self.origin.fluid)
+        return self.run.scene._replace(
+            laws=law_table(pieces.laws, jit=False),
+            parameters=np.array(pieces.parameters, dtype=float),
+            surface_reach=float(pieces.surface_reach), events=int(pieces.events),
+        )  # fmt: skip
+
+    @functools.cached_property
+    def single_scenes(self) -> dict[str, Scene]:
+        """{name of a force: the scene with it alone}."""
+        names: list[str] = []
+        for force in self.origin.forces:
+            name = type(force).__name__
+            names.append(name if name not in names else f"{name} {1 + names.count(name)}")
+        return {
+            name: self.scene_of([force])
+            for name, force in zip(names, self.origin.forces, strict=True)
+        }
+
+    def to_step(self, step: int) -> None:
+        """Go on until so many steps of the trajectory have been taken."""
+        legs = self.origin.legs
+        while self.run.steps < step:
+            last = legs[self.leg][0]
+            if self.run.steps >= last and self.leg + 1 < len(legs):
+                self.leg += 1
+                self.run.clock[UNTIL] = legs[self.leg][1]
+                continue
+            self.run.advance(min(step, last) - self.run.steps)
+
+    def instants(self, times: Sequence[float] | np.ndarray, steps: np.ndarray) -> Iterator[Instant]:
+        """The Instant at each of these times [s], in increasing order.
+
+        ``steps`` (k,): the times of the trajectory's start and steps.
+        """
+        for time in times:
+            step = int(np.searchsorted(steps, time, side="right")) - 1
+            if steps[step] == time:
+                self.to_step(step)
+                yield self.instant(time, self.run.work.motion[NOW], self.slips())
+                continue
+            yield self.instant(time, *self.within(float(time), step, steps))
+
+    def within(self, time: float, step: int, steps: np.ndarray) -> tuple[np.ndarray, Slips]:
+        """(motion (n, 6), tangential displacements) at a time inside of the step after so many.
+
+        The step is taken by a copy of the run, so that it can be asked about again.
+        """
+        self.to_step(step)
+        begin, end = float(steps[step]), float(steps[step + 1])
+        before, start = self.slips(), self.run.work.motion[NOW].copy()
+        ahead = self.run.copy()
+        mine, self.run = self.run, ahead
+        leg = self.leg
+        self.to_step(step + 1)
+        motion = step_motion(self.origin, ahead, start, begin, end, np.array([time]))[0]
+        share, after = (time - begin) / (end - begin), self.slips()
+        slips = {
+            key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
+            for key in before.keys() | after.keys()
+        }
+        self.run, self.leg = mine, leg
+        return motion, slips
+
+    def slips(self) -> Slips:
+        """The tangential displacements of all listed pairs now."""
+        work = self.run.work
+        rows = range(work.tally[CANDIDATES])
+        return {key_of(work, row): float(work.slip[NOW, row]) for row in rows}
+
+    def instant(self, time: float, motion: np.ndarray, slips: Slips) -> Instant:
+        """The Instant of a motion (n, 6) near where the run is now."""
+        work = Work(*(array.copy() for array in self.run.work))
+        work.motion[NOW] = motion
+        if has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0:
+            while not work.tally[CANDIDATES] and not list_candidates(self.scene, work):
+                work = with_capacity(work, 2 * len(work.candidates))
+            locate_contacts(self.scene, work, NOW)
+            set_closed(work)
+            for row in range(work.tally[CANDIDATES]):
+                work.slip[NOW, row] = slips.get(key_of(work, row), 0.0)
+            if self.scene.surface_reach > 0.0:
+                flag_near(self.scene, work, NOW, 0.0)
+        return Instant(float(time), self.scene, work)
+
+
+def key_of(work, row):
+    pair = work.candidates[row]
+    return int(pair[VERTEX_BODY]), int(pair[VERTEX]), int(pair[EDGE_BODY]), int(pair[EDGE_START])
+
+
+def step_motion(
+    origin: Origin, run: Run, start: np.ndarray, begin: float, end: float, times: np.ndarray
+) -> np.ndarray:
+    """The motion (k, n, 6) at times inside of the step that a run has just taken.
+
+    Of implicit methods the cubic through the stages, which the engine itself goes by; of others,
+    and where the stages are no longer those of the step, Hermite's through both ends.
+    """
+    work, clock = run.work, run.clock
+    stages = work.motion[[START, FIRST_STAGE, FIRST_STAGE + 1, FIRST_STAGE + 2]]
+    whole = float(clock[STAGED_STEP])
+    if whole == 0.0 and np.array_equal(stages[3], work.motion[NOW]):
+        whole = end - begin
+    own = isinstance(origin.integrator, Implicit) and clock[STAGED_AT] == begin and whole > 0.0
+    if not own or not np.array_equal(stages[0], start):
+        return hermite(begin, end, start, work.motion[NOW], times)
+    weights = np.array([stage_weights((time - begin) / whole) for time in times])
+    return start + np.einsum("ks,snc->knc", weights[:, 1:], stages[1:] - start)
+
+
+def hermite(
+    begin: float, end: float, start: np.ndarray, stop: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """The motion (k, n, 6) of the cubic with the places and velocities (n, 6) at both ends."""
+    h = end - begin
+    s = ((times - begin) / h)[:, None, None]
+    x, v, y, w = start[:, :3], start[:, 3:], stop[:, :3], stop[:, 3:]
+    # In changes, so that what does not move stays just where it is.
+    place = x + s * s * (3.0 - 2.0 * s) * (y - x)
+    place = place + h * s * (1.0 - s) * ((1.0 - s) * v - s * w)
+    rate = 6.0 * s * (1.0 - s) * (y - x) / h
+    rate = rate + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * w
+    return np.concatenate([place, rate], axis=2)

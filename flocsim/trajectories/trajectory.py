@@ -1,0 +1,305 @@
+"""Trajectory: what happened in a run, at any time of it; drawn, written, and gone on with."""
+
+import functools
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import MAX_STEPS, NOW, TIME, TOLERANCE, UNTIL
+from flocsim.errors import UsageError
+from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators.amplification import MOST_AMPLIFIED
+from flocsim.integrators.base import Status
+from flocsim.run import Run
+from flocsim.trajectories.energies import Energies, energies_of
+from flocsim.trajectories.replay import Contact, Origin, Replay, hermite
+
+ENDED_FOR_GOOD = (Status.STALLED, Status.TOO_DEEP, Status.NOT_FINITE)
+"""Ends from which a run would not get any further."""
+
+FRAMES, ANIMATION_FRAMES = 6, 60
+
+
+@attrs.frozen(eq=False)
+class State:
+    """The bodies at one time, or at k of them: ``t`` [s], a number or (k,); ``position`` (n, 3)
+    [m, m, rad] and ``velocity`` (n, 3) [m/s, m/s, rad/s], or (k, n, 3)."""
+
+    t: Any
+    position: np.ndarray
+    velocity: np.ndarray
+
+    def __repr__(self) -> str:
+        when = f"{self.t:g} s" if np.ndim(self.t) == 0 else f"{len(self.t)} times"
+        return f"State({when}, {self.position.shape[-2]} bodies)"
+
+
+Watch = Callable[[State], Any]
+"""Is shown the State between two steps; what counts as true stops the run."""
+
+
+@attrs.frozen(eq=False, repr=False)
+class Trajectory:
+    """What happened in a run of n bodies.
+
+    ``t`` (k,) [s]; ``position`` (k, n, 3) [m, m, rad] and ``velocity`` (k, n, 3) [m/s, m/s, rad/s]
+    at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
+    how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], what
+    the errors of steps and of switches have led to by the end (nan where the method estimates
+    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a nudge (None
+    where that was not asked for): above MOST_AMPLIFIED, 10, the error is no promise, and
+    ``error_text`` says so; ``row``, of a replicate of a study, what its table of replicates holds
+    of it, in words (None of other runs).
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    status: Status
+    steps: int
+    rejected: int
+    evaluations: int
+    error: float
+    wall_time: float
+    amplification: float | None = None
+    row: dict | None = None
+    origin: Origin | None = None
+
+    def __repr__(self) -> str:
+        n = self.position.shape[1]
+        return (
+            f"Trajectory({n} {'body' if n == 1 else 'bodies'}, {self.t[0]:g} to {self.t[-1]:g} s, "
+            f"{self.steps} steps, {self.status.name})"
+        )
+
+    @property
+    def error_text(self) -> str:
+        """What can be said of the error at the end, in words."""
+        if not np.isfinite(self.error):
+            return "the method states no error"
+        stated = f"stated error {self.error:.2g} m"
+        if self.amplification is None:
+            return stated
+        if self.amplification > MOST_AMPLIFIED:
+            return (
+                f"{stated}, which is no promise: the motion amplifies a nudge "
+                f"{self.amplification:.2g} times"
+            )
+        return f"{stated}; the motion amplifies a nudge {self.amplification:.2g} times"
+
+    @classmethod
+    def of(
+        cls, run: Run, status: Status, wall_time: float, amplification: float | None = None,
+        row: dict | None = None, origin: Origin | None = None,
+    ) -> "Trajectory":  # fmt: skip
+        """What a Run has come to."""
+        times, position, velocity = run.motion()
+        adaptive = np.isfinite(run.clock[TOLERANCE])
+        return cls(
+            times, position, velocity, status, run.steps, run.rejected, run.evaluations,
+            run.error if adaptive else float("nan"), wall_time, amplification, row, origin,
+        )  # fmt: skip
+
+    def known(self) -> Origin:
+        """Where this came from; UsageError for one that was read from a file."""
+        if self.origin is None:
+            raise UsageError(
+                "this Trajectory has its motion alone: run it again with System.run for more"
+            )
+        return self.origin
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The bodies' shapes."""
+        return tuple(body.shape for body in self.known().bodies)
+
+    @functools.cached_property
+    def all_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times (k,), positions and velocities of the start and of every step, recorded or not."""
+        if len(self.t) == self.steps + 1:
+            return self.t, self.position, self.velocity
+        replay = Replay(self.known())
+        rows = [replay.run.row_now()]
+        for step in range(1, self.steps + 1):
+            replay.to_step(step)
+            rows.append(replay.run.row_now())
+        found = np.concatenate(rows)
+        states = found[:, 1:].reshape(len(found), -1, 6)
+        return found[:, 0], states[:, :, :3], states[:, :, 3:]
+
+    def checked_times(self, times: Any) -> np.ndarray:
+        """Times as an array (k,); UsageError for what is no time of the run."""
+        try:
+            found = np.atleast_1d(np.asarray(times, dtype=float))
+        except (TypeError, ValueError):
+            raise UsageError(f"a time must be a number of seconds, found {times!r}") from None
+        outside = ~((found >= self.t[0]) & (found <= self.t[-1]))
+        if found.ndim != 1 or outside.any():
+            wrong = found[outside][0] if outside.any() else times
+            raise UsageError(
+                f"the run has the times from {self.t[0]:g} to {self.t[-1]:g} s, found {wrong}"
+            )
+        return found
+
+    def at(self, t: Any) -> State:
+        """The State at a time [s], or at an array of times.
+
+        At a step, what was computed. Between two, the interpolation that the method itself goes by:
+        of Implicit and Overdamped the cubic through the stages, whose error is below a quarter of
+        what the method estimates for the step where that is smooth; of all others Hermite's cubic
+        through places and velocities at both ends, whose error goes with h⁴ in places.
+        """
+        wanted = self.checked_times(t)
+        times, position, velocity = self.all_steps
+        states = np.concatenate([position, velocity], axis=2)
+        found = np.empty((len(wanted), *states.shape[1:]))
+        implicit = self.origin is not None and self.origin.has_stages
+        replay = None
+        for place in np.argsort(wanted, kind="stable"):
+            time_ = wanted[place]
+            step = int(np.searchsorted(times, time_, side="right")) - 1
+            if times[step] == time_:
+                found[place] = states[step]
+            elif implicit:
+                replay = replay or Replay(self.known())
+                found[place] = replay.within(float(time_), step, times)[0]
+            else:
+                ends = times[step], times[step + 1], states[step], states[step + 1]
+                found[place] = hermite(*ends, np.array([time_]))[0]
+        if np.ndim(t) == 0:
+            return State(float(wanted[0]), found[0, :, :3], found[0, :, 3:])
+        return State(wanted, found[:, :, :3], found[:, :, 3:])
+
+    def contacts(self, t: float) -> list[Contact]:
+        """All contact points at a time [s]: where, how deep, ξ, and the forces there.
+
+        At a step, just as the run has them. Between two, of `at`'s state and of ξ taken linearly.
+        """
+        wanted = self.checked_times(t)
+        if len(wanted) != 1:
+            raise UsageError("contacts are told at one time: ask for each by itself")
+        return next(Replay(self.known()).instants(wanted, self.all_steps[0])).contacts()
+
+    def forces(self, t: Any = None) -> dict[str, np.ndarray]:
+        """{force: (k, n, 3)} force and torque of each kind on every body [N, N, N m].
+
+        At times (k,) [s], by default ``t``; (n, 3) at a single one. Kinds are named by their
+        classes. At steps they are those that the run was driven by; between two, those of `at`'s
+        state, which of stiff contacts are no better than that.
+        """
+        wanted = self.checked_times(self.t if t is None else t)
+        replay, order = Replay(self.known()), np.argsort(wanted, kind="stable")
+        found = {name: np.zeros((len(wanted), *self.position.shape[1:]))
+                 for name in replay.single_scenes}  # fmt: skip
+        instants = replay.instants(wanted[order], self.all_steps[0])
+        for place, instant in zip(order, instants, strict=True):
+            for name, scene in replay.single_scenes.items():
+                found[name][place] = instant.forces(scene)
+        single = t is not None and np.ndim(t) == 0
+        return {name: values[0] for name, values in found.items()} if single else found
+
+    def energies(self) -> Energies:
+        """Kinetic energies, and the work of each kind of force, at every step."""
+        times, _, velocity = self.all_steps
+        return energies_of(self.known(), times, velocity)
+
+    def go_on(
+        self, until: float | str, *, max_steps: int = 1_000_000, watch: Watch | None = None
+    ) -> "Trajectory":
+        """The Trajectory of the same run gone on with until a later time, from its start.
+
+        ``until`` is in s, or a text such as "20 ms". Contacts keep their history (ξ), the method
+        its step. ``max_steps`` counts from here on; ``watch`` as in System.run. UsageError where
+        the run cannot get any further.
+        """
+        origin = self.known()
+        end: float = in_unit(until, "s", "until")
+        if not is_number(end) or not end > self.t[-1]:
+            raise UsageError(f"until must be a time above {self.t[-1]:g} s, found {until!r}")
+        if not is_whole(max_steps) or max_steps < 0:
+            raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
+        if self.status in ENDED_FOR_GOOD or self.row is not None:
+            reason = self.status.reason if self.row is None else "its study has decided it"
+            raise UsageError(f"this run cannot go on: {reason}")
+        began, run = time.perf_counter(), origin.ended.copy()
+        run.clock[UNTIL] = end
+        run.counts[MAX_STEPS] += max_steps
+        status = watched(run, watch)
+        made = attrs.evolve(origin, ended=run, legs=(*origin.legs, (run.steps, end)))
+        return Trajectory.of(run, status, self.wall_time + time.perf_counter() - began, origin=made)
+
+    def plot(
+        self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES
+    ) -> Any:
+        """A matplotlib Figure: "strip" of frames, "distance" of the centres or "forces" of a pair.
+
+        Forces are those on the second body along the line of centres, above 0 where they push
+        apart. Written to ``file`` if given. UsageError for an unknown one, and where there are not
+        two bodies but for the strip.
+        """
+        from flocsim.io.outputs import figure_rule
+        from flocsim.io.plots.style import save
+        from flocsim.trajectories.figures import drawn
+
+        made = drawn(self, figure, frames)
+        if file is not None:
+            save(made, Path(file), figure_rule())
+        return made
+
+    def animate(self, file: str | os.PathLike, frames: int = ANIMATION_FRAMES) -> None:
+        """Write an animation of a pair as a GIF; UsageError where there are not two bodies."""
+        from flocsim.trajectories.figures import animated
+
+        animated(self, Path(file), frames)
+
+    def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Write the motion to HDF5, which `flocsim info`, `flocsim plot`, xarray and ParaView read.
+
+        A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
+        FileError where it cannot be written.
+        """
+        from flocsim.io.outputs import Output, check_outputs, data_rule
+        from flocsim.io.trajectory import write_trajectory
+
+        check_outputs([Output(file, data_rule(overwrite))], [])
+        facts: dict[str, str | float] = {
+            "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
+            "error": self.error,
+        }  # fmt: skip
+        write_trajectory(
+            Path(file), self.t, self.position, self.velocity, self.shapes, facts,
+            data_rule(overwrite),
+        )  # fmt: skip
+
+    def export(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
+        """Write the motion as GSD for OVITO and HOOMD; ``file`` ends in .gsd.
+
+        Lengths are µm in it, times s; shapes are polygons without their holes. A file that is there
+        is left alone, unless ``overwrite``. UsageError where gsd is not installed
+        (``pip install 'flocsim[formats]'``). For ParaView: `save`.
+        """
+        from flocsim.io.exchange.gsd_file import write_gsd
+        from flocsim.io.outputs import Output, check_outputs, data_rule
+
+        path, rule = Path(file), data_rule(overwrite)
+        if path.suffix.lower() != ".gsd":
+            raise UsageError(f"{path}: what is exported must end in .gsd; ParaView reads `save`'s")
+        check_outputs([Output(path, rule)], [])
+        write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
+
+
+def watched(run: Run, watch: Watch | None) -> Status:
+    """Let a run go on to its end, shown to ``watch`` between all steps: how it ended."""
+    if watch is None:
+        return run.to_end()
+    while (status := run.advance(1)) == Status.PAUSED:
+        motion = run.work.motion[NOW].copy()
+        if watch(State(float(run.clock[TIME]), motion[:, :3], motion[:, 3:])):
+            return Status.STOPPED
+    return status

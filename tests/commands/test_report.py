@@ -1,0 +1,213 @@
+"""`flocsim report`: one page that needs no other file, with the numbers of the results file."""
+
+import argparse
+import base64
+import html
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.commands import report
+from flocsim.commands.reporting import page
+from flocsim.ensembles.studies.study import Study
+from flocsim.errors import FileError, UsageError
+from flocsim.io.plots.results import FIGURES
+from flocsim.io.provenance import provenance
+from flocsim.io.results.file import first_of_each, read_results, write_results
+from flocsim.io.results.schema import OUTCOMES
+from tests.helpers.browser import browser, open_page
+from tests.helpers.small_study import write_small
+from tests.helpers.synthetic_results import make_results
+
+HOSTILE = "<script>document.title='taken'</script><img src=x onerror=alert(1)>'\"&"
+
+
+def call(*words):
+    """Parse the words as the `flocsim` command does, and run."""
+    parser = argparse.ArgumentParser(prog="flocsim")
+    report.add_parser(parser.add_subparsers())
+    args = parser.parse_args(["report", *map(str, words)])
+    return args.run(args)
+
+
+class Page(HTMLParser):
+    """What a page links to, and the rows of its tables."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.links, self.rows, self.ids, self.tags = [], [], set(), []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.tags.append(tag)
+        self.links += [found[name] for name in ("src", "href", "data", "action") if name in found]
+        self.ids |= {found.get("id")}
+        if tag == "tr":
+            self.rows.append([])
+
+    def handle_data(self, data):
+        if self.tags and self.tags[-1] in ("td", "th") and data.strip():
+            self.rows[-1].append(data)
+
+
+def write_made_up(path):
+    """Results that were made up, with hostile words in all that is text."""
+    run = provenance(f'preset = "si"\n# {HOSTILE}\n', 3) | {"wall_time": 12.3, "ranks": 2}
+    run |= {"warnings": json.dumps([f"4 m/s {HOSTILE}"]), "command": HOSTILE}
+    made = make_results((HOSTILE, "II"), vertices=(1, 4), delta=(0.0, 1.0), count=12, run=run)
+    write_results(path, made)
+
+
+@pytest.fixture
+def made_up(tmp_path, monkeypatch):
+    """The folder of made-up results; their page has one figure."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(page, "FIGURES", {"4": FIGURES["4"]})
+    write_made_up("r.h5")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """(results file, text of its page) with all figures and no motion."""
+    path = tmp_path_factory.mktemp("whole") / "r.h5"
+    write_made_up(path)
+    assert call(path, "--no-motion", "--output", path.with_suffix(".html")) == 0
+    return path, path.with_suffix(".html").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """(path, page) of a small study of spheres, with motion."""
+    folder = tmp_path_factory.mktemp("real")
+    results = Study(write_small(folder, vertices="[1]")).run(output=folder / "small.h5")
+    assert call(results.path, "--output", folder / "small.html") == 0
+    return results.path, folder / "small.html"
+
+
+def test_the_page_needs_nothing_else_and_has_all_figures(whole):
+    _, text = whole
+    found = Page(text)
+    assert all(link.startswith(("data:image/svg+xml;base64,", "#")) for link in found.links)
+    assert {link[1:] for link in found.links if link.startswith("#")} <= found.ids
+    pictures = [link for link in found.links if link.startswith("data:")]
+    assert len(pictures) == len(FIGURES)
+    assert all(b"<svg" in base64.b64decode(each.partition(",")[2]) for each in pictures)
+    assert "@import" not in text and "url(" not in text
+
+
+def test_tables_have_both_errors_of_every_condition(whole):
+    path, text = whole
+    results = read_results(path)
+    rows = [row for row in Page(text).rows if len(row) > 15]
+    head, *rows = rows
+    assert head[:3] == ["type", "N", "δ/δ_max"] and len(rows) == np.prod(results.shape)
+    table = results.probabilities
+    for row, place in zip(rows, np.ndindex(*results.shape), strict=True):
+        assert row[1] == str(results.vertices[place[1]])
+        value, low, high, numerical = (table[f"pr_a{end}"][place]
+                                       for end in ("", "_low", "_high", "_numerical"))  # fmt: skip
+        added = "?" if np.isnan(numerical) else f"{numerical:.3f}"
+        expected = f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}" if value == value else "–"
+        assert row[head.index("Pr[A]")] == expected
+        assert row[head.index("D")] == str(table["n_class"][place][3])
+
+
+def test_what_a_file_says_of_itself_cannot_become_code(whole):
+    _, text = whole
+    assert HOSTILE not in text and html.escape(HOSTILE) in text
+    assert Page(text).tags.count("script") == 1 and "onerror" not in re.sub("&lt;.*", "", text)
+    assert re.search(r"default-src 'none'; .* script-src 'sha256-[\w+/=]{44}'\"", text)
+
+
+def test_a_page_is_written_anew_unless_somebody_changed_it(made_up, capsys):
+    assert call("r.h5", "--no-motion") == 0
+    assert capsys.readouterr().out == "r.html\n"
+    first = (made_up / "r.html").read_bytes()
+    call("r.h5", "--no-motion")
+    assert (made_up / "r.html").read_bytes() == first
+    (made_up / "r.html").write_bytes(first.replace(b"<h1>", b"<h1>My "))
+    with pytest.raises(UsageError, match="exists already and is left as it is"):
+        call("r.h5", "--no-motion")
+    call("r.h5", "--no-motion", "--overwrite")
+    assert b"My " in (made_up / "r.1.html").read_bytes()
+
+
+def test_wrong_names_are_refused(made_up):
+    with pytest.raises(UsageError, match=r"must end in \.html"):
+        call("r.h5", "--output", "r.pdf")
+    with pytest.raises(FileError, match=r"absent\.h5"):
+        call("absent.h5")
+
+
+def test_the_first_of_each_outcome_has_the_most_vertices(made_up):
+    results = read_results("r.h5")
+    found = first_of_each("r.h5")
+    outcome = results.replicates["outcome"]
+    for code, name in enumerate(OUTCOMES):
+        places = np.argwhere(outcome == code)
+        if name in found:
+            assert outcome[found[name]] == code
+            assert results.vertices[found[name][1]] == results.vertices[places[:, 1]].max()
+        else:
+            assert not len(places)
+
+
+def test_what_cannot_be_run_again_is_said(made_up, capsys):
+    assert call("r.h5") == 0
+    said = capsys.readouterr().out
+    assert "class A is not shown in motion: " in said and said.endswith("r.html\n")
+    assert "Not shown in motion: " in (made_up / "r.html").read_text("utf-8")
+
+
+def test_motion_is_that_of_the_replicate(real):
+    path, file = real
+    text = file.read_text("utf-8")
+    found = first_of_each(path)
+    classes = [name for name in "ABCD" if name in found]
+    motions = [json.loads(html.unescape(each))
+               for each in re.findall(r"data-frames='([^']*)'", text)]  # fmt: skip
+    assert len(motions) == len(classes) > 0
+    opened = flocsim.open(path)
+    for name, motion in zip(classes, motions, strict=True):
+        t, v, d, k = found[name]
+        run = opened.replicate(k, opened.types[t], int(opened.vertices[v]), float(opened.delta[d]))
+        pose = np.array(motion["pose"])
+        assert motion["t"][0] == run.t[0] and motion["t"][-1] == pytest.approx(run.t[-1], rel=1e-5)
+        np.testing.assert_allclose(
+            pose[-1, 1, :2], 1e6 * (run.position[-1, 1, :2] - run.position[-1, 0, :2]), rtol=1e-5
+        )
+        shown = motion["shown"]
+        assert motion["t"][shown] == pytest.approx(run.row["t_collision"], rel=1e-2)
+        lengths = {len(motion[key]) for key in ("t", "eye", "pose", "dot", "contacts", "words")}
+        assert lengths == {len(motion["t"])}
+        assert f"d_c = {1e6 * run.row['d_c_last']:.4g} µm" in motion["words"][-1]
+
+
+def test_a_browser_shows_the_page_and_moves_it(real, tmp_path):
+    from PIL import Image
+
+    browser()
+    _, file = real
+    dom, said, picture = open_page(file, tmp_path, height=5000)
+    assert not said
+    assert "d_c = " in re.search("<output>(.*?)</output>", dom)[1]
+    colours = Image.open(picture).convert("RGB").getcolors(2**24)
+    assert len(colours) > 100 and max(colours)[0] < 0.98 * 1200 * 5000
+    # The page allows no script but its own: one that presses the button goes without that.
+    press = "<script>document.querySelector('.motion button').click()</script></body>"
+    open_text = re.sub("<meta http-equiv[^>]*>", "", file.read_text("utf-8"))
+    (tmp_path / "played.html").write_text(open_text.replace("</body>", press), "utf-8")
+    moved, said, _ = open_page(tmp_path / "played.html", tmp_path)
+    assert not said and "Pause" in moved
+    place = "<output>(.*?)</output>"
+    assert re.search(place, moved)[1] != re.search(place, dom)[1]
+    # In the page itself no such script runs.
+    (tmp_path / "kept.html").write_text(file.read_text("utf-8").replace("</body>", press), "utf-8")
+    kept, said, _ = open_page(tmp_path / "kept.html", tmp_path)
+    assert said and "Pause</button>" not in kept

@@ -1,0 +1,117 @@
+"""`flocsim shapes`: what is listed, selected and merged of libraries."""
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim.__main__ import main
+from flocsim.io.shapes.library import (
+    ShapeEntry,
+    StoredFit,
+    read_library,
+    read_settings,
+    write_library,
+)
+
+
+def entry(name, radius, pixel=1e-6, spheroradius=1.0, counts=(1, 4)):
+    corners = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]) * radius * pixel
+    fits = {n: StoredFit(corners[:n], pixel, 10.0 / n) for n in counts}
+    image = name.partition("#")[0]
+    area = int(np.pi * radius**2)
+    return ShapeEntry(name, image, pixel, (3.0, 4.0), area, radius, spheroradius, fits)
+
+
+@pytest.fixture
+def libraries(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    one = [entry("a.png#1", 5.0), entry("a.png#2", 10.0), entry("b,c.png#1", 20.0)]
+    write_library("one.h5", one, {"method": "pattern", "inscribed": False})
+    two = [entry("a.png#1", 6.0, 2e-6), entry("d.png#1", 7.0, 2e-6)]
+    write_library("two.h5", two, {"method": "even", "inscribed": False})
+    return tmp_path
+
+
+def names(path):
+    return [each.floc_id for each in read_library(path)]
+
+
+def refused(capsys, *words):
+    assert main(["shapes", *words]) == 2
+    output, errors = capsys.readouterr()
+    [line] = errors.splitlines()
+    assert output == ""
+    return line
+
+
+def test_all_flocs_are_listed_with_their_measured_size(libraries, capsys):
+    assert main(["shapes", "list", "one.h5", "two.h5"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "one.h5: 3 flocs" and lines[5] == "two.h5: 2 flocs"
+    assert lines[3].split() == ["a.png#2", "10", "1", "1", "2.50"]
+    assert lines[7].split() == ["a.png#1", "12", "2", "1", "2.50"]
+
+
+@pytest.mark.parametrize(
+    ("words", "left"),
+    [
+        (("--keep", "a.png#2,b,c.png#1"), ["a.png#2", "b,c.png#1"]),
+        (("--drop", "a.png#2"), ["a.png#1", "b,c.png#1"]),
+        (("--picture", "a*"), ["a.png#1", "a.png#2"]),
+        (("--min-radius", "8e-6", "--max-radius", "10e-6"), ["a.png#2"]),
+        (("--picture", "a.png", "--max-radius", "6e-6"), ["a.png#1"]),
+    ],
+)
+def test_flocs_are_selected(libraries, capsys, words, left):
+    before = {each.floc_id: each for each in read_library("one.h5")}
+    assert main(["shapes", "select", "one.h5", *words, "-o", "some.h5"]) == 0
+    assert f"some.h5: {len(left)} floc" in capsys.readouterr().out
+    assert names("some.h5") == left
+    for each in read_library("some.h5"):
+        for field in ("image", "pixel_size", "centroid", "area", "equivalent_radius"):
+            assert getattr(each, field) == getattr(before[each.floc_id], field)
+        assert np.array_equal(each.fits[4].vertices, before[each.floc_id].fits[4].vertices)
+    assert read_settings("some.h5") == {"method": "pattern", "inscribed": False}
+    assert main(["shapes", "list", "one.h5", *words]) == 0
+    assert f"one.h5: {len(left)} floc" in capsys.readouterr().out
+
+
+def test_a_name_stands_for_all_spheroradii_of_a_floc(libraries):
+    write_library("r.h5", [entry(f"a.png#{k} r={r}", 9.0, 1e-6, r) for k in (1, 2) for r in (1, 2)])
+    assert main(["shapes", "select", "r.h5", "--keep", "a.png#1", "-o", "s.h5"]) == 0
+    assert names("s.h5") == ["a.png#1 r=1", "a.png#1 r=2"]
+    assert main(["shapes", "select", "r.h5", "--drop", "a.png#1 r=2", "-o", "t.h5"]) == 0
+    assert names("t.h5") == ["a.png#1 r=1", "a.png#2 r=1", "a.png#2 r=2"]
+
+
+def test_merged_flocs_keep_sizes_and_get_names_of_their_own(libraries, capsys):
+    (libraries / "later").mkdir()
+    write_library("later/two.h5", [attrs.evolve(entry("a.png#1", 8.0), image="x.png")])
+    assert main(["shapes", "merge", "one.h5", "two.h5", "later/two.h5", "-o", "all.h5"]) == 0
+    assert "all.h5: 6 flocs of 3 libraries" in capsys.readouterr().out
+    merged = read_library("all.h5")
+    assert [(e.floc_id, e.image, e.pixel_size, e.equivalent_radius) for e in merged] == [
+        ("a.png#1", "a.png", 1e-6, 5.0), ("a.png#2", "a.png", 1e-6, 10.0),
+        ("b,c.png#1", "b,c.png", 1e-6, 20.0), ("two/a.png#1", "two/a.png", 2e-6, 6.0),
+        ("two/d.png#1", "two/d.png", 2e-6, 7.0), ("two/two/a.png#1", "two/two/x.png", 1e-6, 8.0),
+    ]  # fmt: skip
+    settings = {"method": "pattern, even, unknown", "inscribed": "False, unknown"}
+    assert read_settings("all.h5") == settings
+
+
+def test_what_cannot_be_is_said_in_one_line(libraries, capsys):
+    write_library("other.h5", [entry("e.png#1", 5.0, counts=(1, 3))])
+    assert "fit both at the same --vertices" in refused(
+        capsys, "merge", "one.h5", "other.h5", "-o", "x.h5"
+    )
+    assert "no floc 'z#1'" in refused(capsys, "select", "one.h5", "--keep", "z#1", "-o", "x.h5")
+    small = ("--max-radius", "1e-9", "-o", "x.h5")
+    assert "none of 3 flocs" in refused(capsys, "select", "one.h5", *small)
+    for output, told in (("one.h5", "which is read"), ("two.h5", "exists already")):
+        assert told in refused(capsys, "select", "one.h5", "-o", output)
+    assert "which is read" in refused(
+        capsys, "merge", "one.h5", "two.h5", "-o", "two.h5", "--overwrite"
+    )
+    assert "--min-radius takes" in refused(
+        capsys, "select", "one.h5", "--min-radius", "8 um", "-o", "x.h5"
+    )

@@ -1,0 +1,14 @@
+"""A small study of spheres, run once for all tests of this folder."""
+
+import pytest
+
+import flocsim
+from tests.helpers.small_study import write_small
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory):
+    """Its results, from two processes; its config is small.toml beside them."""
+    folder = tmp_path_factory.mktemp("finished")
+    study = flocsim.Study(write_small(folder)).with_({"shapes.vertices": [1]})
+    return study.run(jobs=2, output=folder / "small.h5")

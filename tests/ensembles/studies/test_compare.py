@@ -1,0 +1,133 @@
+"""Differences between two results files: intervals from the literature, pairs, what is refused."""
+
+import json
+
+import attrs
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.ensembles.estimates.paired import between, newcombe
+from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.errors import UsageError
+from flocsim.io.results.file import read_results, write_results
+from tests.helpers.synthetic_results import make_results
+
+
+def test_independent_samples_as_published():
+    # R. G. Newcombe, Stat. Med. 17 (1998) 873, table II (a), method 10.
+    found = between(56, 70, 48, 80)
+    np.testing.assert_allclose(found, (0.2, 0.0524, 0.3339), atol=5e-5)
+    assert np.isnan(between(0, 0, 1, 2)).all()
+
+
+def changed(path, results, **columns):
+    """The results with other columns of replicates, counted anew, in a file."""
+    rows = results.replicates | columns
+    codes = [rows[name] for name in ("outcome", "inside", "bond")]
+    again = [rows[f"checked_{name}"] for name in ("outcome", "inside", "bond")]
+    table = tabulate(*codes, *again)
+    made = attrs.evolve(results, replicates=rows, probabilities=table, pooled={}, differences={})
+    write_results(path, made)
+    return path
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Two files of one study: in the second, every second aggregate inside has departed."""
+    first = make_results()
+    write_results(tmp_path / "a.h5", first)
+    first = read_results(tmp_path / "a.h5")
+    outcome, bond = (first.replicates[name].copy() for name in ("outcome", "bond"))
+    departs = (outcome == 0) & (np.arange(outcome.shape[-1]) % 2 == 0)
+    outcome[departs], bond[departs] = 1, 255
+    return first, tmp_path / "a.h5", changed(tmp_path / "b.h5", first, outcome=outcome, bond=bond)
+
+
+def test_pairs_are_used_where_the_draws_are_common(files):
+    first, a, b = files
+    comparison = flocsim.compare(flocsim.open(a), flocsim.open(b))
+    assert comparison.paired and comparison.pairs == first.count
+    one, other = read_results(a), read_results(b)
+    found = comparison.arrays["pr_a"]
+    change = other.probabilities["pr_a"] - one.probabilities["pr_a"]
+    np.testing.assert_allclose(found["difference"], change, atol=1e-15)
+    # No replicate has changed the other way.
+    place = (-1, -1, -1)
+    outcomes = [each.replicates["outcome"][place] for each in (one, other)]
+    held = [np.isin(each, (0, 2)) for each in outcomes]
+    decided = outcomes[0] < 4
+    cells = [
+        (held[0] & held[1])[decided].sum(), (held[1] & ~held[0])[decided].sum(),
+        (held[0] & ~held[1])[decided].sum(), (~held[0] & ~held[1])[decided].sum(),
+    ]  # fmt: skip
+    assert cells[1] == 0 < cells[2]
+    assert found["difference_low"][place] == newcombe(*cells)[1]
+    alone = between(held[1][decided].sum(), decided.sum(), held[0][decided].sum(), decided.sum())
+    assert found["difference_high"][place] - found["difference_low"][place] < alone[2] - alone[1]
+    assert not comparison.arrays["pr_inside"]["difference"].any()
+
+
+def test_other_draws_are_independent_samples(files, tmp_path):
+    first, a, _ = files
+    other = changed(tmp_path / "c.h5", first, angle_i=first.replicates["angle_i"] + 1e-9)
+    comparison = flocsim.compare(flocsim.open(a), flocsim.open(other))
+    assert not comparison.paired and "independent" in repr(comparison)
+    counts = first.probabilities["n_class"]
+    held, decided = counts[..., [0, 2]].sum(-1), counts.sum(-1)
+    np.testing.assert_array_equal(
+        comparison.arrays["pr_a"]["difference_high"], between(held, decided, held, decided)[2]
+    )
+
+
+def test_conditions_that_both_have_are_found_by_their_names(files, tmp_path):
+    first, a, _ = files
+    fewer = attrs.evolve(
+        first, types=first.types[::-1][:2], delta=first.delta[1:],
+        replicates={k: v[::-1][:2, :, 1:] for k, v in first.replicates.items()},
+        probabilities={k: v[::-1][:2, :, 1:] for k, v in first.probabilities.items()},
+        pooled={}, differences={}, radii={k: v[::-1][:2] for k, v in first.radii.items()},
+    )  # fmt: skip
+    write_results(tmp_path / "d.h5", fewer)
+    comparison = flocsim.compare(flocsim.open(a), flocsim.open(tmp_path / "d.h5"))
+    assert comparison.types == first.types[1:] and len(comparison.delta) == 4
+    assert not np.nan_to_num(comparison.arrays["pr_a"]["difference"]).any()
+    none = attrs.evolve(fewer, types=("X", "Y"))
+    write_results(tmp_path / "e.h5", none)
+    with pytest.raises(UsageError, match="no types in common"):
+        flocsim.compare(flocsim.open(a), flocsim.open(tmp_path / "e.h5"))
+
+
+def comparison_without_numerics(a, b):
+    """The Comparison of two files whose numerical errors were zero."""
+    found = flocsim.compare(flocsim.open(a), flocsim.open(b))
+    none = np.zeros_like(found.arrays["pr_a"]["numerical"])
+    return attrs.evolve(found, arrays={"pr_a": found.arrays["pr_a"] | {"numerical": none}})
+
+
+def test_the_command_says_what_differs(files, capsys):
+    _, a, b = files
+    assert main(["compare", str(a), str(b)]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "replicates that both have, paired" in said and "-0.211 [-0.315, -0.097] +-0.632\n" in said
+    )
+    exact = comparison_without_numerics(a, b)
+    assert "-0.211 [-0.315, -0.097] +-0.000 *" in exact.table()
+    opened = flocsim.open(a), flocsim.open(b)
+    for each, value in zip(opened, (1.0, 2.0), strict=True):
+        each.run["identity"] = json.dumps({"forces.contact.k_n": value})
+    line = "forces.contact.k_n is 1.0 in the first, 2.0 in the second"
+    comparison = flocsim.compare(*opened)
+    assert comparison.changes == (line,) and comparison.table().startswith(line)
+    with pytest.raises(UsageError, match="probability must be one of"):
+        comparison.table("pr_class")
+
+
+def test_tables_have_the_numbers(files):
+    pytest.importorskip("xarray")
+    _, a, b = files
+    comparison = flocsim.compare(flocsim.open(a), flocsim.open(b))
+    frame, data = comparison.to_pandas("pr_a"), comparison.to_xarray("pr_a")
+    np.testing.assert_array_equal(frame["difference"].to_numpy(), data["difference"].values.ravel())

@@ -1,0 +1,97 @@
+"""Doubts of a study: in the terms of its config, on the terminal, and in the file."""
+
+import json
+
+from flocsim.commands.info import results_text
+from flocsim.ensembles import cli
+from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.dry_run import dry_run
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.io.results.file import read_overview, read_results
+from tests.helpers.small_study import small_config, write_small
+
+USUAL = {
+    "bodies": {"density": 2650.0},
+    "fluid": {"buoyancy": True},
+    "scene": {"types": ["I"]},
+    "forces": {"contact": {"k_n": 200.0}},
+}
+WILD = USUAL | {
+    "fluid": {"viscosity": 1.0, "buoyancy": False},
+    "forces": {"van_der_waals": {"hamaker": 5.0}, "contact": {"k_n": 200.0}},
+    "shapes": {"radius": "9 um"},
+    "zone": {"distance": "5 um"},
+}
+
+
+def test_a_usual_study_is_not_doubted(tmp_path):
+    assert study_doubts(small_config(tmp_path, USUAL)) == []
+
+
+def test_doubts_have_the_names_of_the_config(tmp_path):
+    lines = study_doubts(small_config(tmp_path, WILD))
+    starts = ["forces.van_der_waals.hamaker = 5 J", "fluid.viscosity = 1 Pa s", "buoyancy is off",
+              "shapes.radius over the smallest equivalent radius = 0.548"]  # fmt: skip
+    assert [line.startswith(start) for line, start in zip(lines, starts, strict=True)] == [True] * 4
+    assert lines[2].endswith("give fluid.buoyancy = true")
+
+
+def test_the_fastest_body_of_all_types_is_held_to_the_drag_law(tmp_path):
+    [line] = study_doubts(small_config(tmp_path))
+    assert "r_eq = 23.02 um settles at 84.58 mm/s: Re = 4.4" in line
+    assert "forces.drag takes law =" in line
+    law = {"forces": {"drag": {"law": "schiller_naumann"}}}
+    assert study_doubts(small_config(tmp_path, law)) == []
+
+
+OWN = """\
+import attrs
+from flocsim.forces import ContactForce
+
+
+@attrs.frozen
+class Hertz(ContactForce):
+    @staticmethod
+    def kernel(contact):
+        return 1e3 * max(contact.overlap, 0.0) ** 1.5, 0.0
+"""
+
+
+def test_an_own_contact_beside_the_presets(tmp_path):
+    (tmp_path / "own_hertz.py").write_text(OWN)
+    mine = USUAL | {"forces": {"mine": {"class": "own_hertz:Hertz"}, "contact": {"k_n": 200.0}}}
+    [line] = study_doubts(small_config(tmp_path, mine))
+    assert line.startswith("forces.contact and forces.mine both act")
+    assert line.endswith("give forces.contact = false")
+    alone = USUAL | {"forces": {"mine": {"class": "own_hertz:Hertz"}, "contact": False}}
+    assert study_doubts(small_config(tmp_path, alone)) == []
+
+
+def test_numbers_of_every_body(tmp_path):
+    facts = settling_facts(small_config(tmp_path))
+    assert [(each["type"], each["body"]) for each in facts] == [
+        ("I", "i"), ("I", "j"), ("III", "i"), ("III", "j"),
+    ]  # fmt: skip
+    held = settling_facts(small_config(tmp_path, {"scene": {"receiver": "fixed"}}))
+    assert [each["body"] for each in held] == ["j", "j"]
+
+
+def test_a_dry_run_tells_numbers_and_doubts(tmp_path):
+    lines = dry_run(small_config(tmp_path, WILD), 1, pilot=False).splitlines()
+    assert sum(line.startswith("warning: ") for line in lines) == 4
+    [told] = [line for line in lines if line.startswith("    at terminal speed: body i Re = ")]
+    assert "; body j Re = " in told and "St = " in told
+
+
+def test_a_run_tells_them_once_and_keeps_them(folder, capsys):
+    write_small(folder, name="small.toml", vertices="[1]", replicates=1, delta="[0.0]")
+    assert cli.main(["small.toml"]) == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("flocsim: warning: a body of r_eq = 23.02 um settles at 84.58 mm/s")
+    run = read_results(folder / "small.h5").run
+    assert [f"flocsim: warning: {each}" for each in stored(run, "warnings")] == [line]
+    assert stored(run, "settling") == settling_facts(small_config(folder))
+    assert json.loads(run["settling"])[1]["reynolds"] > 4.0
+    text = results_text("small.h5", *read_overview(folder / "small.h5"))
+    assert line.removeprefix("flocsim: ") in text.splitlines()
+    assert "I: i Re 2.2 St " in text

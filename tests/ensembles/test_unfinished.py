@@ -1,0 +1,95 @@
+"""What a running study has so far: the same counts as the rows, without lock or touch."""
+
+import numpy as np
+import pytest
+
+from flocsim.__main__ import main
+from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
+from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.ensembles.unfinished import journal_of, read_unfinished
+from flocsim.errors import FileError
+from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import SESSION, encode
+from tests.helpers.synthetic_results import make_results
+
+RESULTS = make_results(types=("I", "III"), vertices=(1, 8), delta=(0.0, 1.0), count=40)
+ASKED = {"types": ["I", "III"], "vertices": [1, 8], "delta": [0.0, 1.0], "replicates": 40}
+
+
+def write_journal(path, asked=ASKED):
+    """A locked journal: all of type I, of type III replicates 10 to 25 at N = 8, delta = 0."""
+    session = {
+        "identity": {}, "short": "k", "layout": layout(), "date": "2020", "command": "x y",
+        "asked": asked,
+    }  # fmt: skip
+    journal = Journal(path)
+    journal.append(encode(SESSION, session))
+    pieces = [((0, v, d), 0, 40) for v in range(2) for d in range(2)] + [((1, 1, 0), 10, 25)]
+    for (t, v, d), first, stop in pieces:
+        rows = np.zeros(stop - first, ROW)
+        for name in COLUMNS:
+            rows[name] = RESULTS.replicates[name][t, v, d, first:stop]
+        rows["failure"] = 0
+        condition = Condition(
+            RESULTS.types[t], int(RESULTS.vertices[v]), float(RESULTS.delta[d])
+        )  # fmt: skip
+        # Some replicates twice, as a run that was killed while it wrote leaves them.
+        for part in ([0, 30], [20, 40]) if first == 0 else ([0, 15],):
+            journal.append(chunk_record(condition, first + part[0], rows[slice(*part)], "k"))
+    return journal
+
+
+def test_the_counts_are_those_of_the_rows_there_are(tmp_path):
+    journal = write_journal(tmp_path / "r.h5.journal")
+    before = (tmp_path / "r.h5.journal").read_bytes()
+    found = read_unfinished(tmp_path / "r.h5.journal")
+    codes = [RESULTS.replicates[name] for name in ("outcome", "inside", "bond")]
+    again = [RESULTS.replicates[f"checked_{name}"] for name in ("outcome", "inside", "bond")]
+    whole = tabulate(*codes, *again)
+    part = tabulate(*(each[1:, 1:, :1, 10:25] for each in [*codes, *again]))
+    for name in ("n_class", "pr_a", "pr_a_low", "n_checked", "pr_inside_numerical"):
+        table = found.results.probabilities[name]
+        # The numerical error looks at a whole type: of the first one all is there.
+        assert np.array_equal(table[0], whole[name][0], equal_nan=True), name
+        if "numerical" not in name:
+            assert np.array_equal(table[1, 1, 0], part[name][0, 0, 0], equal_nan=True), name
+    assert found.results.probabilities["n_total"].tolist() == [
+        [[40, 40], [40, 40]],
+        [[0, 0], [15, 0]],
+    ]
+    assert found.progress == "unfinished: 175 of 320 replicates so far"
+    assert (tmp_path / "r.h5.journal").read_bytes() == before and journal.is_as_left()
+    journal.file.close()
+
+
+def test_info_and_plot_of_results_that_are_not_there_yet(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    journal = write_journal(tmp_path / "r.h5.journal")  # and locked by this job
+    for name in ("r.h5", "r.h5.journal"):
+        assert main(["info", name]) == 0
+        told = capsys.readouterr().out
+        assert "unfinished: 175 of 320 replicates so far" in told
+        assert "0 to 40 in each of 8 conditions, 40 planned" in told
+    assert main(["plot", "r.h5", "--figures", "delta,efficiency"]) == 0
+    assert capsys.readouterr().out.split() == ["r-delta.png", "r-efficiency.png"]
+    journal.file.close()
+
+
+def test_a_journal_that_does_not_say_what_was_asked_tells_what_it_has(tmp_path):
+    write_journal(tmp_path / "r.h5.journal", asked=None).file.close()
+    found = read_unfinished(tmp_path / "r.h5.journal")
+    assert found.results.types == ("I", "III") and found.asked == 0
+    assert found.progress == "unfinished: 175 replicates so far"
+
+
+def test_what_has_no_replicate_yet_is_said_in_one_line(tmp_path):
+    Journal(tmp_path / "r.h5.journal").file.close()
+    with pytest.raises(FileError, match="has just begun"):
+        read_unfinished(tmp_path / "r.h5.journal")
+
+
+def test_finished_results_are_read_themselves(tmp_path):
+    write_journal(tmp_path / "r.h5.journal").file.close()
+    assert journal_of(tmp_path / "r.h5") == tmp_path / "r.h5.journal"
+    (tmp_path / "r.h5").write_bytes(b"")
+    assert journal_of(tmp_path / "r.h5") is None

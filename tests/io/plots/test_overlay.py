@@ -1,0 +1,61 @@
+"""The overlay: everything that was found is outlined, numbered, inside the frame, visible."""
+
+import numpy as np
+import pytest
+
+from flocsim.geometry.fit.fit import Fit, fit_mask
+from flocsim.io.images.pictures import segment
+from flocsim.io.plots.overlay import FLOC_COLOUR, REASON_COLOURS, draw_overlay, stretched
+from flocsim.io.plots.style import save
+
+
+@pytest.mark.parametrize("name", [r"a$\frac{b.png", "$x^$", "a\x1b[31m\n.png"])
+def test_a_picture_of_any_name_is_drawn(name, tmp_path):
+    save(draw_overlay(np.zeros((20, 30)), [], f"{name}: 0 flocs", []), tmp_path / "o.png")
+
+
+def corners(*places, shape=(120, 160)):
+    """A bright-on-black picture of disks (x, y, radius)."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return sum((np.hypot(x - cx, y - cy) <= r) * 0.05 for cx, cy, r in places)
+
+
+def test_what_was_left_out_is_outlined_and_named_inside_the_frame(tmp_path):
+    grey = corners((60, 60, 15), (0, 0, 12), (159, 119, 12), (0, 119, 9), (150, 5, 2.5))
+    found = segment(grey)
+    (region,) = found.regions
+    fit = fit_mask(region.mask, vertices=8)
+    assert isinstance(fit, Fit)
+    figure = draw_overlay(grey, [(region, fit)], "title", found.rejected)
+    figure.canvas.draw()
+    picture, *_ = figure.axes
+    texts = {text.get_text(): text for text in picture.texts}
+    assert sorted(texts) == [
+        "1",
+        "2 at the border",
+        "3 too small",
+        "4 at the border",
+        "5 at the border",
+    ]
+    frame = picture.get_window_extent()
+    for text in texts.values():
+        box = text.get_window_extent()
+        assert frame.x0 - 1 <= box.x0 and box.x1 <= frame.x1 + 1
+        assert frame.y0 - 1 <= box.y0 and box.y1 <= frame.y1 + 1
+    assert len(picture.collections) == len(found.rejected)
+    assert texts["3 too small"].get_color() == REASON_COLOURS["too small"]
+    key = [entry.get_text() for entry in figure.legends[0].get_texts()]
+    assert key == ["1 fitted", "3 at the border", "1 too small"]
+    outline = picture.lines[0]
+    assert outline.get_color() == FLOC_COLOUR
+    assert np.allclose(outline.get_xydata().mean(axis=0), (60, 60), atol=2)
+
+
+def test_a_dim_picture_becomes_visible():
+    shown = stretched(corners((60, 60, 15)))
+    assert shown.max() == 1.0 and shown.min() == 0.0
+    light = np.linspace(0.01, 0.5, 100)[None] * np.ones((50, 1))
+    assert np.percentile(stretched(light**3), 20) > 0.12
+    assert np.percentile(stretched(light), 20) == pytest.approx(0.35, abs=0.01)
+    for flat in (np.zeros((5, 5)), np.ones((5, 5)), np.full((5, 5), 0.3)):
+        assert np.isfinite(stretched(flat)).all()
