@@ -260,6 +260,11 @@ def work_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, capacity: 
     )
 
 
+def copy_of(work: Work) -> Work:
+    """The same work in arrays of its own."""
+    return Work(*(array.copy() for array in work))
+
+
 def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
 

@@ -27,8 +27,7 @@ from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.plausibility.doubts import doubts_of
-from flocsim.plausibility.reynolds import all_settled
-from flocsim.plausibility.settling import terminal_speed
+from flocsim.plausibility.reynolds import all_settled, settled
 
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}
@@ -368,8 +367,8 @@ def body_scales(system):
             0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
         )
         resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
-        speed = terminal_speed(system, body)
-        settling.append(radius / speed if speed > 0.0 else math.inf)
+        alone = settled(system, body)
+        settling.append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)
         relaxation.append(decay_time(body.mass, resistance))
     return [
         Scale("Stokes relaxation", min(relaxation), True),

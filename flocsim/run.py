@@ -18,6 +18,7 @@ from flocsim.arrays import (
     UNTIL,
     Scene,
     Work,
+    copy_of,
     with_capacity,
 )
 from flocsim.integrators.base import Integrator, Status
@@ -82,7 +83,7 @@ class Run:
     def copy(self) -> "Run":
         """The same run with arrays of its own: either may go on."""
         other = copy.copy(self)
-        other.work = Work(*(array.copy() for array in self.work))
+        other.work = copy_of(self.work)
         other.clock, other.counts = self.clock.copy(), self.counts.copy()
         other.observed, other.record = self.observed.copy(), self.record.copy()
         other.saved = list(self.saved)

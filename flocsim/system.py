@@ -18,7 +18,7 @@ from flocsim.arrays import (
     TOLERANCE,
     UNTIL,
     Scene,
-    Work,
+    copy_of,
     work_of,
 )
 from flocsim.body import Body, Fluid, scene_of
@@ -251,7 +251,7 @@ class System:
             for name in ("first", "vertices")
         ) or not np.array_equal(run.scene.bodies[:, RADIUS], scene.bodies[:, RADIUS]):
             raise UsageError("start must be a run of the same shapes in the same order")
-        run.work = Work(*(array.copy() for array in origin.ended.work))
+        run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
         run.work.tally[EVALUATIONS] = 0
         run.clock[TIME] = start.t[-1]

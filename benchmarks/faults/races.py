@@ -237,11 +237,19 @@ def unfinished_journal(root, references):
     while not path.exists():
         results.unlink(missing_ok=True)  # of a job that was not stopped in time
         job = subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL)
-        while job.poll() is None and not (path.exists() and path.stat().st_size > half):
+        while job.poll() is None and size_of(path) <= half:
             time.sleep(0.002)
         job.kill()
         job.wait()
     return path
+
+
+def size_of(path):
+    """Bytes of a file; 0 where there is none, which may change between a look and the next."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ from argparse import Namespace
 from collections import Counter
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, efficiency_lines, format_table
+from flocsim.ensembles.report import checked_line, efficiency_lines, format_table, undecided_line
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
@@ -20,9 +21,9 @@ from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io import trajectory
 from flocsim.io.opening import kind_of
 from flocsim.io.results import sweep_file
-from flocsim.io.results.file import OUTCOMES, read_overview, read_results
+from flocsim.io.results.file import OUTCOMES, Totals, read_overview, read_results
 from flocsim.io.results.layout import FORMAT
-from flocsim.io.results.schema import BONDS
+from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
@@ -81,7 +82,7 @@ def text_of(path):
 def library_text(path):
     entries = read_library(path)
     images = sorted({entry.image for entry in entries})
-    sizes = [1e6 * entry.equivalent_radius * entry.pixel_size for entry in entries]
+    sizes = [1e6 * entry.measured_radius for entry in entries]
     facts = [
         ("shapes", f"{len(entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
@@ -94,27 +95,45 @@ def library_text(path):
     return "\n".join([f"{path}: a shape library", "", *lines, "", format_errors(entries)])
 
 
-def results_text(path, results, totals):
+@attrs.frozen
+class Summary:
+    """What a results file says of its study: ``facts`` and ``origin`` as [(name, value)], warnings,
+    and the replicates that failed, a line each."""
+
+    facts: list[tuple[str, str]]
+    origin: list[tuple[str, str]]
+    warnings: list[str]
+    failed: list[str]
+
+
+def summary(path: str, results: Results, totals: Totals) -> Summary:
+    """The Summary of a results file; FileError where what it says of its run cannot be read."""
+    run = results.run
     try:
         facts = conditions(results) + sizes(results, totals) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
-        if choice := stored(results.run, "accuracy"):
-            facts += [("accuracy", visible(line, "")) for line in choice_lines(choice)]
-        facts += settling(results.run) + origin(results.run)
-        doubts = [visible(line, "") for line in stored(results.run, "warnings")]
-        notes = stored(results.run, "failed")
+        if choice := stored(run, "accuracy"):
+            facts += [("accuracy", line) for line in choice_lines(choice)]
+        warnings = [str(line) for line in stored(run, "warnings")]
+        warnings += filter(None, [undecided_line(results)])
+        failed = [describe_note(note) for note in stored(run, "failed")]
+        return Summary(facts + settling(run), origin(run), warnings, failed)
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error
+
+
+def results_text(path, results, totals):
+    said = summary(path, results, totals)
+    facts = said.facts + said.origin
     width = max(len(name) for name, _ in facts)
     lines = [f"{path}: results of a collision ensemble", ""]
-    lines += [f"{name:<{width}}  {value}" for name, value in facts]
-    if doubts:
-        lines += ["", *(f"warning: {line}" for line in doubts)]
-    if notes:
-        shown = [visible(describe_note(note), keep="") for note in notes[:MOST_FAILURES]]
-        lines += ["", *(f"failed: {note}" for note in shown)]
-    if len(notes) > MOST_FAILURES:
-        lines.append(f"and {len(notes) - MOST_FAILURES} more in run/failed")
+    lines += [f"{name:<{width}}  {visible(value, '')}" for name, value in facts]
+    if said.warnings:
+        lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
+    if said.failed:
+        lines += ["", *(f"failed: {visible(line, '')}" for line in said.failed[:MOST_FAILURES])]
+    if len(said.failed) > MOST_FAILURES:
+        lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
     return "\n".join([*lines, *efficiency_block(results), "", table])
 

@@ -64,7 +64,7 @@ def run_list(args: argparse.Namespace) -> int:
         print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
         for each in entries:
             cells = [
-                f"{MICRO * measured_radius(each):8.4g}", f"{MICRO * each.pixel_size:8.4g}",
+                f"{MICRO * each.measured_radius:8.4g}", f"{MICRO * each.pixel_size:8.4g}",
                 f"{each.spheroradius:8g}",
                 *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
             ]  # fmt: skip
@@ -162,7 +162,7 @@ def selected(entries, args, source):
         if (keep is None or keep & names_of(each))
         and not (drop and drop & names_of(each))
         and (args.picture is None or fnmatch.fnmatchcase(each.image, args.picture))
-        and least <= measured_radius(each) <= most
+        and least <= each.measured_radius <= most
     ]
 
 
@@ -192,8 +192,3 @@ def named(option, text, entries, source):
 
 def names_of(entry):
     return {entry.floc_id, entry.floc_id.removesuffix(f" r={entry.spheroradius:g}")}
-
-
-def measured_radius(entry):
-    """r_eq [m] of a floc in its picture."""
-    return entry.equivalent_radius * entry.pixel_size

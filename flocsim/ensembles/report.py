@@ -32,6 +32,9 @@ HEADER = (
 WIDTH = 110
 """Columns of a wide terminal; the table is set more openly where this leaves room."""
 
+EFFICIENCY = "aggregations per approach over delta, in the plane and axially [95 %]"
+"""What the efficiencies are."""
+
 
 def format_table(
     types: Sequence[str], vertices: Sequence[int] | np.ndarray,
@@ -61,22 +64,31 @@ def format_table(
     return "\n".join(lines)
 
 
-def efficiency_lines(results: Results) -> list[str]:
-    """A table of efficiencies, the aggregations per approach integrated over delta; none where
-    delta does not reach from 0 to 1."""
+def efficiency_rows(results: Results) -> list[tuple[str, int, str, str]]:
+    """(type, N, in the plane, axially) of efficiencies with their 95 % intervals: the aggregations
+    per approach integrated over delta; none where delta does not reach from 0 to 1."""
     planar, axial = (
         efficiency(results.probabilities, results.delta, each) for each in (False, True)
     )
     if planar is None or axial is None:
         return []
-    lines = ["efficiency: aggregations per approach over delta, in the plane and axially [95 %]"]
+    rows = []
     for t, name in enumerate(results.types):
         for v, count in enumerate(results.vertices):
             if np.isfinite(planar[0][t, v]):
-                told = [f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]"
-                        for e, lo, hi in (planar, axial)]  # fmt: skip
-                lines.append(f"type {visible(name, '')}, N = {count}: {'   '.join(told)}")
-    return lines if len(lines) > 1 else []
+                first, second = (f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]"
+                                 for e, lo, hi in (planar, axial))  # fmt: skip
+                rows.append((str(name), int(count), first, second))
+    return rows
+
+
+def efficiency_lines(results: Results) -> list[str]:
+    """The efficiency_rows as a table of text."""
+    lines = [
+        f"type {visible(name, '')}, N = {count}: {planar}   {axial}"
+        for name, count, planar, axial in efficiency_rows(results)
+    ]
+    return [f"efficiency: {EFFICIENCY}", *lines] if lines else []
 
 
 def undecided_line(results: Results) -> str:

@@ -146,16 +146,6 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     )
 
 
-def terminal_speed(system: Any, body: Body) -> float:
-    """Speed against the flow at which a body settles alone [m/s]; 0 where it does not."""
-    try:
-        velocity, _ = terminal_motion(system, body)
-    except UsageError:
-        return 0.0
-    u, v = system.fluid.velocity
-    return 0.0 if body.fixed else math.hypot(velocity[0] - u, velocity[1] - v)
-
-
 def turn_time(radius_i: float, radius_j: float, drift: np.ndarray) -> float:
     """(r_i + r_j)/|relative drift| [s]: how long the pair takes to pass or to turn over."""
     return (radius_i + radius_j) / math.hypot(*drift)

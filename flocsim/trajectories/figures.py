@@ -1,33 +1,20 @@
 """What a Trajectory shows: frames of it, distance and forces of a pair, an animation."""
 
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
-from flocsim.geometry.contact.overlap import touching_points
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
 from flocsim.io.plots.style import Figure
 from flocsim.io.trajectory import centre_distance
+from flocsim.trajectories.frames import Frames, frames_at, rows_along, travelled
 
 FIGURES = ("strip", "distance", "forces")
 MOST_FRAMES = 500
-
-
-@attrs.frozen(eq=False)
-class Frames:
-    """Instants as the figures want them, seen from the first body's centroid."""
-
-    times: np.ndarray
-    outlines: list[list[list[np.ndarray]]]
-    contacts: list[np.ndarray]
-    paths: list[np.ndarray]
-    centre_distance: np.ndarray
 
 
 def frames_of(trajectory: Any, count: int) -> Frames:
@@ -35,32 +22,8 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     if not is_whole(count) or not 2 <= count <= MOST_FRAMES:
         raise UsageError(f"frames must be a whole number from 2 to {MOST_FRAMES}, found {count!r}")
     position, shapes = trajectory.position, trajectory.shapes
-    alone = len(shapes) == 1
-    relative = position.copy()
-    if not alone:
-        relative[:, :, :2] -= position[:, :1, :2]
-    moved = np.hypot(*np.moveaxis(np.diff(relative[:, :, :2], axis=0), 2, 0)).sum(axis=1)
-    sizes = np.array([shape.bounding_radius for shape in shapes])
-    moved = moved + np.abs(np.diff(position[:, :, 2], axis=0)) @ sizes
-    way = np.concatenate([[0.0], np.cumsum(moved)])
-    rows = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], count)).clip(0, len(way) - 1))
-    return Frames(
-        trajectory.t[rows],
-        [[shape.outline(*relative[row, n]) for n, shape in enumerate(shapes)] for row in rows],
-        [points_of(shapes, relative[row]) for row in rows],
-        [relative[:, n, :2] for n in range(len(shapes))],
-        np.zeros(len(rows)) if alone else centre_distance(position[rows]),
-    )
-
-
-def points_of(shapes, places):
-    """Where the outlines of any two bodies touch (c, 2)."""
-    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
-    found = [
-        touching_points(cores[a], shapes[a].radius, cores[b], shapes[b].radius)
-        for a, b in combinations(range(len(shapes)), 2)
-    ]
-    return np.concatenate([np.reshape(each, (-1, 2)) for each in [*found, np.empty((0, 2))]])
+    way = travelled(position, [shape.bounding_radius for shape in shapes])
+    return frames_at(np.unique(rows_along(way, count)), shapes, trajectory.t, position)
 
 
 def drawn(trajectory: Any, figure: str, frames: int) -> Figure:

@@ -4,6 +4,7 @@ A run is the same each time, so nothing of this has to be kept: it is found when
 Forces are summed by the engine's own functions, uncompiled, for one force at a time.
 """
 
+import copy
 import functools
 from collections.abc import Callable, Iterator, Sequence
 
@@ -30,6 +31,7 @@ from flocsim.arrays import (
     VERTEX_BODY,
     Scene,
     Work,
+    copy_of,
     with_capacity,
 )
 from flocsim.body import Body, Fluid
@@ -41,7 +43,8 @@ from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.modes import set_closed
 from flocsim.integrators.implicit import Implicit
-from flocsim.integrators.radau.collocation import stage_weights
+from flocsim.integrators.radau.collocation import cubic, stage_weights
+from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import contact_view
@@ -194,19 +197,16 @@ class Replay:
         """
         self.to_step(step)
         begin, end = float(steps[step]), float(steps[step + 1])
-        before, start = self.slips(), self.run.work.motion[NOW].copy()
-        ahead = self.run.copy()
-        mine, self.run = self.run, ahead
-        leg = self.leg
-        self.to_step(step + 1)
-        motion = step_motion(self.origin, ahead, start, begin, end, np.array([time]))[0]
-        share, after = (time - begin) / (end - begin), self.slips()
+        ahead = copy.copy(self)
+        ahead.run = self.run.copy()
+        ahead.to_step(step + 1)
+        start, before, after = self.run.work.motion[NOW], self.slips(), ahead.slips()
+        share = (time - begin) / (end - begin)
         slips = {
             key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
             for key in before.keys() | after.keys()
         }
-        self.run, self.leg = mine, leg
-        return motion, slips
+        return step_motion(self.origin, ahead.run, start, begin, end, time), slips
 
     def slips(self) -> Slips:
         """The tangential displacements of all listed pairs now."""
@@ -216,7 +216,7 @@ class Replay:
 
     def instant(self, time: float, motion: np.ndarray, slips: Slips) -> Instant:
         """The Instant of a motion (n, 6) near where the run is now."""
-        work = Work(*(array.copy() for array in self.run.work))
+        work = copy_of(self.run.work)
         work.motion[NOW] = motion
         if has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0:
             while not work.tally[CANDIDATES] and not list_candidates(self.scene, work):
@@ -236,35 +236,34 @@ def key_of(work, row):
 
 
 def step_motion(
-    origin: Origin, run: Run, start: np.ndarray, begin: float, end: float, times: np.ndarray
+    origin: Origin, run: Run, start: np.ndarray, begin: float, end: float, time: float
 ) -> np.ndarray:
-    """The motion (k, n, 6) at times inside of the step that a run has just taken.
+    """The motion (n, 6) at a time inside of the step that a run has just taken.
 
     Of implicit methods the cubic through the stages, which the engine itself goes by; of others,
     and where the stages are no longer those of the step, Hermite's through both ends.
     """
     work, clock = run.work, run.clock
-    stages = work.motion[[START, FIRST_STAGE, FIRST_STAGE + 1, FIRST_STAGE + 2]]
+    stages = work.motion[[START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE]]
     whole = float(clock[STAGED_STEP])
     if whole == 0.0 and np.array_equal(stages[3], work.motion[NOW]):
         whole = end - begin
-    own = isinstance(origin.integrator, Implicit) and clock[STAGED_AT] == begin and whole > 0.0
+    own = origin.has_stages and clock[STAGED_AT] == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
-        return hermite(begin, end, start, work.motion[NOW], times)
-    weights = np.array([stage_weights((time - begin) / whole) for time in times])
-    return start + np.einsum("ks,snc->knc", weights[:, 1:], stages[1:] - start)
+        return hermite(begin, end, start, work.motion[NOW], time)
+    return cubic(stage_weights((time - begin) / whole), *stages)
 
 
 def hermite(
-    begin: float, end: float, start: np.ndarray, stop: np.ndarray, times: np.ndarray
+    begin: float, end: float, start: np.ndarray, stop: np.ndarray, time: float
 ) -> np.ndarray:
-    """The motion (k, n, 6) of the cubic with the places and velocities (n, 6) at both ends."""
+    """The motion (n, 6) of the cubic with the places and velocities (n, 6) at both ends."""
     h = end - begin
-    s = ((times - begin) / h)[:, None, None]
+    s = (time - begin) / h
     x, v, y, w = start[:, :3], start[:, 3:], stop[:, :3], stop[:, 3:]
     # In changes, so that what does not move stays just where it is.
     place = x + s * s * (3.0 - 2.0 * s) * (y - x)
     place = place + h * s * (1.0 - s) * ((1.0 - s) * v - s * w)
     rate = 6.0 * s * (1.0 - s) * (y - x) / h
     rate = rate + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * w
-    return np.concatenate([place, rate], axis=2)
+    return np.concatenate([place, rate], axis=1)

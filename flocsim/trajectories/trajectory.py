@@ -171,7 +171,7 @@ class Trajectory:
                 found[place] = replay.within(float(time_), step, times)[0]
             else:
                 ends = times[step], times[step + 1], states[step], states[step + 1]
-                found[place] = hermite(*ends, np.array([time_]))[0]
+                found[place] = hermite(*ends, time_)
         if np.ndim(t) == 0:
             return State(float(wanted[0]), found[0, :, :3], found[0, :, 3:])
         return State(wanted, found[:, :, :3], found[:, :, 3:])

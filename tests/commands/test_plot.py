@@ -41,7 +41,7 @@ def test_all_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):
     printed = capsys.readouterr().out.split("\n")[:-1]
     names = [f"study-{label}.pdf" for label in
              ("figure-4", "figure-5", "figure-6", "figure-8", "bonds", "delta", "efficiency",
-              "overview")]  # fmt: skip
+              "overview", "size")]  # fmt: skip
     assert printed == [str(tmp_path / "a" / "b" / name) for name in names]
     assert sorted(os.listdir(tmp_path / "a" / "b")) == sorted(names)
 
@@ -55,7 +55,7 @@ def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkey
 
 @pytest.mark.parametrize("figures", ["7", "4,figure", "", ","])
 def test_unknown_figures_are_refused_before_anything_is_read(figures):
-    known = "2, 3, 4, 5, 6, 8, bonds, delta, efficiency, overview"
+    known = "2, 3, 4, 5, 6, 8, bonds, delta, efficiency, overview, size"
     with pytest.raises(UsageError, match=f"choose from {known}"):
         call(plot, "absent.h5", "--figures", figures)
 

@@ -13,6 +13,7 @@ import pytest
 import flocsim
 from flocsim.commands import report
 from flocsim.commands.reporting import page
+from flocsim.ensembles.report import efficiency_rows
 from flocsim.ensembles.studies.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES
@@ -99,6 +100,15 @@ def test_the_page_needs_nothing_else_and_has_all_figures(whole):
     assert len(pictures) == len(FIGURES)
     assert all(b"<svg" in base64.b64decode(each.partition(",")[2]) for each in pictures)
     assert "@import" not in text and "url(" not in text
+
+
+def test_sizes_and_efficiencies_stand_in_the_page(whole):
+    path, text = whole
+    results, rows = read_results(path), Page(text).rows
+    names = {row[0] for row in rows if row}
+    assert {"D_0 [um]", "steps"} <= names
+    wanted = [[str(cell) for cell in row] for row in efficiency_rows(results)]
+    assert len(wanted) == 4 and all(row in rows for row in wanted)
 
 
 def test_tables_have_both_errors_of_every_condition(whole):

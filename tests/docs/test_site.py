@@ -42,7 +42,7 @@ class Links(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the built site."""
-    for name in ("mkdocs", "material", "mkdocstrings"):
+    for name in ("mkdocs", "material", "mkdocstrings", "latex2mathml"):
         if importlib.util.find_spec(name) is None:
             pytest.skip(f"{name} is not installed: pip install 'flocsim[docs]'")
     made = tmp_path_factory.mktemp("site")
@@ -92,6 +92,15 @@ def test_every_public_name_has_its_place(site):
     wanted |= {name for name, value in vars(errors).items() if isinstance(value, type)}
     assert wanted - ends <= {"__version__", "open", "Force", "PairForce"}
     assert "open_any" in ends
+
+
+def test_equations_are_drawn_by_the_browser_itself(site):
+    source = (ROOT / "docs" / "physics.md").read_text("utf-8")
+    page = (site / "physics.html").read_text("utf-8")
+    formulas = re.findall(r"<math .*?</math>", page, re.DOTALL)
+    assert len(formulas) == source.count("```math") >= 6
+    shown = re.sub(r"<[^>]*>", "", "".join(formulas))
+    assert "\\" not in shown and all(letter in shown for letter in "ΔξκφγωW")
 
 
 def test_a_browser_shows_the_site(site, tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import text
 from flocsim.ensembles.collision.snapshots import choose_instants
-from flocsim.geometry.contact.overlap import touching_points
+from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
     MICRO,
@@ -21,6 +21,7 @@ from flocsim.io.plots.collision import (
 )
 from flocsim.io.plots.results import CLASS_WORDS
 from flocsim.io.plots.style import BODY_COLOURS
+from flocsim.trajectories.frames import seen_from_first
 
 FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)
@@ -74,9 +75,8 @@ def motion_of(example: Example) -> str:
         )
     trajectory = example.trajectory
     shapes, times = trajectory.shapes, trajectory.t
-    relative = trajectory.position.copy()
-    relative[:, :, :2] -= trajectory.position[:, :1, :2]
-    relative[:, :, :2] *= MICRO
+    places = seen_from_first(trajectory.position)
+    relative = places * [MICRO, MICRO, 1.0]
     touch = float(trajectory.row["t_collision"])
     size = 0.5 * sum(shape.bounding_radius for shape in shapes)
     rows = choose_instants(times, trajectory.position, size, FRAMES, touch)
@@ -87,7 +87,7 @@ def motion_of(example: Example) -> str:
     unit, factor = time_unit(times)
     zone = MICRO * example.zone_distance
     graph, dots = graph_of(times * factor, distance, rows, zone, unit)
-    contacts = [contacts_of(shapes, relative[row]) for row in rows]
+    contacts = [MICRO * placed_contacts(shapes, places[row]) for row in rows]
     data = {
         "t": rounded(times[rows]), "shown": shown, "eye": rounded(eyes), "ring": 0.03 * half,
         "pose": rounded(relative[rows] * [1.0, 1.0, 180.0 / math.pi]), "dot": rounded(dots),
@@ -118,16 +118,6 @@ def windows_of(places, reaches):
     reach = np.array(reaches)[None, :, None]
     low, high = (places[:, :, :2] - reach).min(axis=1), (places[:, :, :2] + reach).max(axis=1)
     return 0.5 * (low + high), 0.52 * float(np.max(high - low))
-
-
-def contacts_of(shapes, places):
-    """Where the outlines of two bodies overlap (c, 2) [µm]."""
-    cores = [
-        shape.placed_vertices(*(place[:2] / MICRO), place[2])
-        for shape, place in zip(shapes, places, strict=True)
-    ]
-    points = touching_points(cores[0], shapes[0].radius, cores[1], shapes[1].radius)
-    return MICRO * np.reshape(points, (-1, 2))
 
 
 def drawing_of(shapes: Sequence, data: dict, half: float, shown: int) -> str:

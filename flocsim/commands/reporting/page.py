@@ -6,15 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.commands.info import conditions, origin, outcomes, settling
+from flocsim.commands.info import summary
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
 from flocsim.commands.reporting.motion import SCRIPT, motion_of
-from flocsim.ensembles.collision.failures import describe_note
-from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, undecided_line
-from flocsim.ensembles.storage.stored_json import stored
-from flocsim.errors import FileError
+from flocsim.ensembles.report import EFFICIENCY, efficiency_rows
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import METADATA, house_style
 from flocsim.io.results.file import Totals
@@ -35,24 +31,14 @@ ERRORS_TEXT = (
 
 
 def report_page(path: str, results: Results, totals: Totals, examples: Sequence[Example]) -> str:
-    """The HTML of a results file; FileError where what it says of its run cannot be read."""
-    try:
-        facts = conditions(results) + outcomes(results, totals)
-        facts.append(("numerical error", checked_line(results) or "unknown: none was run again"))
-        if choice := stored(results.run, "accuracy"):
-            facts += [("accuracy", line) for line in choice_lines(choice)]
-        facts += settling(results.run)
-        came_from = origin(results.run)
-        warnings = [str(line) for line in stored(results.run, "warnings")]
-        failed = [describe_note(note) for note in stored(results.run, "failed")]
-    except ValueError as error:
-        raise FileError(f"{path} holds no readable results: {error}; run it again") from error
-    warnings += list(filter(None, [undecided_line(results)]))
-    sections = [("results", "What was run, and what came out", facts_of(facts))]
-    if warnings or failed:
-        more = len(failed) - MOST_FAILURES
-        shown = failed[:MOST_FAILURES] + ([f"and {more} more in run/failed"] if more > 0 else [])
-        content = list_of(warnings, "warnings") + list_of(shown, "failed")
+    """The HTML of a results file; FileError as `summary` raises it."""
+    said = summary(path, results, totals)
+    sections = [("results", "What was run, and what came out", facts_of(said.facts))]
+    if said.warnings or said.failed:
+        more = len(said.failed) - MOST_FAILURES
+        shown = said.failed[:MOST_FAILURES]
+        shown += [f"and {more} more in run/failed"] if more > 0 else []
+        content = list_of(said.warnings, "warnings") + list_of(shown, "failed")
         sections.append(("warnings", "Warnings", content))
     sections.append(("figures", "Figures", figures_of(results)))
     sections.append(("tables", "Probabilities", tables_of(results)))
@@ -65,7 +51,7 @@ def report_page(path: str, results: Results, totals: Totals, examples: Sequence[
         )
         sections.append(("motion", "In motion", f"{told}<div class='motions'>{motions}</div>"))
     config = str(results.run.get("config", ""))
-    came = facts_of(came_from)
+    came = facts_of(said.origin)
     if config:
         lines = "\n".join(map(text, config.splitlines()))
         came += f"<h3>Config</h3><pre>{lines}</pre>"
@@ -107,6 +93,9 @@ def tables_of(results: Results) -> str:
             for t, v in places
         ]  # fmt: skip
         parts.append("<h3>All displacements pooled</h3>" + table_of(heads, rows))
+    if rows := efficiency_rows(results):
+        heads = ["type", "N", "in the plane", "axially"]
+        parts.append(f"<h3>Efficiency</h3><p>{text(EFFICIENCY)}</p>" + table_of(heads, rows))
     return "\n".join(parts)
 
 

@@ -90,7 +90,7 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
                 entry.equivalent_radius / entry.spheroradius,
                 {n: entry.fits[n].shape for n in kept},
                 {n: entry.fits[n].relative_error for n in kept},
-                entry.equivalent_radius * entry.pixel_size,
+                entry.measured_radius,
             )
         )
     if shapes.size == "own" and len({floc.size for floc in flocs}) < 2:

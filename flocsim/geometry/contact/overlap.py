@@ -1,5 +1,8 @@
 """Whether two placed cores overlap too deeply to start from, and where they touch."""
 
+from collections.abc import Sequence
+from itertools import combinations
+
 import numpy as np
 
 from flocsim.constants import DEEPEST_OVERLAP
@@ -10,6 +13,7 @@ from flocsim.geometry.shapes.cores import (
     from_edges,
     inside_polygon,
 )
+from flocsim.geometry.shapes.shape import Shape
 
 TOUCHING = 1e-12
 """Gap [m] below which outlines are shown as touching."""
@@ -51,3 +55,13 @@ def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: flo
         middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
         found.append(middle[distance < radius + other + TOUCHING])
     return np.concatenate(found)
+
+
+def placed_contacts(shapes: Sequence[Shape], places: np.ndarray) -> np.ndarray:
+    """Where any two of the bodies at these places (n, 3) touch: (c, 2) [m]."""
+    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
+    found = [
+        touching_points(cores[a], shapes[a].radius, cores[b], shapes[b].radius)
+        for a, b in combinations(range(len(shapes)), 2)
+    ]
+    return np.concatenate([np.empty((0, 2)), *(np.reshape(each, (-1, 2)) for each in found)])

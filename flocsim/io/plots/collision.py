@@ -253,8 +253,7 @@ def picture_of(frames, place, motion, zone_distance, title):
         graph.set_ylabel("centre distance $d_c$ [µm]")
         draw_zone(graph, zone_distance)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-        keep_titles_whole(figure)
-        figure.canvas.draw()
+        keep_titles_whole(figure)  # which draws it
         pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
     return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
 

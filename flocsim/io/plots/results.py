@@ -64,6 +64,10 @@ NO_EVENTS = {
     "classes": "no decided collision",
     "bonds": "no aggregation",
 }
+SIZE_COLOURS = "viridis"
+MOST_SIZES_NAMED = 6
+"""Up to so many receiving sizes are all named beside their colours."""
+
 SHARES = {
     "classes": ("n_class", "outcome", range(len(CLASSES)), CLASS_COLOURS),
     "bonds": ("n_bond", "bond", range(1, 1 + len(BONDS)), BOND_COLOURS),
@@ -196,6 +200,50 @@ def efficiencies(results: Results) -> Figure:
         add_line_legend(
             panels[:PANELS_PER_ROW][-1], words, colours, "aggregations per approach\n(bars: 95 %)"
         )
+        return figure
+
+
+def against_size(results: Results) -> Figure:
+    """Pr[A], all displacements pooled, against the approaching floc's size; a panel for each N.
+
+    A point for each collision type, coloured by the size of the receiving floc; points of one
+    receiving size are joined.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import LogLocator
+
+    r_i, r_j = (1e6 * np.asarray(results.radii[name]) for name in ("r_i", "r_j"))
+    known = (r_i > 0.0) & (r_j > 0.0)
+    receivers = np.unique(r_i[known].round(9))
+    with house_style():
+        figure, panels = panel_grid(len(results.vertices), x_label="approaching $r_j$ [µm]")
+        low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
+        shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
+        missing = "the sizes are not known" if results.pooled else "not yet pooled"
+        for number, axes in enumerate(panels):
+            set_probability_axis(axes)
+            axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.minorticks_off()
+            count = results.vertices[number]
+            axes.set_title("sphere" if count == 1 else f"$N$ = {count}")
+            if not (known.any() and results.pooled):
+                note_if_empty(axes, np.array([np.nan]), missing)
+                continue
+            for index, receiver in enumerate(receivers):
+                rows = np.flatnonzero(known & (r_i.round(9) == receiver))
+                rows = rows[np.argsort(r_j[rows])]
+                bands = [results.pooled["pr_a" + end][rows, number] for end in ENDS]
+                draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
+        for axes in panels[::PANELS_PER_ROW]:
+            axes.set_ylabel(LABELS["pr_a"])
+        if known.any() and results.pooled:
+            bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
+            bar.minorticks_off()
+            marks = receivers if len(receivers) <= MOST_SIZES_NAMED else np.geomspace(low, high, 4)
+            bar.set_ticks(marks, labels=[f"{each:.3g}" for each in marks])
         return figure
 
 
@@ -357,4 +405,5 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "delta": against_delta,
     "efficiency": efficiencies,
     "overview": overview,
+    "size": against_size,
 }

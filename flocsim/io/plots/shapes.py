@@ -35,7 +35,7 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
     # A library may hold a floc at several spheroradii.
     first = min(entry.spheroradius for entry in entries)
     flocs = [entry for entry in entries if entry.spheroradius == first]
-    sizes = np.array([1e6 * entry.equivalent_radius * entry.pixel_size for entry in flocs])
+    sizes = np.array([1e6 * entry.measured_radius for entry in flocs])
     width = 2.0 * np.subtract(*np.percentile(sizes, [75, 25])) / len(sizes) ** (1 / 3)
     count = int(np.clip(np.ceil(sizes.max() / width) if width > 0 else 5, 5, 60))
     bins = np.linspace(0.0, 1.001 * sizes.max(), count + 1)

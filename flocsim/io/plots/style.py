@@ -84,7 +84,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def keep_titles_whole(figure: Figure) -> None:
-    """Break the lines of titles that are wider than the room they have; what fits stays as it is.
+    """Draw a figure, the lines of titles broken that are wider than the room they have.
 
     The room of a panel's title ends where the next panel of its row begins, or the figure.
     """

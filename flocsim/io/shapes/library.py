@@ -105,6 +105,11 @@ class ShapeEntry:
     spheroradius: float
     fits: dict[int, StoredFit]
 
+    @property
+    def measured_radius(self) -> float:
+        """r_eq [m] of the floc in its picture."""
+        return self.equivalent_radius * self.pixel_size
+
 
 def make_entry(
     image: str,

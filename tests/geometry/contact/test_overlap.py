@@ -6,7 +6,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.geometry.contact.overlap import distance_between, overlap_fault, touching_points
+from flocsim import Sphere
+from flocsim.geometry.contact.overlap import (
+    distance_between,
+    overlap_fault,
+    placed_contacts,
+    touching_points,
+)
 from tests.reference.contacts import contacts
 from tests.reference.outline import core_geometry
 from tests.reference.samples import SEEDS, random_core, scene_of
@@ -58,3 +64,13 @@ def test_touching_points_are_the_contact_points(seed):
             apart = np.hypot(*(found[:, None] - wanted[None]).transpose(2, 0, 1))
             assert np.all(apart.min(axis=0, initial=np.inf) < 1e-15)
             assert np.all(apart.min(axis=1, initial=np.inf) < 1e-15)
+
+
+def test_contacts_are_those_of_any_two():
+    """Three in a row: two contacts, each seen from both bodies; one alone: none."""
+    shapes = [Sphere(1e-6)] * 3
+    places = np.array([[0.0, 0.0, 0.0], [1.5e-6, 0.0, 1.0], [3.0e-6, 0.0, 0.0]])
+    found = placed_contacts(shapes, places)
+    np.testing.assert_allclose(found, [[0.75e-6, 0.0]] * 2 + [[2.25e-6, 0.0]] * 2, atol=1e-20)
+    assert placed_contacts(shapes[:1], places[:1]).shape == (0, 2)
+    assert placed_contacts(shapes[:2], places[[0, 2]]).shape == (0, 2)

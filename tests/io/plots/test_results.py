@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.estimates.statistics import tabulate, wilson
-from flocsim.io.plots.results import FIGURES, figure_4, figure_6, figure_8
+from flocsim.io.plots.results import FIGURES, against_size, figure_4, figure_6, figure_8
 from flocsim.io.plots.style import save
+from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
 
 
@@ -157,7 +158,7 @@ def test_a_panel_without_events_says_so():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", [name for name in FIGURES if name != "efficiency"])
+@pytest.mark.parametrize("name", [name for name in FIGURES if name not in ("efficiency", "size")])
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
     assert all("no " in texts(axes) for axes in figure.axes)
@@ -191,6 +192,38 @@ def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
     figure = FIGURES[name](results)
     save(figure, tmp_path / "figure.svg")
     assert len([axes for axes in figure.axes if axes.get_visible()]) in (
-        len(results.types),
+        len(results.vertices) if name == "size" else len(results.types),
         4 * len(results.types),
     )
+
+
+def pooled_sizes():
+    """Four types: two receiving sizes, each met by two approaching ones, Pr[A] pooled."""
+    results = make_results(("a", "b", "c", "d"), vertices=(1, 8))
+    radii = dict(results.radii)
+    radii |= {
+        "r_i": np.array([5e-6, 5e-6, 9e-6, 9e-6]),
+        "r_j": np.array([8e-6, 6e-6, 20e-6, 10e-6]),
+    }
+    pooled = {name: np.zeros(results.shape[:2]) for name in POOLED}
+    pooled["pr_a"] = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6], [0.7, 0.8]])
+    pooled["pr_a_high"] = np.ones((4, 2))
+    return attrs.evolve(results, radii=radii, pooled=pooled)
+
+
+def test_sizes_are_a_numeric_axis():
+    figure = against_size(pooled_sizes())
+    sphere, eight, bar = figure.axes
+    assert sphere.get_xscale() == "log" and "receiving" in bar.get_ylabel()
+    assert (sphere.get_title(loc="left"), eight.get_title(loc="left")) == ("sphere", "$N$ = 8")
+    lines = [container.lines[0].get_xydata() for container in eight.containers]
+    np.testing.assert_allclose(lines[0], [[6.0, 0.4], [8.0, 0.2]])
+    np.testing.assert_allclose(lines[1], [[10.0, 0.8], [20.0, 0.6]])
+
+
+@pytest.mark.parametrize(("change", "said"), [("pooled", "not yet pooled"), ("radii", "not known")])
+def test_without_sizes_or_pooled_numbers_the_figure_says_so(change, said):
+    made = pooled_sizes()
+    unknown = {"pooled": {}, "radii": make_results(made.types, vertices=(1, 8)).radii}[change]
+    figure = against_size(attrs.evolve(made, **{change: unknown}))
+    assert all(said in texts(axes) for axes in figure.axes)

@@ -1,0 +1,65 @@
+"""Frames of a motion, for drawing: what is seen at some of its instants."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from flocsim.geometry.contact.overlap import placed_contacts
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.io.trajectory import centre_distance
+
+
+@attrs.frozen(eq=False)
+class Frames:
+    """Instants of a motion, seen from the first body's centroid; of a lone body, from where it is.
+
+    ``times`` (f,) [s]; ``outlines`` per frame and body a list of rings (k, 2) [m]; ``contacts``
+    per frame (c, 2) [m]; ``paths`` per body (m, 2) [m]; ``centre_distance`` (f,) [m] of the first
+    two, 0 of one.
+    """
+
+    times: np.ndarray
+    outlines: list[list[list[np.ndarray]]]
+    contacts: list[np.ndarray]
+    paths: list[np.ndarray]
+    centre_distance: np.ndarray
+
+
+def seen_from_first(position: np.ndarray) -> np.ndarray:
+    """Places (k, n, 3) against the first body's centroid; those of a lone body as they are."""
+    relative = position.copy()
+    if position.shape[1] > 1:
+        relative[:, :, :2] -= position[:, :1, :2]
+    return relative
+
+
+def travelled(position: np.ndarray, sizes: Sequence[float]) -> np.ndarray:
+    """Length (k,) [m] of the way of the bodies against the first, turning by angle · size included.
+
+    ``position`` (k, n, 3); ``sizes`` (n,) [m].
+    """
+    relative = seen_from_first(position)
+    steps = np.hypot(*np.moveaxis(np.diff(relative[:, :, :2], axis=0), 2, 0)).sum(axis=1)
+    turns = np.abs(np.diff(position[:, :, 2], axis=0)) @ np.asarray(sizes)
+    return np.concatenate([[0.0], np.cumsum(steps + turns)])
+
+
+def rows_along(way: np.ndarray, count: int) -> np.ndarray:
+    """``count`` rows evenly along a way, the first and the last among them; some may be alike."""
+    return np.searchsorted(way, np.linspace(0.0, way[-1], count)).clip(0, len(way) - 1)
+
+
+def frames_at(
+    rows: np.ndarray, shapes: Sequence[Shape], times: np.ndarray, position: np.ndarray
+) -> Frames:
+    """The Frames at some rows of times (k,) [s] and positions (k, n, 3)."""
+    relative = seen_from_first(position)
+    apart = len(shapes) > 1
+    return Frames(
+        times[rows],
+        [[shape.outline(*relative[row, n]) for n, shape in enumerate(shapes)] for row in rows],
+        [placed_contacts(shapes, relative[row]) for row in rows],
+        [relative[:, n, :2] for n in range(len(shapes))],
+        centre_distance(position[rows]) if apart else np.zeros(len(rows)),
+    )
