@@ -42,6 +42,7 @@ from flocsim.arrays import (
     NORMAL_Y,
     NOW,
     RELAXATION,
+    SLIP_OFFSET,
     SPIN,
     STEP_ERROR,
     STEP_PLACE,
@@ -64,10 +65,10 @@ from flocsim.laws import contact_force
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
 
-OF_VECTOR = 9.0
+OF_VECTOR = 15.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
-LEAST = 0.01
+LEAST = 0.006
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
 
 DOUBT = 2.0
@@ -144,6 +145,9 @@ def shorten(scene, work, leader):
             if work.cluster[body] == leader:
                 for axis in range(MOTION_COLUMNS):
                     work.motion[CARRIED, body, axis] *= share
+        for row in range(work.tally[CANDIDATES]):
+            if work.cluster[work.candidates[row, VERTEX_BODY]] == leader:
+                work.slip[SLIP_OFFSET, row] *= share
 
 
 def bound_carried(scene, work):
