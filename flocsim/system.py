@@ -239,6 +239,11 @@ class System:
 
         UsageError where that has other shapes, or has come as far as this one is to go.
         """
+        if not isinstance(start, Trajectory):
+            raise UsageError(
+                "start must be a Trajectory, at whose end this run begins, found "
+                f"{type(start).__name__}: run the first one until then, and hand that over"
+            )
         origin = start.known()
         if run.clock[UNTIL] <= start.t[-1]:
             raise UsageError(

@@ -22,7 +22,7 @@ BESIDE_PYTHON = Path(sys.executable).parent
 PATIENCE = 30.0
 """Seconds after which a job that does not end hangs."""
 
-REPORTED = 50
+REPORTED = 25
 """Faults of a kind after which a line says how they went: the whole takes hours."""
 
 STUDY = """\

@@ -233,21 +233,22 @@ def unfinished_journal(root, references):
     folder = make_study(root / "unfinished")
     words = [sys.executable, "-m", "flocsim.ensemble", "study.toml", "--quiet"]
     path, results = folder / "study.h5.journal", folder / "study.h5"
-    half = references[SEEDS[0]].stat().st_size // 3
+    half = read_results(references[SEEDS[0]]).replicates["outcome"].size // 2
     while not path.exists():
         results.unlink(missing_ok=True)  # of a job that was not stopped in time
         job = subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL)
-        while job.poll() is None and size_of(path) <= half:
-            time.sleep(0.002)
+        while job.poll() is None and rows_so_far(path) < half:
+            time.sleep(0.01)
         job.kill()
         job.wait()
     return path
 
 
-def size_of(path):
-    """Bytes of a file; 0 where there is none, which may change between a look and the next."""
+def rows_so_far(path):
+    """Replicates in a journal that is being written; 0 where there is none, which may change
+    between a look and the next."""
     try:
-        return path.stat().st_size
+        return seed_and_rows(path)[1]
     except FileNotFoundError:
         return 0
 

@@ -33,17 +33,31 @@ COUNTS = {"kills": 1000, "signals": 200, "disk": 100, "flips": 10_000}
 QUICK = {"kills": 12, "signals": 6, "disk": 6, "flips": 300}
 
 
-def begin_job(folder, rng, **more):
-    """A job on a random number of ranks, at a random time: half of them once it writes."""
+def begin_job(folder, rng, lasts, **more):
+    """A job on a random number of ranks, at a random time: some of them have ended by then.
+
+    ``lasts``: see `undisturbed`.
+    """
     kind = rng.choice(list(KINDS))
     job = Job.start(folder, kind, **more)
     job.wait_for_handlers()
-    if rng.random() < 0.75:
+    if rng.random() < 0.5:
         job.wait_for_journal()
-        time.sleep(rng.uniform(0.0, 0.6))
-    else:
-        time.sleep(rng.uniform(0.0, 1.5))
+    time.sleep(rng.uniform(0.0, 1.2 * lasts[kind]))
     return kind, job
+
+
+def undisturbed(root):
+    """{kind: seconds from when it listens until it ends} of a job that nothing disturbs: on a slow
+    or busy machine, faults at fixed times would all hit its beginning."""
+    found = {}
+    for number, kind in enumerate(KINDS):
+        job = Job.start(make_study(root / f"undisturbed{number}"), kind)
+        job.wait_for_handlers()
+        began = time.monotonic()
+        assert job.finish([job.process.pid])[0] == 0
+        found[kind] = time.monotonic() - began
+    return found
 
 
 def fresh(root, number):
@@ -65,12 +79,12 @@ def within(count, seconds):
 def kill_often(root, reference, count, rng, seconds):
     """{target: Tally} of kills of a rank, of the launcher, of all."""
     tallies = {target: Tally() for target in ("rank", "launcher", "group")}
-    number = 0
+    number, lasts = 0, undisturbed(root)
     for _ in within(count, seconds):
         folder = fresh(root, number)
         target = rng.choice(list(tallies))
         before = whole_rows(folder)
-        kind, job = begin_job(folder, rng)
+        kind, job = begin_job(folder, rng, lasts)
         pids = job.send(signal.SIGKILL, target, rng)
         code, seconds = job.finish(pids)
         problem = "hang" if code is None else verdict(folder, reference)
@@ -85,11 +99,11 @@ def kill_often(root, reference, count, rng, seconds):
 
 def signal_often(root, reference, count, rng, seconds):
     """{signal: Tally}: each has to end the job in time with exit code 75."""
-    tallies = {number.name: Tally() for number in SIGNALS}
+    tallies, lasts = {number.name: Tally() for number in SIGNALS}, undisturbed(root)
     for number in within(count, seconds):
         folder = fresh(root, f"-signal{number}")
         sign = SIGNALS[number % len(SIGNALS)]
-        kind, job = begin_job(folder, rng)
+        kind, job = begin_job(folder, rng, lasts)
         target = rng.choice(["launcher", "group"])
         pids = job.send(sign, target, rng)
         code, seconds = job.finish(pids)

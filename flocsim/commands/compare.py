@@ -11,7 +11,7 @@ def add_parser(subparsers: Any) -> None:
         "compare",
         help="compare two results files: differences of probabilities with 95 %% intervals",
         description="Print the differences of a probability between two results files, at every "
-        "condition that both have, with 95 %% intervals: of replicates paired where both have "
+        "condition that both have, with 95 % intervals: of replicates paired where both have "
         "drawn the same orientations (studies of one seed), of independent samples else. What the "
         "studies differ in comes first.",
     )

@@ -139,7 +139,8 @@ def run(args: argparse.Namespace) -> int:
     ]
     table = summary_text(pictures, fits, options.pixel_size).encode()
     if not entries:
-        write_file(summary, table, rule)
+        if args.summary:
+            write_file(summary, table, rule)
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return LOST if lost else 2
     settings = {"method": options.method, "preserve_area": options.preserve_area,

@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
         help="describe a results file, a running study, a library, a trajectory or a sweep",
-        description="Print what a file holds: conditions, counts, probabilities with 95 %% "
+        description="Print what a file holds: conditions, counts, probabilities with 95 % "
         "intervals, and where it came from. Of a study that still runs or was interrupted, its "
         "replicates so far, without touching it.",
     )

@@ -55,6 +55,7 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 def run(args: Namespace) -> int:
     """Run what is missing and join it; the exit code."""
+    from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.studies.study import Study, settings_of
     from flocsim.ensembles.studies.sweep import planned, sweep
 
@@ -75,7 +76,7 @@ def run(args: Namespace) -> int:
     try:
         sweep(
             study, over, output, jobs=args.jobs, mode="resume" if args.resume else "new",
-            overwrite=args.overwrite, tell=tell,
+            overwrite=args.overwrite, tell=tell, ways=WAYS,
         )  # fmt: skip
     except KeyboardInterrupt:
         tell("flocsim: stopped; what is finished is kept: go on with --resume")

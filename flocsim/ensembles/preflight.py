@@ -26,8 +26,9 @@ from flocsim.io.outputs import loaded_sources
 from flocsim.system import System
 from flocsim.trajectories.blame import wrong_answer
 
-CLOSE_GAPS = (1e-9, 1e-12, -1e-12)
-"""Gaps [m] that every two bodies that collide come through."""
+CLOSE_GAPS = (1e-9, 1e-12, 0.0, -1e-12)
+"""Gaps [m] that every two bodies that collide come through: a pole at 0 turns a repulsion into an
+attraction there."""
 
 CLOSE_OVERLAPS = (1e-12, 1e-10)
 """ [m] The same of contacts, at rates of either sign."""

@@ -35,6 +35,9 @@ THERMAL = re.compile(
 UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)" + EXPONENT)
 SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
 
+PIXELS = ("px", "pixel", "dot", "pel", "picture_element", "css_pixel")
+"""What pint takes for a length, of screens and paper."""
+
 LONGEST = 100
 """Letters of a number and its unit."""
 
@@ -116,6 +119,8 @@ def unit_of(name):
     """The unit of a name, as "um"."""
     import pint
 
+    if name in PIXELS:
+        raise ValueError(f"{name!r} is no unit of length: a pixel has the size that a picture has")
     try:
         return registry().Unit(name)
     except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:

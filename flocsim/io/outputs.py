@@ -52,6 +52,9 @@ def fingerprint(path):
 WAYS = "add --overwrite, which keeps the old one under another name"
 """What a user can do where a file is in the way, besides naming another place."""
 
+SCRIPT_WAYS = "say overwrite=True, which keeps the old one under another name"
+"""The same in Python."""
+
 
 @attrs.frozen
 class Output:

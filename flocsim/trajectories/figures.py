@@ -3,15 +3,17 @@
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
+from flocsim.io.plots.results import CLASS_WORDS
 from flocsim.io.plots.style import Figure
 from flocsim.io.trajectory import centre_distance
-from flocsim.trajectories.frames import Frames, frames_at, rows_along, travelled
+from flocsim.trajectories.frames import Frames, frames_at, seen_from_first, travelled
 
 FIGURES = ("strip", "distance", "forces")
 MOST_FRAMES = 500
@@ -23,14 +25,28 @@ def frames_of(trajectory: Any, count: int) -> Frames:
         raise UsageError(f"frames must be a whole number from 2 to {MOST_FRAMES}, found {count!r}")
     position, shapes = trajectory.position, trajectory.shapes
     way = travelled(position, [shape.bounding_radius for shape in shapes])
-    return frames_at(np.unique(rows_along(way, count)), shapes, trajectory.t, position)
+    wanted = np.linspace(0.0, way[-1], count)
+    # What stays where it is is seen evenly in time.
+    times = np.interp(wanted, way, trajectory.t) if way[-1] > 0.0 else trajectory.t[[0, -1]]
+    states = trajectory.at(times).position
+    found = frames_at(np.arange(len(times)), shapes, times, states)
+    whole = seen_from_first(position)
+    return attrs.evolve(found, paths=[whole[:, n, :2] for n in range(len(shapes))])
+
+
+def title_of(trajectory: Any) -> str:
+    """The outcome of a study's replicate; of any other run, how it ended."""
+    if trajectory.row is not None:
+        outcome = trajectory.row["outcome"]
+        return CLASS_WORDS.get(outcome, outcome)
+    return str(trajectory.status).partition(":")[0].lower()
 
 
 def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
     """One of FIGURES of a Trajectory."""
     if figure not in FIGURES:
         raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
-    title = str(trajectory.status).partition(":")[0].lower()
+    title = title_of(trajectory)
     if figure == "strip":
         seen = frames_of(trajectory, frames)
         pair = len(trajectory.shapes) == 2

@@ -135,6 +135,8 @@ class Trajectory:
 
     def checked_times(self, times: Any) -> np.ndarray:
         """Times as an array (k,); UsageError for what is no time of the run."""
+        if isinstance(times, str):
+            times = in_unit(times, "s", "t")
         try:
             found = np.atleast_1d(np.asarray(times, dtype=float))
         except (TypeError, ValueError):
@@ -148,7 +150,7 @@ class Trajectory:
         return found
 
     def at(self, t: Any) -> State:
-        """The State at a time [s], or at an array of times.
+        """The State at a time, in s or as "5 ms", or at an array of times [s].
 
         At a step, what was computed. Between two, the interpolation that the method itself goes by:
         of Implicit and Overdamped the cubic through the stages, whose error is below a quarter of
@@ -264,10 +266,10 @@ class Trajectory:
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.
         """
-        from flocsim.io.outputs import Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
         from flocsim.io.trajectory import write_trajectory
 
-        check_outputs([Output(file, data_rule(overwrite))], [])
+        check_outputs([Output(file, data_rule(overwrite), ways=SCRIPT_WAYS)], [])
         facts: dict[str, str | float] = {
             "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
             "error": self.error,
@@ -285,12 +287,12 @@ class Trajectory:
         (``pip install 'flocsim[formats]'``). For ParaView: `save`.
         """
         from flocsim.io.exchange.gsd_file import write_gsd
-        from flocsim.io.outputs import Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
 
         path, rule = Path(file), data_rule(overwrite)
         if path.suffix.lower() != ".gsd":
             raise UsageError(f"{path}: what is exported must end in .gsd; ParaView reads `save`'s")
-        check_outputs([Output(path, rule)], [])
+        check_outputs([Output(path, rule, ways=SCRIPT_WAYS)], [])
         write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 

@@ -36,6 +36,7 @@ MISTAKES = {
     "nan": ("return math.log(X - X)Z", "gives (nan|no number|-inf)"),
     "fractional power": ("return (-1e-9 - abs(X))**1.5Z", "gives no real number at"),
     "division by zero": ("return 1e-12/(X - X)Z", "gives (inf|no number)"),
+    "pole at touching": ("return 1e-23/XZ", "gives (inf|no number) at a gap of 0 m"),
     "no return": ("x = X", "returns None"),
     "no return in a branch": (NEVER + "x = X\nelse:\n    return 0.0Z", "returns None on the way"),
     "array": ("return np.zeros(2)[0]Z", r"makes an array \(np.zeros\) in"),
@@ -57,6 +58,8 @@ MISTAKES = {
 def test_each_mistake_is_one_line(kind, tmp_path, capsys):
     """All of a kind in one test, for each needs its own folder and no compiling but the last."""
     for number, (name, (text, said)) in enumerate(MISTAKES.items()):
+        if name == "pole at touching" and "gap" not in SEEN[kind]:
+            continue
         folder = tmp_path / str(number)
         folder.mkdir()
         body = text.replace("X", SEEN[kind]).replace("Z", ZEROS.get(kind, ""))

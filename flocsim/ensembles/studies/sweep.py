@@ -62,21 +62,22 @@ class SweepResults:
 def sweep(
     study: Study, over: Mapping[str, Sequence], output: str | os.PathLike, *, jobs: int = 1,
     mode: str = "new", overwrite: bool = False, quiet: bool = True,
-    tell: Callable[[str], object] = lambda line: None,
+    tell: Callable[[str], object] = lambda line: None, ways: str = WAYS,
 ) -> SweepResults:  # fmt: skip
     """Run a Study at every value of some keys, and join the results in the file ``output``.
 
     ``over``: {dotted key: values}; several keys make a grid. ``mode`` "resume" goes on with what is
     there, extends it, or takes it as it is, as Study.run does with each part; ``tell`` is given a
-    line for each. All values have the study's seed: what differs between them is paired.
-    UsageError for a key that is none, a value that does not fit, or a file in the way.
+    line for each; ``ways``: what to say where a file is in the way. All values have the study's
+    seed: what differs between them is paired. UsageError for a key that is none, a value that does
+    not fit, or a file in the way.
     """
     parts = planned(study, over, Path(output))
     rule = data_rule(overwrite)
     if mode == "resume" and Path(output).exists():
         read_sweep(Path(output))  # what is replaced has to be a sweep
         rule = extension_rule(output)
-    check_outputs([Output(output, rule, ways=WAYS)], [study.path])
+    check_outputs([Output(output, rule, ways=ways)], [study.path])
     folder = parts_folder(Path(output))
     try:
         folder.mkdir(exist_ok=True)

@@ -224,7 +224,11 @@ def opened(path: str | Path) -> Iterator[Any]:
     ) as (file, nodes):
         known = nodes[""].attributes
         if text_of(file, nodes, "format") != FORMAT:
-            raise FileError(f"{path} is not a results file: name one that flocsim ensemble wrote")
+            what = text_of(file, nodes, "format") or text_of(file, nodes, "kind")
+            found = f", it holds a {what}" if what else ""
+            raise FileError(
+                f"{path} is not a results file{found}: name one that flocsim ensemble wrote"
+            )
         version = read_version(file, known)
         if version != SCHEMA_VERSION:
             raise FileError(

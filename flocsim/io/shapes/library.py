@@ -164,6 +164,13 @@ def write_library(
         raise UsageError(f"floc id {repeated!r} occurs twice: give every floc its own")
     if len({tuple(sorted(entry.fits)) for entry in entries}) > 1 or not entries[0].fits:
         raise UsageError("every floc of a library needs fits at the same numbers of vertices")
+    largest = max(entries, key=reach_of)
+    if reach_of(largest) > LARGEST:
+        raise UsageError(
+            f"floc {largest.floc_id} reaches {reach_of(largest):.3g} m far, and none in a library "
+            f"may reach beyond {LARGEST:g} m: with pixels of {largest.pixel_size:g} m? Give the "
+            "size of one, as in '0.95 um'"
+        )
 
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=False) as file:
@@ -182,6 +189,11 @@ def write_library(
                 column = np.array([getattr(fit, name) for fit in fits], dtype=float)
                 _write_column(group, name, column, units, long_name)
     write_file(path, seal(image.getvalue()), rule)
+
+
+def reach_of(entry):
+    """The largest coordinate or radius of a floc's fits [m]."""
+    return max(max(np.abs(fit.vertices).max(), fit.radius) for fit in entry.fits.values())
 
 
 def _write_column(group, name, values, units, long_name):
