@@ -36,18 +36,18 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
-START, CHANGE, DEVIATION, CARRIED, MOTION_ROWS = range(STATES, STATES + 5)
+START, CHANGE, DEVIATION, CARRIED, FORCING, MOTION_ROWS = range(STATES, STATES + 6)
 """Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
 change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
-such errors, carried on with the motion, have become."""
+such errors, carried on with the motion, have become; forces by which it is carried otherwise than a
+change of the start [N, N, N m], in the columns of velocities."""
 
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
-KEPT_SLIP = 2 * STATES
-"""The row of ``Work.slip`` for displacements that are set aside while the list is made anew."""
-
-SLIP_ROWS = KEPT_SLIP + 1
+SLIP_OFFSET, KEPT_SLIP, KEPT_OFFSET, SLIP_ROWS = range(2 * STATES, 2 * STATES + 4)
+"""Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
+along the tangent; displacements and such offsets that are set aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
@@ -208,11 +208,11 @@ class Scene(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (13, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION,
-    CARRIED.
+    ``motion`` (14, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION,
+    CARRIED, FORCING.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (19, capacity): tangential displacements in the states, their rates there, and those
-    set aside while the list is made anew.
+    ``slip`` (21, capacity): tangential displacements in the states, their rates there, then see
+    SLIP_OFFSET.
     ``bodies`` (n, 31): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
     ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:

@@ -25,12 +25,13 @@ from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
 from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.overlap_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.integrators.rhs.stated_error import carry_vector
+from flocsim.integrators.rhs.stated_error import carry_vector, overlap_error
 from flocsim.integrators.rhs.views import inertia
 
 ORDER_OF_ESTIMATE = 4.0
@@ -132,4 +133,5 @@ class Implicit(Integrator):
             end_within: end_on_the_cubic,
             skin_factor: wide_skin,
             carry_vector: carry_error,
+            overlap_error: step_overlap_error,
         }

@@ -3,7 +3,10 @@
 import math
 
 from flocsim.arrays import (
+    ANGLE,
     CANDIDATES,
+    CARRIED,
+    CLOSED,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
@@ -12,16 +15,21 @@ from flocsim.arrays import (
     GAP,
     KEPT,
     KEPT_EDGE,
+    KEPT_OFFSET,
     KEPT_SLIP,
     KEPT_VERTEX,
     NORMAL_X,
     NORMAL_Y,
     NOW,
     RADIUS,
+    SLIDING,
+    SLIP_OFFSET,
     VERTEX,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
+    X,
+    Y,
 )
 
 
@@ -38,6 +46,7 @@ def keep_slips(work):
             work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
             work.kept[count, KEPT_EDGE] = work.candidates[row, EDGE_START]
             work.slip[KEPT_SLIP, count] = work.slip[NOW, row]
+            work.slip[KEPT_OFFSET, count] = work.slip[SLIP_OFFSET, row]
             count += 1
     work.tally[KEPT] = count + 1
     return count
@@ -46,11 +55,12 @@ def keep_slips(work):
 def restore_slips(work, count):
     """Give the kept displacements back to the same pairs of the new list."""
     for row in range(work.tally[CANDIDATES]):
-        work.slip[NOW, row] = 0.0
+        work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = 0.0
         for k in range(count):
             same = work.kept[k, KEPT_VERTEX] == work.candidates[row, VERTEX]
             if same and work.kept[k, KEPT_EDGE] == work.candidates[row, EDGE_START]:
                 work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
+                work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
     work.tally[KEPT] = 0
 
 
@@ -124,9 +134,31 @@ def hand_over(scene, work):
             if heir >= 0:
                 own, given = work.slip[NOW, heir], work.slip[NOW, row]
                 most = math.hypot(own, given)
-                total = own + given * tangent_agreement(work, row, heir)
+                agreement = tangent_agreement(work, row, heir)
+                total = own + given * agreement
                 work.slip[NOW, heir] = min(max(total, -most), most)
+                wrong = slip_error(work, row) + work.slip[SLIP_OFFSET, row]
+                work.slip[SLIP_OFFSET, heir] += wrong * agreement
             work.slip[NOW, row] = 0.0
+
+
+def slip_error(work, row):
+    """How wrong a pair's two contact points lie along the tangent, as carried on with the motion
+    [m]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    e, g = work.motion, work.geometry
+    along = g[NOW, row, NORMAL_X] * (e[CARRIED, a, Y] - e[CARRIED, b, Y])
+    along -= g[NOW, row, NORMAL_Y] * (e[CARRIED, a, X] - e[CARRIED, b, X])
+    along += g[NOW, row, VERTEX_ARM_T] * e[CARRIED, a, ANGLE]
+    return along - g[NOW, row, EDGE_ARM_T] * e[CARRIED, b, ANGLE]
+
+
+def forget_offsets(work):
+    """Of pairs that are open, or slide, no displacement knows of the error that there is already:
+    ξ counts from where they will stick."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == 0 or work.candidates[row, SLIDING] != 0:
+            work.slip[SLIP_OFFSET, row] = -slip_error(work, row)
 
 
 def tangent_agreement(work, row, other):

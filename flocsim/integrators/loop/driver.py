@@ -30,7 +30,7 @@ from flocsim.arrays import (
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import hand_over
+from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
 from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
@@ -87,7 +87,8 @@ def accept(scene, work, clock, counts, step, lists):
         return SAME
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
         _, depth = resolutions_of(work, clock)
-        add_switch_errors(scene, work, step, depth)
+        add_switch_errors(scene, work, clock, step, depth)
+    forget_offsets(work)
     hand_over(scene, work)
     return set_modes(scene, work)
 

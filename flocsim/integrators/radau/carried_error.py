@@ -9,6 +9,10 @@ taken as
 
 of second order and, for γ from .18 to 2.18, L-stable (Hairer & Wanner II, 1996, section IV.6): for
 γ = h/µ, µ the real eigenvalue of Radau's matrix, the step has the factors of 1 − γz already.
+K has the springs k_t of the contacts that stick; but ξ counts from where a contact has touched or
+stuck, and knows nothing of the error e that the places had there already. So these springs pull by
+k_t e less: FORCING, constant over a step, for which (R − 1)/z stands.
+
 Contacts thus take up what they resist, a doublet that tips over lets an error grow, and errors of
 opposite signs cancel. Behind each step its own estimated error is added; what switches do is added
 by rhs/stated_error.py.
@@ -18,6 +22,7 @@ from flocsim.arrays import (
     CARRIED,
     CHANGE,
     DEVIATION,
+    FORCING,
     FREE,
     MOTION_COLUMNS,
     STAGED_STEP,
@@ -30,13 +35,15 @@ from flocsim.integrators.rhs.stated_error import bound_carried
 from flocsim.integrators.rhs.views import inertia
 
 
-def divide(scene, work, full):
-    """Divide CHANGE by 1 − γz, with the factors of a step of ``full`` [s]."""
+def divide(scene, work, full, weight):
+    """Divide CHANGE and ``weight`` times γh FORCING/M by 1 − γz, with the factors of a step of
+    ``full`` [s]."""
     size, motion = work.jacobian.shape[1], work.motion
     part = full / EIGENVALUES[REAL].real
     for row in range(size):
         body, axis = row // 3, row % 3
         load = inertia(scene, body, axis) / part * motion[CHANGE, body, VELOCITY + axis]
+        load += weight * motion[FORCING, body, VELOCITY + axis]
         for column in range(size):
             stiffness = work.jacobian[STIFFNESS, row, column]
             load -= stiffness * motion[CHANGE, column // 3, column % 3]
@@ -75,12 +82,13 @@ def carry_error(scene, work, clock, step):
     gamma = full / (EIGENVALUES[REAL].real * step)
     first = (1.0 - 3.0 * gamma) / gamma
     second = (0.5 - 3.0 * gamma + 3.0 * gamma * gamma) / (gamma * gamma)
-    # R as a polynomial in u = 1/(1 − γz), z being (1 − 1/u)/γ.
+    # R as a polynomial in u = 1/(1 − γz), z being (1 − 1/u)/γ; what a constant force leads to is
+    # (R − 1)/z = γ (u + (1 − second) u² + (1 + first + second) u³).
     mix(work, 0.0, 1.0)
-    divide(scene, work, full)
+    divide(scene, work, full, 1.0)
     mix(work, 1.0 + first + second, -first - 2.0 * second)
-    divide(scene, work, full)
+    divide(scene, work, full, 1.0 - second)
     mix(work, 1.0, second)
-    divide(scene, work, full)
+    divide(scene, work, full, 1.0)
     add_step(work)
     return bound_carried(scene, work)

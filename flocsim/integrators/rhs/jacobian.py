@@ -19,6 +19,7 @@ from flocsim.arrays import (
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
+    FORCING,
     GAP,
     NORMAL_X,
     NORMAL_Y,
@@ -26,8 +27,10 @@ from flocsim.arrays import (
     RADIUS,
     SHARE,
     SLIDING,
+    SLIP_OFFSET,
     STIFFNESS,
     TURNING,
+    VELOCITY,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
@@ -178,9 +181,24 @@ def add_contact(scene, work, row):
         add_product(work, which, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(work, which, a, b, across, by, sign * found[3 + 2 * axis])
     add_turning(scene, work, row, found[0], found[1])
+    if work.candidates[row, SLIDING] == 0:
+        offset = work.slip[SLIP_OFFSET, row]
+        add_forcing(work, a, b, along, found[6] * offset)
+        add_forcing(work, a, b, across, found[7] * offset)
+
+
+def add_forcing(work, a, b, out, size):
+    """Add a force of a size along a direction, by which the error is carried otherwise."""
+    out_a, out_b = out
+    for axis in range(3):
+        work.motion[FORCING, a, VELOCITY + axis] += size * out_a[axis]
+        work.motion[FORCING, b, VELOCITY + axis] += size * out_b[axis]
 
 
 def add_contacts(scene, work):
+    for body in range(work.motion.shape[1]):
+        for axis in range(VELOCITY, VELOCITY + 3):
+            work.motion[FORCING, body, axis] = 0.0
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             add_contact(scene, work, row)

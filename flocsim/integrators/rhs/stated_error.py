@@ -37,10 +37,12 @@ from flocsim.arrays import (
     GAP,
     INERTIA,
     MASS,
+    MOTION_COLUMNS,
     NORMAL_X,
     NORMAL_Y,
     NOW,
     RELAXATION,
+    SLIP_OFFSET,
     SPIN,
     STEP_ERROR,
     STEP_PLACE,
@@ -57,16 +59,16 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.views import contact_view, normal_rate
+from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
 from flocsim.laws import contact_force
 
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
 
-OF_VECTOR = 6.0
+OF_VECTOR = 15.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
-LEAST = 0.01
+LEAST = 0.006
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
 
 DOUBT = 2.0
@@ -112,27 +114,51 @@ def carry_errors(scene, work, clock, step):
     clock[ERROR] = min(largest, OF_VECTOR * vector)
 
 
-def shorten(scene, work, body, first, most):
-    """Shorten a body's carried error of place, or of velocity, to what it can be; its size."""
+@hook
+def overlap_error(scene, work, clock, row):
+    """By how much a method may have the overlap of a contact wrong beside its motion [m]."""
+    return 0.0
+
+
+def carried_size(scene, work, body):
+    """How large a body's carried error is in the place of its outline [m]."""
     e = work.motion
-    size = math.hypot(e[CARRIED, body, first], e[CARRIED, body, first + 1])
-    size += scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, first + 2])
-    if size <= most:
-        return size
-    for axis in range(first, first + 3):
-        e[CARRIED, body, axis] *= most / size
-    return most
+    turn = scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, ANGLE])
+    return math.hypot(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
+
+
+def shorten(scene, work, leader):
+    """Shorten the carried error of a cluster to what its places can be wrong by.
+
+    All of it by one factor, for it must not give the cluster a momentum that no step and no switch
+    has given it, and velocities too: those of vibrations are what their places make them.
+    """
+    share = 1.0
+    for body in range(work.bodies.shape[0]):
+        if work.cluster[body] == leader:
+            most = work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
+            size = carried_size(scene, work, body)
+            if size > most:
+                share = min(share, most / size)
+    if share < 1.0:
+        for body in range(work.bodies.shape[0]):
+            if work.cluster[body] == leader:
+                for axis in range(MOTION_COLUMNS):
+                    work.motion[CARRIED, body, axis] *= share
+        for row in range(work.tally[CANDIDATES]):
+            if work.cluster[work.candidates[row, VERTEX_BODY]] == leader:
+                work.slip[SLIP_OFFSET, row] *= share
 
 
 def bound_carried(scene, work):
-    """Keep every body's vector within the sum of its parts, which a mode that switches again and
-    again would make it leave; the largest one of place [m]."""
-    largest, errors = 0.0, work.bodies
+    """Keep the vector of every cluster within the sums of its parts, which a mode that switches
+    again and again would make it leave; the largest one of place [m]."""
+    largest = 0.0
     for body in range(work.bodies.shape[0]):
-        place = errors[body, ERROR_PLACE] + OF_SWITCHES * errors[body, SWITCH_PLACE]
-        speed = errors[body, ERROR_SPEED] + OF_SWITCHES * errors[body, SWITCH_SPEED]
-        shorten(scene, work, body, VX, speed)
-        largest = max(largest, shorten(scene, work, body, X, place))
+        if work.cluster[body] == body:
+            shorten(scene, work, body)
+    for body in range(work.bodies.shape[0]):
+        largest = max(largest, carried_size(scene, work, body))
     return largest
 
 
@@ -174,38 +200,53 @@ def gap_error(work, row, kind):
     return gap - g[NOW, row, EDGE_ARM_N] * e[kind, b, ANGLE]
 
 
+def is_closed(work, row):
+    """Whether a pair is flagged as one that touches."""
+    return work.candidates[row, CLOSED] == 1
+
+
 def has_switched(work, row):
     """Whether a pair touches, or no longer does, other than it is flagged."""
     closed = 1 if work.geometry[NOW, row, GAP] < 0.0 else 0
     return closed != work.candidates[row, CLOSED]
 
 
-def doubtful_time(work, row, step, depth):
+def doubtful_time(work, row, step, depth, doubt):
     """For how much of a step it is in doubt whether a pair touched [s]."""
     gap = work.geometry[NOW, row, GAP]
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
-        return min(abs(gap) / speed, step) if speed > 0.0 else step
-    doubt = max(depth, DOUBT * abs(gap_error(work, row, DEVIATION)))
-    return step if -doubt < gap < 0.0 else 0.0
+        return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
+    deepest = max(depth, doubt, DOUBT * abs(gap_error(work, row, DEVIATION)))
+    return step if -deepest < gap < 0.0 else 0.0
 
 
-def signed_time(work, row, step, depth):
+def pressed_stiffness(scene, view, overlap):
+    """The normal force of a contact pressed so far, over that [N/m]."""
+    force, _ = contact_force(scene, pressed_view(view, overlap, 0.0))
+    return force / overlap
+
+
+def signed_time(work, row, step, depth, doubt):
     """The same, above 0 where the force has acted for too long, as the carried error has it."""
     gap, wrong = work.geometry[NOW, row, GAP], gap_error(work, row, CARRIED)
     if has_switched(work, row):
         rate = normal_rate(work, NOW, row)
         late = (gap - wrong) / rate if rate != 0.0 else 0.0
+        if rate != 0.0:
+            late += math.copysign(doubt / rate, late)
         late = min(max(late, -step), step)
         return -late if gap < 0.0 else late
-    return step if -max(depth, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
+    return step if -max(depth, doubt, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
 
 
-def add_switch_errors(scene, work, step, depth):
+def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
-        late, signed = doubtful_time(work, row, step, depth), signed_time(work, row, step, depth)
+        doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
+        late = doubtful_time(work, row, step, depth, doubt)
+        signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = late * math.hypot(normal, tangential)

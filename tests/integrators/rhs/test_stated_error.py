@@ -4,20 +4,25 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim import Body, Sphere, System
+from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.arrays import (
     CARRIED,
     DAMPING,
     ERROR_PLACE,
     ERROR_SPEED,
     MASS,
+    NOW,
     STAGED_STEP,
     SWITCH_PLACE,
     work_of,
 )
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.slip_transfer import forget_offsets
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
+from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
@@ -87,12 +92,66 @@ def test_drag_uses_up_an_error_of_velocity():
     assert abs(speed) < 1e-12
 
 
+def touching(error, sticks_since):
+    """(x, y) that an error of place of a sphere on a fixed slab becomes over a hundred steps that
+    are long against the contact; ``sticks_since``: whether it was there when the contact stuck."""
+    slab = SpheroPolygon([(-2e-5, 0.0), (-2e-5, -5e-6), (2e-5, -5e-6), (2e-5, 0.0)], 1e-6)
+    bodies = [
+        Body(slab, (0.0, -2.5e-6), surface_density=2.0, fixed=True),
+        Body(Sphere(5e-6), (0.0, 6e-6 - 1e-9), surface_density=2.0),
+    ]
+    system = System(bodies, [Contact(), StokesDrag()])
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    work.bodies[:, ERROR_PLACE] = work.bodies[:, ERROR_SPEED] = 1.0
+    work.motion[CARRIED, 1, :2] = error
+    if sticks_since:
+        forget_offsets(work)
+    set_modes(scene, work)
+    forget_offsets(work)  # which leaves those that stick alone
+    for _ in range(100):
+        assemble_jacobian(scene, work, 0.0, 1.0)
+        clock = stepped(scene, work, 1e-5)
+        carry_error(scene, work, clock, 1e-5)
+    return work.motion[CARRIED, 1, :2]
+
+
+def test_a_contact_takes_up_what_is_wrong_along_its_normal_but_not_where_it_has_stuck():
+    x, y = touching((1e-9, 1e-9), sticks_since=True)
+    assert x == pytest.approx(1e-9, rel=1e-3) and abs(y) < 1e-12
+    x, y = touching((1e-9, 1e-9), sticks_since=False)
+    assert x < 0.8e-9 and abs(y) < 1e-12
+
+
 def test_a_vector_is_kept_within_the_sums():
     """The sums of this body's errors are nought, and so is what is carried on."""
     scene, work = at_start([StokesDrag()])
     work.motion[CARRIED, 0] = 1e-3
     assert carry_error(scene, work, stepped(scene, work, 1e-5), 1e-5) == 0.0
     assert not work.motion[CARRIED].any()
+
+
+def test_shortening_gives_a_cluster_no_momentum():
+    """Errors that a contact has given two bodies, of which one can be wrong by less than it has."""
+    bodies = [
+        Body(Sphere(radius), (x, 0.0), surface_density=2.0)
+        for radius, x in ((5e-6, 0.0), (8e-6, 1.3e-5 - 1e-9))
+    ]
+    system = System(bodies, [Contact()])
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    work.cluster[:] = 0
+    masses = scene.bodies[:, MASS]
+    work.motion[CARRIED, :, 0] = work.motion[CARRIED, :, 3] = 1e-9 / masses * masses.min()
+    work.motion[CARRIED, 1] *= -1.0
+    work.bodies[:, ERROR_PLACE] = 1e-10, 1e-8
+    assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
+    for axis in (0, 3):
+        moved = masses * work.motion[CARRIED, :, axis]
+        assert moved[0] != 0.0
+        assert moved[0] == pytest.approx(-moved[1], rel=1e-12, abs=0.0)
 
 
 def head_on(damping):
