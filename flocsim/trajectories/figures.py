@@ -10,8 +10,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
-from flocsim.io.plots.results import CLASS_WORDS
-from flocsim.io.plots.style import Figure
+from flocsim.io.plots.style import CLASS_WORDS, Figure
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.frames import Frames, frames_at, seen_from_first, travelled
 

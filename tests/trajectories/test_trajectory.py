@@ -132,7 +132,7 @@ def test_what_cannot_be_is_told(resting):
         system.run(until=1e-4, start=run, jit=False)
     with pytest.raises(UsageError, match="watch must be a function"):
         system.run(until=1e-4, watch=3)
-    with pytest.raises(UsageError, match="a time must be a number"):
+    with pytest.raises(UsageError, match="t must be a time such as '5 s', found 'now'"):
         run.at("now")
     with pytest.raises(UsageError, match="figure must be one of strip, distance, forces"):
         run.plot("histogram")

@@ -19,8 +19,7 @@ from flocsim.io.plots.collision import (
     rounded_length,
     time_unit,
 )
-from flocsim.io.plots.results import CLASS_WORDS
-from flocsim.io.plots.style import BODY_COLOURS
+from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS
 from flocsim.trajectories.frames import seen_from_first
 
 FRAMES = 150

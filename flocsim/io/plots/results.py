@@ -13,6 +13,7 @@ from flocsim.io.confidence import clustered_proportion, numerical_error, proport
 from flocsim.io.plots.style import (
     BOND_COLOURS,
     CLASS_COLOURS,
+    CLASS_WORDS,
     CROWDED,
     MARKERS,
     Figure,
@@ -36,12 +37,6 @@ LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
 BARS = "\n(bars: 95 %;\nthin: and numerics)"
 ENDS = ("", "_low", "_high", "_numerical")
-CLASS_WORDS = {
-    "A": "A  inside, aggregated",
-    "B": "B  inside, departed",
-    "C": "C  outside, aggregated",
-    "D": "D  outside, departed",
-}
 BOND_WORDS = {
     "certificate": "certificate: no load opens it",
     "hook": "hook: hangs by its shape",

@@ -61,6 +61,14 @@ METADATA: dict[str, dict[str, str | None]] = {
     "pdf": {"CreationDate": None, "Creator": "flocsim", "Producer": None},
     "svg": {"Date": None, "Creator": "flocsim"},
 }
+CLASS_WORDS = {
+    "A": "A  inside, aggregated",
+    "B": "B  inside, departed",
+    "C": "C  outside, aggregated",
+    "D": "D  outside, departed",
+}
+"""What the classes of outcome are."""
+
 FORMATS = tuple(METADATA)
 
 
