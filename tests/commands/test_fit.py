@@ -90,6 +90,11 @@ def test_nothing_fitted_is_an_error_and_writes_nothing(tmp_path, capsys):
     assert run(tmp_path / "empty", "--pixel-size", "1e-6", "-o", tmp_path / "s.h5") == 2
     assert "holds no pictures" in capsys.readouterr().err
     assert not (tmp_path / "s.h5").exists()
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(tmp_path / "absent.png", *options) == 2
+    assert "nothing was fitted" in capsys.readouterr().err
+    # Else the call that is right would find its table in the way.
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty"]
 
 
 def test_pictures_of_one_name_stay_apart(tmp_path, frame):

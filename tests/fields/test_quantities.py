@@ -76,6 +76,8 @@ WRONG = {
     "inf m": "no number",
     "1_000 m": "no unit",
     "5 furlangs": "unknown unit 'furlangs'",
+    "0.95 px": "'px' is no unit of length: a pixel has the size that a picture has",
+    "2 pixel": "'pixel' is no unit of length",
     "5 m +": "no unit",
     "3 m + 4 m": "no unit",
     "9**9**9 m": "no unit",

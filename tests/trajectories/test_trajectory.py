@@ -7,6 +7,7 @@ from flocsim import Body, Sphere, System
 from flocsim.errors import UsageError
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
+from flocsim.trajectories.figures import frames_of
 
 FALL = [Gravity(), StokesDrag()]
 STICKY = [*FALL, VanDerWaals(hamaker=1e-20), Contact(k_n=20.0, k_t=2.0)]
@@ -130,6 +131,8 @@ def test_what_cannot_be_is_told(resting):
         falling(Implicit()).run(until=1.0, start=run, jit=False)
     with pytest.raises(UsageError, match="at which start has ended"):
         system.run(until=1e-4, start=run, jit=False)
+    with pytest.raises(UsageError, match=r"start must be a Trajectory, .* found State"):
+        system.run(until=1.0, start=run.at("0.2 ms"), jit=False)
     with pytest.raises(UsageError, match="watch must be a function"):
         system.run(until=1e-4, watch=3)
     with pytest.raises(UsageError, match="t must be a time such as '5 s', found 'now'"):
@@ -150,6 +153,19 @@ def test_figures_and_words(resting, tmp_path):
     assert len(repr(run)) < 80 and len(repr(run.at(0.0))) < 60
 
 
+def test_frames_are_as_many_as_were_asked_for(resting):
+    """Of few long steps, between them too, evenly along the way; of a body that stays, in time."""
+    lone = falling(Implicit()).run(until=5e-3, jit=False)
+    for frames in (2, 6, 40):
+        found = frames_of(lone, frames)
+        assert len(found.times) == len(found.outlines) == frames
+        ways = np.array([each[0][0].mean(axis=0)[1] for each in found.outlines])
+        np.testing.assert_allclose(np.diff(ways), ways[-1] / (frames - 1), rtol=0.05)
+    assert [found.times[0], found.times[-1]] == [0.0, 5e-3]
+    at_rest = System([Body(Sphere(1e-5), fixed=True, density=2650.0)], FALL).run(1e-3, jit=False)
+    assert frames_of(at_rest, 5).times.tolist() == [0.0, 1e-3]
+
+
 def test_a_saved_motion_opens_in_xarray(resting, tmp_path):
     xarray = pytest.importorskip("xarray")
     _, run = resting
@@ -160,7 +176,7 @@ def test_a_saved_motion_opens_in_xarray(resting, tmp_path):
         np.testing.assert_array_equal(data["position"].sel(body=1, component="y"),
                                       run.position[:, 1, 1])  # fmt: skip
         np.testing.assert_array_equal(data["time"], run.t)
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(UsageError, match=r"exists already .* say overwrite=True"):
         run.save(tmp_path / "m.h5")
 
 

@@ -1,5 +1,6 @@
 """The shape library: what is written is read, and nothing else is."""
 
+import attrs
 import h5py
 import numpy as np
 import pytest
@@ -142,4 +143,10 @@ def test_what_cannot_be_written_is_refused(tmp_path, entries):
         write_library(tmp_path / "s.h5", [])
     with pytest.raises(UsageError, match="twice"):
         write_library(tmp_path / "s.h5", [entries[0], entries[0]])
+    fits = {
+        count: attrs.evolve(fit, vertices=1e6 * fit.vertices, radius=1e6 * fit.radius)
+        for count, fit in entries[0].fits.items()
+    }
+    with pytest.raises(UsageError, match=r"reaches .* m far, .* with pixels of 0.5 m\?"):
+        write_library(tmp_path / "s.h5", [attrs.evolve(entries[0], fits=fits, pixel_size=0.5)])
     assert not list(tmp_path.iterdir())
