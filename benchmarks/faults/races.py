@@ -116,7 +116,8 @@ def race(folder, rng):
             return None, SLOWEST
         if to_end is not None and time.monotonic() > moment:
             to_end.signal(signal.SIGCONT)
-            os.kill(to_end.process.pid, signal.SIGTERM)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(to_end.process.pid, signal.SIGTERM)
             to_end = None
         racer = racers[rng.integers(2)]
         if racer.process.poll() is None and time.monotonic() - began < 8.0:

@@ -13,6 +13,7 @@ from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, w
 from flocsim.io.plots.style import CLASS_WORDS, Figure
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.frames import Frames, frames_at, seen_from_first, travelled
+from flocsim.trajectories.replay import hermite
 
 FIGURES = ("strip", "distance", "forces")
 MOST_FRAMES = 500
@@ -27,15 +28,29 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     wanted = np.linspace(0.0, way[-1], count)
     # What stays where it is is seen evenly in time.
     times = np.interp(wanted, way, trajectory.t) if way[-1] > 0.0 else trajectory.t[[0, -1]]
-    states = trajectory.at(times).position
-    found = frames_at(np.arange(len(times)), shapes, times, states)
+    found = frames_at(np.arange(len(times)), shapes, times, places_at(trajectory, times))
     whole = seen_from_first(position)
     return attrs.evolve(found, paths=[whole[:, n, :2] for n in range(len(shapes))])
 
 
+def places_at(trajectory: Any, times: np.ndarray) -> np.ndarray:
+    """The places (f, n, 3) at some times; of a motion from a file by Hermite's cubic."""
+    if hasattr(trajectory, "at"):
+        return trajectory.at(times).position
+    t = trajectory.t
+    steps = np.searchsorted(t[1:-1], times, side="right") if len(t) > 1 else None
+    if steps is None:
+        return trajectory.position[np.zeros(len(times), dtype=int)]
+    states = np.concatenate([trajectory.position, trajectory.velocity], axis=2)
+    return np.array([
+        hermite(t[step], t[step + 1], states[step], states[step + 1], time)[:, :3]
+        for step, time in zip(steps, times, strict=True)
+    ])  # fmt: skip
+
+
 def title_of(trajectory: Any) -> str:
     """The outcome of a study's replicate; of any other run, how it ended."""
-    if trajectory.row is not None:
+    if getattr(trajectory, "row", None) is not None:
         outcome = trajectory.row["outcome"]
         return CLASS_WORDS.get(outcome, outcome)
     return str(trajectory.status).partition(":")[0].lower()

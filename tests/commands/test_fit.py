@@ -60,9 +60,14 @@ def test_a_pixel_size_with_its_unit(tmp_path, frame):
 
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
     options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
-    assert run(frame, "--pixel-size", "8.6", *options) == 0
+    with pytest.raises(UsageError, match=r"reaches .* m far"):
+        run(frame, "--pixel-size", "8.6", *options)
+    capsys.readouterr()
+    assert run(frame, "--pixel-size", "8.6 mm", *options) == 0
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith("flocsim: warning: --pixel-size = 8.6 m is implausible: the side of a")
+    assert line.startswith(
+        "flocsim: warning: --pixel-size = 0.0086 m is implausible: the side of a"
+    )
     assert line.removeprefix("flocsim: warning: ") == read_settings(tmp_path / "s.h5")["warning"]
 
 
