@@ -26,7 +26,7 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     position, shapes = trajectory.position, trajectory.shapes
     way = travelled(position, [shape.bounding_radius for shape in shapes])
     wanted = np.linspace(0.0, way[-1], count)
-    # What stays where it is is seen evenly in time.
+    # What stays where it is is seen at its start and its end.
     times = np.interp(wanted, way, trajectory.t) if way[-1] > 0.0 else trajectory.t[[0, -1]]
     found = frames_at(np.arange(len(times)), shapes, times, places_at(trajectory, times))
     whole = seen_from_first(position)

@@ -88,7 +88,7 @@ def accept(scene, work, clock, counts, step, lists):
     if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
         _, depth = resolutions_of(work, clock)
         add_switch_errors(scene, work, clock, step, depth)
-    forget_offsets(work)
+        forget_offsets(work)
     hand_over(scene, work)
     return set_modes(scene, work)
 

@@ -75,11 +75,12 @@ def against_key(content: tuple[dict[str, Any], dict[str, Any]]) -> Figure:
             if is_log:
                 axes.set_xscale("log")
                 axes.xaxis.set_minor_formatter(NullFormatter())
+            else:
+                axes.locator_params(axis="x", nbins=5)
             style = (
                 EngFormatter(first.unit) if first.unit in PREFIXED else StrMethodFormatter("{x:g}")
             )
             axes.xaxis.set_major_formatter(style)
-            axes.locator_params(axis="x", nbins=5) if not is_log else None
         for axes in panels[::PANELS_PER_ROW]:
             axes.set_ylabel(LABELS["pr_a"])
         title = ", ".join(plain(name) for name in others) + BARS
