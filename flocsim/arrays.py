@@ -331,14 +331,16 @@ def work_of(
     capacity: int = 256,
     pairs: int | None = None,
     blocks: int | None = None,
+    all_pairs: bool = True,
 ) -> Work:
     """Work arrays for a scene at the given position and velocity (n, 3), no contact yet; room for
-    so many pairs of features and of bodies, and blocks of sparse systems."""
+    so many pairs of features and of bodies, and blocks of sparse systems; ``all_pairs``: whether
+    all pairs of few bodies are watched."""
     n = len(scene.bodies)
     motion = np.zeros((MOTION_ROWS, n, MOTION_COLUMNS))
     motion[NOW] = np.hstack([position, velocity])
     dense = n if n <= DENSE else 0
-    if n <= ALL_PAIRS:
+    if n <= ALL_PAIRS and all_pairs:
         pairs = n * (n - 1) // 2
     elif pairs is None:
         pairs = PAIRS_A_BODY * n
@@ -363,7 +365,7 @@ def work_of(
         starts=np.zeros(n + 1, dtype=np.int64),
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
-    if n <= ALL_PAIRS:
+    if n <= ALL_PAIRS and all_pairs:
         work.pairs[:, LATER], work.pairs[:, EARLIER] = np.tril_indices(n, -1)
         work.tally[PAIRS] = pairs
     return work

@@ -69,7 +69,7 @@ class Swarm(NamedTuple):
 
 
 def swarm_of(
-    scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float, wander: np.ndarray
+    scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float
 ) -> Swarm:
     """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet."""
     n = len(scene.bodies)
@@ -83,7 +83,7 @@ def swarm_of(
         carried=np.zeros((n, MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
         steps=np.full(n, float(first_step)),
-        wander=np.array(wander, dtype=float),
+        wander=np.zeros(n),
         first_link=np.zeros(n + 1, dtype=np.int64),
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
         slips=np.zeros((0, 2)),

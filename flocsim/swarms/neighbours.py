@@ -22,13 +22,13 @@ from flocsim.geometry.contact.sweep import (
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 
 
-def set_discs(swarm, span, share, reach):
-    """The discs of a window of so many seconds, and of a share of what bodies may stray."""
+def set_discs(swarm, span, reach):
+    """The discs of a window of so many seconds."""
     for body in range(swarm.bodies.shape[0]):
         disc = swarm.discs[body]
         disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, X], swarm.motion[body, Y]
         disc[WAY_X], disc[WAY_Y] = span * swarm.motion[body, VX], span * swarm.motion[body, VY]
-        disc[REACH] = swarm.bodies[body, BOUNDING_RADIUS] + share * swarm.wander[body]
+        disc[REACH] = swarm.bodies[body, BOUNDING_RADIUS] + swarm.wander[body]
         disc[REACH] += 0.5 * reach
         disc[MOVES] = swarm.bodies[body, FREE]
         if disc[MOVES] == 0.0:
@@ -50,7 +50,7 @@ def core_distance2(swarm, wall, x, y):
     return least
 
 
-def reaches_wall(swarm, body, wall, span, share, reach, width, height):
+def reaches_wall(swarm, body, wall, span, reach, width, height):
     """Whether a body can come to act on a fixed one in a window."""
     m = swarm.motion
     x = nearest_way(m[body, X] - m[wall, X], width)
@@ -58,7 +58,7 @@ def reaches_wall(swarm, body, wall, span, share, reach, width, height):
     way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
     way += span * abs(m[wall, SPIN]) * swarm.bodies[wall, BOUNDING_RADIUS]
     near = swarm.bodies[body, BOUNDING_RADIUS] + swarm.bodies[wall, RADIUS] + reach
-    near += way + share * swarm.wander[body]
+    near += way + swarm.wander[body]
     return core_distance2(swarm, wall, x, y) < near * near
 
 
@@ -69,14 +69,14 @@ def first_of(labels, body):
     return body
 
 
-def find_islands(swarm, span, share, reach, width, height, pairs, labels, walls, touches):
+def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
     """Name every free body by the first one of its island, fixed ones by −1, and note in
     ``touches`` (n, k) which of the fixed bodies ``walls`` (k,) it can reach.
 
     Returns the number of near pairs: more than ``pairs`` has room for where that was too few.
     """
     n = swarm.bodies.shape[0]
-    set_discs(swarm, span, share, reach)
+    set_discs(swarm, span, reach)
     total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
     if total > pairs.shape[0]:
         return total
@@ -92,7 +92,7 @@ def find_islands(swarm, span, share, reach, width, height, pairs, labels, walls,
         free = swarm.bodies[body, FREE] == 1.0
         for each in range(walls.shape[0]):
             touches[body, each] = free and reaches_wall(
-                swarm, body, walls[each], span, share, reach, width, height
+                swarm, body, walls[each], span, reach, width, height
             )
     for wall in walls:
         labels[wall] = -1

@@ -1,54 +1,24 @@
-"""From one common time to the next: which islands there are, their runs, and what is kept of them.
+"""Islands of a window as arrays, and how threads run them."""
 
-A window is tried until no body of it strays further from its straight path than others have counted
-on: those that did may stray further in the next try, islands that merge by that are run anew, and
-after some tries the window is made shorter. What islands have come to is taken over all at once.
-"""
-
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import FREE, FULL, NOTHING_FULL, Scene, Work, with_room, work_of
-from flocsim.integrators.base import Integrator, Status
-from flocsim.swarms.arrays import (
-    BEGIN,
-    COST_COLUMNS,
-    END,
-    TRACK_COLUMNS,
-    Found,
-    Swarm,
-    found_of,
-    with_links,
-)
+from flocsim.integrators.base import Integrator
+from flocsim.swarms.arrays import COST_COLUMNS, TRACK_COLUMNS, Found, Swarm, found_of
 
-LEAST_WANDER = 0.02
-"""A body may stray by so many bounding radii at least."""
-
-MORE_WANDER = 2.0
-"""It may stray by so many times as far as it has in the last window."""
-
-MOST_TRIES = 4
-"""Tries of a window before it is made shorter."""
-
-CROWDED, SPARSE = 3.0, 1.5
-"""A window is made shorter where its islands take more than so many times the work of the clusters
-that there are, longer where they take less."""
-
-SHORTER, LONGER = 0.6, 1.4
-
-SMALL_ROOM = 24
-"""Room for so many pairs of features of a body, at first."""
+FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
+"""Room at first for pairs of features, for every body of so few, and of more."""
 
 CHUNK = 64
 """Bodies of islands that a thread takes at once."""
 
 
 @attrs.define
-class Place:
+class IslandArrays:
     """Arrays for islands of a number of bodies."""
 
     scene: Scene
@@ -58,17 +28,17 @@ class Place:
     counts: np.ndarray
 
 
-class Bench:
-    """The arrays of one thread: places by size, what its islands have found."""
+class ThreadArrays:
+    """The arrays of one thread: for islands of every size that there is, and what they found."""
 
-    def __init__(self, template: Scene, most_points: int) -> None:
-        self.template, self.most_points = template, most_points
-        self.places: dict[int, Place] = {}
+    def __init__(self, template: Scene) -> None:
+        self.template, self.most_points = template, int(np.diff(template.first).max())
+        self.by_size: dict[int, IslandArrays] = {}
         self.found: Found = found_of(256)
 
-    def place_of(self, size: int, integrator: Integrator) -> Place:
+    def of_size(self, size: int, integrator: Integrator) -> IslandArrays:
         """Arrays for islands of so many bodies."""
-        if size not in self.places:
+        if size not in self.by_size:
             points = size * self.most_points
             scene = self.template._replace(
                 bodies=np.ones((size, self.template.bodies.shape[1])),
@@ -77,18 +47,18 @@ class Bench:
                 tree=np.zeros((2 * points, 3)),
             )
             zeros = np.zeros((size, 3))
-            room = max(16, min(SMALL_ROOM * size, 256) if size < 12 else 6 * size)
-            work = work_of(scene, zeros, zeros, room if size > 1 else 1, 4 * size, 8 * size)
-            self.places[size] = Place(
+            room = size * (ROOM_OF_FEW if 1 < size <= FEW else ROOM_OF_MANY)
+            work = work_of(scene, zeros, zeros, room, pairs=4 * size, blocks=8 * size)
+            self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, TRACK_COLUMNS)),
                 integrator.fresh_clock(), integrator.fresh_counts(0),
             )  # fmt: skip
-        return self.places[size]
+        return self.by_size[size]
 
     def forget_above(self, size: int) -> None:
         """Give back the arrays for more bodies than that: no island is so large any more."""
-        for each in [each for each in self.places if each > size]:
-            del self.places[each]
+        for each in [each for each in self.by_size if each > size]:
+            del self.by_size[each]
 
 
 @attrs.define
@@ -123,33 +93,42 @@ class Islands:
 
     def key(self, island: int) -> bytes:
         """What tells an island from others."""
-        return self.members[self.starts[island] : self.starts[island + 1]].tobytes()
+        return self.members_of(island).tobytes()
 
-    def sorted_by_size(self) -> "Islands":
-        """The same, the largest first, islands of a size one after another."""
-        order = np.argsort(-self.sizes, kind="stable")
-        sizes = self.sizes[order]
-        starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        members = np.concatenate(
-            [self.members[self.starts[each] : self.starts[each + 1]] for each in order]
-        )
-        return Islands(members, starts, self.codes[order], self.costs[order])
+    def members_of(self, island: int) -> np.ndarray:
+        """The bodies of an island, in their order."""
+        return self.members[self.starts[island] : self.starts[island + 1]]
+
+    def chosen(self, which: Sequence[int]) -> "Islands":
+        """Some of them, the largest first, those of a size one after another."""
+        which = np.array(which, dtype=int)
+        which = which[np.argsort(-self.sizes[which], kind="stable")]
+        members = [self.members_of(each) for each in which]
+        starts = np.concatenate([[0], np.cumsum(self.sizes[which])]).astype(np.int64)
+        return Islands(
+            np.concatenate([self.members[:0], *members]),
+            starts, self.codes[which], self.costs[which],
+        )  # fmt: skip
+
+    @property
+    def work(self) -> float:
+        """What they cost as long as all steps are alike: bodies of each, times bodies."""
+        return float(np.sum(self.sizes.astype(float) ** 2))
 
 
 @attrs.define
 class Runner:
-    """Runs islands: the compiled functions, and each thread's arrays."""
+    """Finds and runs islands: the compiled functions, and each thread's arrays."""
 
     finder: Callable[..., int]
     driver: Callable[..., int]
     integrator: Integrator
-    benches: list[Bench]
+    threads: list[ThreadArrays]
     max_steps: int
-    pool: ThreadPoolExecutor | None
-    pairs: np.ndarray
+    pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
 
     def islands_of(
-        self, swarm: Swarm, span: float, share: float, reach: float, box: tuple[float, float]
+        self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
     ) -> Islands:
         """The islands of a window of so many seconds."""
         walls = np.flatnonzero(swarm.bodies[:, FREE] == 0.0)
@@ -157,17 +136,17 @@ class Runner:
         touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
         while True:
             found = self.finder(
-                swarm, span, share, reach, *box, self.pairs, labels, walls, touches
+                swarm, span, reach, *box, self.pairs, labels, walls, touches
             )
             if found <= len(self.pairs):
                 return Islands.of(labels, walls, touches)
             self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
 
     def run_chunk(
-        self, bench: Bench, swarm: Swarm, islands: Islands, first: int, last: int, all_in: bool
+        self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int, all_in: bool
     ) -> None:
         """Run islands of one size."""
-        place = bench.place_of(int(islands.sizes[first]), self.integrator)
+        place = own.of_size(int(islands.sizes[first]), self.integrator)
         start_clock = self.integrator.fresh_clock()
         start_counts = self.integrator.fresh_counts(self.max_steps)
         record = np.zeros((0, 1))
@@ -175,39 +154,39 @@ class Runner:
             first = self.driver(
                 swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
                 start_clock, start_counts, islands.members, islands.starts, islands.codes,
-                islands.costs, bench.found, first, last, all_in,
+                islands.costs, own.found, first, last, all_in,
             )  # fmt: skip
             if first == last:
                 return
             if place.work.tally[FULL] == NOTHING_FULL:
-                bench.found = larger(bench.found)
+                own.found = larger(own.found)
             else:
                 place.work = with_room(place.work)
 
-    def run(self, swarm: Swarm, islands: Islands, all_in: bool) -> list:
-        """Run islands, sorted by size, in all threads; the contacts that they have found."""
+    def run(self, swarm: Swarm, islands: Islands, all_in: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Run islands, those of a size one after another, in all threads: the contacts that they
+        leave behind (links and slips), in any order."""
         chunks = chunks_of(islands.sizes)
-        for bench in self.benches:
-            bench.found.count[0] = 0
-            bench.forget_above(int(islands.sizes[0]) if len(islands.sizes) else 0)
 
-        def work_off(bench: Bench) -> None:
-            while True:
+        def work_off(own: ThreadArrays) -> None:
+            own.found.count[0] = 0
+            own.forget_above(int(islands.sizes.max(initial=0)))
+            while chunks:
                 try:
                     first, last = chunks.pop()
                 except IndexError:
                     return
-                self.run_chunk(bench, swarm, islands, first, last, all_in)
+                self.run_chunk(own, swarm, islands, first, last, all_in)
 
-        if self.pool is None:
-            work_off(self.benches[0])
+        if len(self.threads) == 1:
+            work_off(self.threads[0])
         else:
-            list(self.pool.map(work_off, self.benches))
-        return [
-            (bench.found.links[: bench.found.count[0]].copy(),
-             bench.found.slips[: bench.found.count[0]].copy())
-            for bench in self.benches
-        ]  # fmt: skip
+            with ThreadPoolExecutor(len(self.threads)) as pool:
+                list(pool.map(work_off, self.threads))
+        counts = [int(own.found.count[0]) for own in self.threads]
+        both = list(zip(self.threads, counts, strict=True))
+        links = np.concatenate([own.found.links[:count] for own, count in both])
+        return links, np.concatenate([own.found.slips[:count] for own, count in both])
 
 
 def larger(found: Found) -> Found:
@@ -230,8 +209,3 @@ def chunks_of(sizes: np.ndarray) -> list[tuple[int, int]]:
         found.append((first, last))
         first = last
     return found[::-1]
-
-
-def work_in(islands: Islands) -> float:
-    """What islands cost as long as all have steps alike: bodies of each, times bodies."""
-    return float(np.sum(islands.sizes.astype(float) ** 2))
