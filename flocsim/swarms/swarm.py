@@ -28,7 +28,7 @@ from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.trajectory import SwarmTrajectory
 from flocsim.system import System
 
-LEAST_BOX = 5.0
+LEAST_BOX = 3.0
 """A box that repeats itself is so many times as wide as the largest body at least: two bodies must
 not meet in two places at once."""
 
