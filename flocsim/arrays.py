@@ -268,8 +268,8 @@ class Work(NamedTuple):
     ``candidates`` (capacity, 9): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
     ``kept`` (capacity, 4): the pairs whose displacements are set aside.
     ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
-    (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8), ``order`` (n,) and
-    ``starts`` (n + 1,): what the sweep for them works on.
+    (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),
+    ``order`` (n,) and ``starts`` (n + 1,): what the sweep for them works on.
     ``tally``: counts, see CANDIDATES.
     """
 

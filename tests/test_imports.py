@@ -22,6 +22,7 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
+    ["swarms"],
     ["system"],
     ["trajectories"],
     ["io"],
@@ -44,6 +45,14 @@ INNER_ROWS = {
         ["disk_cache", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
+    "swarms": [
+        ["swarm"],
+        ["trajectory"],
+        ["progress"],
+        ["runner", "clusters"],
+        ["contacts", "islands", "neighbours", "placement", "walls"],
+        ["arrays"],
+    ],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

@@ -46,8 +46,8 @@ another kind leave the text of a law as it is."""
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
-    gap of outlines is smoothed (smoothing.py), how many events its contact forces have, and which forces are
-    used and left out."""
+    gap of outlines is smoothed (smoothing.py), how many events its contact forces have, and which
+    forces are used and left out."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)

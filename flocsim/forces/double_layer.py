@@ -15,8 +15,8 @@ class DoubleLayer(PairForce):
     """Repulsion F = 4π ε0 ε_r κ φ² r* exp(−κ d), r* = r_i r_j/(r_i + r_j).
 
     Parameters: ``potential`` φ [V]; ``debye_length`` 1/κ [m]; ``permittivity`` ε_r [-]; ``gap`` and
-    ``cut`` as for VanDerWaals. Bodies in contact count as d = 0.  Source: Tang et al. (2014), eq. 6, whose
-    minus sign means "against attraction".
+    ``cut`` as for VanDerWaals. Bodies in contact count as d = 0.  Source: Tang et al. (2014), eq.
+    6, whose minus sign means "against attraction".
     """
 
     potential: float = quantity("V", default=15e-3)

@@ -9,7 +9,9 @@ from flocsim.forces.base import PairForce
 GAPS = {"equivalent_spheres": "centres", "surface": "surfaces"}
 """What the gap d is: between equivalent spheres (the paper), or between the outlines."""
 
-CUT_HELP = "gap beyond which the force is left out, where that is to be nearer than it is negligible"
+CUT_HELP = (
+    "gap beyond which the force is left out, where that is to be nearer than it is negligible"
+)
 
 
 def cut_at(cut: float | None, reach: float) -> float:
@@ -24,7 +26,7 @@ class VanDerWaals(PairForce):
     Parameters: ``hamaker`` H_A [J]; ``d_min`` [m], below which the diverging law is cut off;
     ``gap``: d = d_c − r_i − r_j ("equivalent_spheres", along the line of centres) or the distance
     of the outlines ("surface", at all nearly closest points); ``cut`` [m], the gap beyond which the
-    force is left out, where that is to be nearer than it is negligible.  Source: Tang et al. (2014), eq. 5.
+    force is left out, where it is not negligible by then.  Source: Tang et al. (2014), eq. 5.
     """
 
     hamaker: float = quantity("J", at_least=0.0, default=1e-18)

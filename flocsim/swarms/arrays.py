@@ -68,9 +68,7 @@ class Swarm(NamedTuple):
     times: np.ndarray
 
 
-def swarm_of(
-    scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float
-) -> Swarm:
+def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float) -> Swarm:
     """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet."""
     n = len(scene.bodies)
     motion = np.ascontiguousarray(np.hstack([position, velocity]))
@@ -102,11 +100,11 @@ def swarm_of(
 
 class Found(NamedTuple):
     """What islands have left behind: ``links`` (room, 4) and ``slips`` (room, 2), filled up to
-    ``count[0]``."""
+    ``filled[0]``."""
 
     links: np.ndarray
     slips: np.ndarray
-    count: np.ndarray
+    filled: np.ndarray
 
 
 def found_of(room: int) -> Found:

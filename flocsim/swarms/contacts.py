@@ -1,17 +1,13 @@
 """Which bodies of a swarm are near each other at an instant, and how near."""
 
-import math
 from collections.abc import Callable
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import (
-    BOUNDING_RADIUS,
     EARLIER,
-    FULL,
     LATER,
-    NOTHING_FULL,
     NOW,
     PAIRS,
     Scene,
@@ -62,7 +58,10 @@ class Gauge:
             hook: function for hook, function in fillings.items()
             if hook in (gap_between, separation)
         }  # fmt: skip
-        self.gaps, self.vectors = compose(measure_gaps, geometry), compose(vectors_between, geometry)
+        self.gaps, self.vectors = (
+            compose(measure_gaps, geometry),
+            compose(vectors_between, geometry),
+        )
         n = len(scene.bodies)
         self.work = work_of(scene, np.zeros((n, 3)), np.zeros((n, 3)), 1, blocks=0, all_pairs=False)
 
@@ -74,8 +73,9 @@ class Gauge:
         count = int(self.work.tally[PAIRS])
         vectors = np.zeros((count, 2))
         self.vectors(self.scene, self.work, vectors)
-        near = self.work.budget[:count] < within if within > 0.0 else self.work.budget[:count] <= 0.0
+        gaps = self.work.budget[:count]
+        near = gaps < within if within > 0.0 else gaps <= 0.0
         return Neighbours(
-            self.work.pairs[:count, :2][near].copy(), self.work.budget[:count][near].copy(),
+            self.work.pairs[:count, :2][near].copy(), gaps[near].copy(),
             vectors[near],
         )  # fmt: skip

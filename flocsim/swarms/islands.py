@@ -78,8 +78,16 @@ def watch_paths(scene, work, observed, time):
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, FREE] == 1.0:
             since = time - observed[body, SINCE]
-            x = work.motion[NOW, body, X] - observed[body, START_X] - since * observed[body, PATH_VX]
-            y = work.motion[NOW, body, Y] - observed[body, START_Y] - since * observed[body, PATH_VY]
+            x = (
+                work.motion[NOW, body, X]
+                - observed[body, START_X]
+                - since * observed[body, PATH_VX]
+            )
+            y = (
+                work.motion[NOW, body, Y]
+                - observed[body, START_Y]
+                - since * observed[body, PATH_VY]
+            )
             away = math.hypot(x, y)
             observed[body, FURTHEST] = max(observed[body, FURTHEST], away)
             strays = strays or away > observed[body, ALLOWED]
@@ -183,7 +191,9 @@ def global_point(swarm, scene, members, first, point, body, other):
     return swarm.first[members[first + body]] + point - scene.first[body]
 
 
-def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, first, all_in):
+def put_times(
+    swarm, work, observed, clock, counts, start_clock, start_counts, members, first, all_in
+):
     """Clock, counts, and the paths that its bodies are expected to go."""
     for place in range(CLOCK_SIZE):
         clock[place] = start_clock[place]
@@ -209,7 +219,7 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
 
 def take_slips(swarm, scene, work, found, members, first):
     """Write down the displacements of its contacts; False without room."""
-    count, begin = keep_slips(work), found.count[0]
+    count, begin = keep_slips(work), found.filled[0]
     work.tally[KEPT] = 0
     if begin + count > found.links.shape[0]:
         return False
@@ -226,7 +236,7 @@ def take_slips(swarm, scene, work, found, members, first):
         )
         found.slips[row, SLIP] = work.slip[KEPT_SLIP, kept]
         found.slips[row, OFFSET] = work.slip[KEPT_OFFSET, kept]
-    found.count[0] = begin + count
+    found.filled[0] = begin + count
     return True
 
 

@@ -7,7 +7,6 @@ that a window leaves nothing behind that is half done.
 """
 
 import math
-from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -161,7 +160,7 @@ class Progress:
                 self.failed = members
                 return Status(code)
         own = np.maximum(owners[links[:, 0]], owners[links[:, 1]])
-        for each in np.flatnonzero(fresh.codes == Status.FINISHED):
+        for each in np.flatnonzero(fresh.codes == Status.FINISHED).tolist():
             kept[fresh.key(each)] = links[own == each], slips[own == each]
         return found
 

@@ -101,13 +101,13 @@ class Islands:
 
     def chosen(self, which: Sequence[int]) -> "Islands":
         """Some of them, the largest first, those of a size one after another."""
-        which = np.array(which, dtype=int)
-        which = which[np.argsort(-self.sizes[which], kind="stable")]
-        members = [self.members_of(each) for each in which]
-        starts = np.concatenate([[0], np.cumsum(self.sizes[which])]).astype(np.int64)
+        order = np.array(which, dtype=int)
+        order = order[np.argsort(-self.sizes[order], kind="stable")]
+        members = [self.members_of(each) for each in order]
+        starts = np.concatenate([[0], np.cumsum(self.sizes[order])]).astype(np.int64)
         return Islands(
             np.concatenate([self.members[:0], *members]),
-            starts, self.codes[which], self.costs[which],
+            starts, self.codes[order], self.costs[order],
         )  # fmt: skip
 
     @property
@@ -135,9 +135,7 @@ class Runner:
         labels = np.zeros(len(swarm.bodies), dtype=np.int64)
         touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
         while True:
-            found = self.finder(
-                swarm, span, reach, *box, self.pairs, labels, walls, touches
-            )
+            found = self.finder(swarm, span, reach, *box, self.pairs, labels, walls, touches)
             if found <= len(self.pairs):
                 return Islands.of(labels, walls, touches)
             self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
@@ -169,7 +167,7 @@ class Runner:
         chunks = chunks_of(islands.sizes)
 
         def work_off(own: ThreadArrays) -> None:
-            own.found.count[0] = 0
+            own.found.filled[0] = 0
             own.forget_above(int(islands.sizes.max(initial=0)))
             while chunks:
                 try:
@@ -183,7 +181,7 @@ class Runner:
         else:
             with ThreadPoolExecutor(len(self.threads)) as pool:
                 list(pool.map(work_off, self.threads))
-        counts = [int(own.found.count[0]) for own in self.threads]
+        counts = [int(own.found.filled[0]) for own in self.threads]
         both = list(zip(self.threads, counts, strict=True))
         links = np.concatenate([own.found.links[:count] for own, count in both])
         return links, np.concatenate([own.found.slips[:count] for own, count in both])
@@ -192,9 +190,9 @@ class Runner:
 def larger(found: Found) -> Found:
     """The same with twice the room."""
     other = found_of(2 * len(found.links))
-    count = found.count[0]
+    count = found.filled[0]
     other.links[:count], other.slips[:count] = found.links[:count], found.slips[:count]
-    other.count[0] = count
+    other.filled[0] = count
     return other
 
 

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import attrs
@@ -23,7 +23,7 @@ from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.islands import run_islands, watch_paths
 from flocsim.swarms.neighbours import find_islands
-from flocsim.swarms.progress import LEAST_WANDER, Progress
+from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.trajectory import SwarmTrajectory
 from flocsim.system import System
@@ -49,7 +49,7 @@ def read_box(box: Any) -> tuple[float, float]:
     sides = []
     for side, name in ((width, "width"), (height, "height")):
         length = math.inf if side is None else in_unit(side, "m", f"the box's {name}")
-        if not is_number(length) and length != math.inf or not length > 0.0:
+        if (not is_number(length) and length != math.inf) or not length > 0.0:
             raise UsageError(f"the box's {name} must be a length above 0 m, found {side!r}")
         sides.append(float(length))
     return sides[0], sides[1]
@@ -190,9 +190,7 @@ class Swarm:
         )  # fmt: skip
 
 
-def stops_of(
-    end: float, every: float | str | None, times: Sequence[float] | None
-) -> list[float]:
+def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:
     """The times that a run is to keep [s], ``end`` the last; UsageError for what are none."""
     if not is_number(end) or not end > 0.0:
         raise UsageError(f"until must be a time above 0 s, found {end!r}")
@@ -206,7 +204,7 @@ def stops_of(
     if every is None:
         return [end]
     step = float(in_unit(every, "s", "every"))
-    if not 0.0 < step:
+    if not step > 0.0:
         raise UsageError(f"every must be a time above 0 s, found {every!r}")
     count = max(1, round(end / step))
     whole = abs(count * step - end) <= 1e-9 * end

@@ -1,12 +1,9 @@
 """SwarmTrajectory: a swarm at the times that were asked for."""
 
-from typing import Any
-
 import attrs
 import numpy as np
 
 from flocsim.body import Body
-from flocsim.errors import UsageError
 from flocsim.integrators.base import Status
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge, Neighbours

@@ -24,8 +24,8 @@ def wall(start: Any, end: Any, radius: float | str | None = None) -> Body:
         raise UsageError(f"a wall leads from one point to another, found {ends[0].tolist()} twice")
     thickness = THIN * length if radius is None else float(in_unit(radius, "m", "radius"))
     middle = ends.mean(axis=0)
-    shape = wall_between(*(ends - middle), thickness)
-    return Body(shape, tuple(middle), surface_density=1.0, fixed=True)
+    shape = wall_between(ends[0] - middle, ends[1] - middle, thickness)
+    return Body(shape, (float(middle[0]), float(middle[1])), surface_density=1.0, fixed=True)
 
 
 def floor(

@@ -93,9 +93,7 @@ def test_a_column_of_spheres_carries_its_weight(gap):
     """Σ overlap = m g n (n + 1)/(2 k_n), from rest and after a fall."""
     n, k_n = 100, 20.0
     bodies = [Body(Sphere(R), (0.0, 0.0), density=2650.0, fixed=True)]
-    bodies += [
-        Body(Sphere(R), (0.0, (2.0 * R + gap) * (k + 1)), density=2650.0) for k in range(n)
-    ]
+    bodies += [Body(Sphere(R), (0.0, (2.0 * R + gap) * (k + 1)), density=2650.0) for k in range(n)]
     trajectory = Swarm(bodies, forces(k_n=k_n)).run(0.5)
     assert trajectory.status == Status.FINISHED
     overlap = 2.0 * R * n - trajectory.position[-1, -1, 1]

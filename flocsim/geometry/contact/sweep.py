@@ -77,10 +77,10 @@ def sweep(discs, order, width, height, starts, pairs, fill):
             b = order[at]
             if discs[b, LEFT] + shift > discs[a, RIGHT]:
                 break
-            if width < math.inf and (2 * step > n or (2 * step == n and a > b)):
-                # Round the box, two long discs find each other twice: the shorter way counts.
-                if discs[a, LEFT] + width - shift <= discs[b, RIGHT]:
-                    continue
+            # Round the box, two long discs find each other twice: the shorter way counts.
+            longer = width < math.inf and (2 * step > n or (2 * step == n and a > b))
+            if longer and discs[a, LEFT] + width - shift <= discs[b, RIGHT]:
+                continue
             if come_near(discs, a, b, width, height):
                 later = max(a, b)
                 if fill:

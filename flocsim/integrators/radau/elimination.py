@@ -166,9 +166,7 @@ def entry(blocks, slot, i, j):
 def invert(blocks, slot):
     """Replace a block by its inverse, of both systems; False where it has none."""
     m = blocks[slot, REAL_PART]
-    found = inverse(
-        m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2]
-    )
+    found = inverse(m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2])
     if found[0] == 0.0:
         return False
     share = 1.0 / found[0]

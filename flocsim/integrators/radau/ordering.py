@@ -17,8 +17,8 @@ the same degree; how many others it is tied to; where they begin in ``graph``, a
 room there; a mark; the cluster for which the pattern was made."""
 
 PATTERN, END, LISTING, FOUND_SIZE = range(4)
-"""Places in ``Elimination.found``: 1 + pairs in the pattern (0: there is none); how far ``graph`` is
-used; the listing of pairs for which the pattern was made."""
+"""Places in ``Elimination.found``: 1 + pairs in the pattern (0: there is none); how far ``graph``
+is used; the listing of pairs for which the pattern was made."""
 
 NONE = -1
 """No body, no place."""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from flocsim.arrays import CANDIDATES, NOW, with_capacity, work_of
+from flocsim.arrays import CANDIDATES, NOW, copy_of, with_capacity, work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import (
     list_candidates,
@@ -196,7 +196,7 @@ def cut_to(work, capacity):
         geometry=work.geometry[:, :capacity],
         kept=work.kept[:capacity],
     )
-    return type(work)(*(array.copy() for array in tight))
+    return copy_of(tight)
 
 
 def move_together(plain, work):

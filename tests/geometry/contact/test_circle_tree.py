@@ -106,7 +106,8 @@ def least_of(distances):
 def listed(scene, work, cutoff, a=1, b=0):
     """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
     work.tally[CANDIDATES] = 0
-    assert compose(list_polygons, {})(scene, work, a, b, cutoff)
+    work.pairs[0, :2] = a, b
+    assert compose(list_polygons, {})(scene, work, 0, cutoff)
     rows = work.candidates[: work.tally[CANDIDATES]]
     first = scene.first
     return [
