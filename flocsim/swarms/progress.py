@@ -51,6 +51,11 @@ ALL_BUT = 0.999
 """A window that ends behind this share of what is left ends with it."""
 
 
+OF_CONTACTS = ("links", "slips")
+STATE = ("motion", "carried", "errors", "steps", "wander", *OF_CONTACTS)
+"""Arrays of a swarm that the rest of a run follows from."""
+
+
 @attrs.define
 class Effort:
     """What a swarm has taken so far: windows and their tries; steps of islands, taken and rejected,
@@ -111,6 +116,27 @@ class Progress:
     def seen(self) -> tuple[float, np.ndarray, float]:
         """(time [s], motion (n, 6), the largest stated error [m]) now."""
         return self.time, self.swarm.motion.copy(), self.error
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All that the rest of the run follows from, as arrays by name."""
+        swarm = self.swarm
+        numbers = {"time": self.time, "span": self.span, "error": self.error}
+        return {
+            **{name: getattr(swarm, name).copy() for name in STATE},
+            **{name: np.array(value) for name, value in numbers.items()},
+            "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
+        }
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from a `state` of a run of the same swarm: to the same bytes as that run itself."""
+        for name in STATE:
+            if name not in OF_CONTACTS:
+                getattr(self.swarm, name)[...] = state[name]
+        self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
+        self.time, self.span, self.error = (
+            float(state[name]) for name in ("time", "span", "error")
+        )
+        self.effort = Effort(*state["effort"].tolist())
 
     def advance(self, stop: float) -> Status:
         """Go on to the next common time, ``stop`` at the latest: PAUSED, FINISHED where that is

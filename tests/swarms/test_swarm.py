@@ -180,6 +180,26 @@ def test_what_a_swarm_cannot_do_is_said():
         Swarm(crossing, forces()).run(0.1)
 
 
+def test_a_run_goes_on_from_its_state_to_the_same_bytes():
+    bodies, side = crowd(20, 4)
+    swarm = Swarm(bodies, forces(k_t=5.0), fluid=WATER, box=(side, side))
+    whole, part, rest = (swarm.begin(UNTIL) for _ in range(3))
+    while whole.advance(UNTIL) == Status.PAUSED:
+        if len(whole.swarm.links) and whole.time < 0.5 * UNTIL:
+            seen = whole.time
+    while part.advance(UNTIL) == Status.PAUSED and part.time < seen:
+        pass
+    state = part.state()
+    assert part.time == seen and len(state["links"])
+    del part
+    rest.restore({name: array.copy() for name, array in state.items()})
+    while rest.advance(UNTIL) == Status.PAUSED:
+        pass
+    assert {name: array.tobytes() for name, array in rest.state().items()} == {
+        name: array.tobytes() for name, array in whole.state().items()
+    }
+
+
 def test_a_run_can_be_watched_and_stopped():
     seen = []
 
