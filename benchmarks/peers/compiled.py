@@ -58,7 +58,7 @@ def rate_state(scene, work, time, vector, rates):
 def locate_now(scene, work):
     """Geometry and flags of NOW; the smallest gap [m] (inf without pairs)."""
     least = locate_contacts(scene, work, NOW)
-    set_modes(scene, work, NOW)
+    set_modes(scene, work)
     return least
 
 
@@ -80,7 +80,7 @@ def longest_step(scene, work):
 def list_anew(scene, work):
     """Hand displacements on, list the pairs; the longest step for this list, −1 without room."""
     locate_now(scene, work)
-    hand_over(work)
+    hand_over(scene, work)
     if not list_candidates(scene, work):
         return -1.0
     locate_now(scene, work)

@@ -60,7 +60,7 @@ def evaluate_and_push(scene, work, step, count, turn):
             return -1
         locate_and_rate(scene, work, NOW)
         sum_forces(scene, work, 0.0, NOW)
-        hand_over(work)
+        hand_over(scene, work)
         for row in range(work.tally[CANDIDATES]):
             if work.candidates[row, CLOSED] == 1:
                 touching += 1
