@@ -8,13 +8,19 @@ import numpy as np
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.io.outputs import figure_rule
-from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
+from flocsim.io.plots.collision import (
+    draw_distance,
+    draw_energies,
+    draw_forces,
+    draw_strip,
+    write_animation,
+)
 from flocsim.io.plots.style import CLASS_WORDS, Figure
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.frames import Frames, frames_at, travelled
 from flocsim.trajectories.replay import motion_at
 
-FIGURES = ("strip", "distance", "forces")
+FIGURES = ("strip", "distance", "forces", "energies")
 MOST_FRAMES = 500
 
 
@@ -59,6 +65,10 @@ def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
             seen_from=0 if len(trajectory.shapes) > 1 else None,
             centre_distance=seen.centre_distance.tolist() if pair else None,
         )  # fmt: skip
+    if figure == "energies":
+        found = trajectory.energies()
+        kinetic = found.kinetic.sum(axis=1)
+        return draw_energies(found.t, found.work, kinetic.tolist(), title)
     check_pair(trajectory)
     if figure == "distance":
         return draw_distance(*distances(trajectory), title=title)
@@ -88,5 +98,6 @@ def distances(trajectory: Any) -> tuple[list[float], list[float]]:
 def check_pair(trajectory):
     if len(trajectory.shapes) != 2:
         raise UsageError(
-            f'this figure is of two bodies, and the run has {len(trajectory.shapes)}: draw "strip"'
+            f'this figure is of two bodies, and the run has {len(trajectory.shapes)}: draw "strip" '
+            'or "energies"'
         )

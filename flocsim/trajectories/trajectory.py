@@ -236,11 +236,12 @@ class Trajectory:
     def plot(
         self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES
     ) -> Any:
-        """A matplotlib Figure: "strip" of frames, "distance" of the centres or "forces" of a pair.
+        """A matplotlib Figure: "strip" of frames, "energies" (work of each force, kinetic), and of
+        a pair "distance" of the centres or "forces".
 
         Forces are those on the second body along the line of centres, above 0 where they push
         apart. Written to ``file`` if given. UsageError for an unknown one, and where there are not
-        two bodies but for the strip.
+        two bodies but for the strip and the energies.
         """
         from flocsim.io.outputs import figure_rule
         from flocsim.io.plots.style import save
