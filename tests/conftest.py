@@ -19,6 +19,11 @@ os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 
+# pytest.approx allows 1e-12 whatever it compares; in SI units that is more than most lengths,
+# forces and masses of a floc are, and no test of them could fail. What is allowed is what a test
+# says; tests/test_tolerances.py sees that this holds.
+type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
+
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):

@@ -92,7 +92,7 @@ def friction(rng, number):
 
 def surface_forces(rng, number):
     """Stable colloids, which pass each other on their double layers."""
-    return replicate(rng, number, "si", (0, 1, 2, 3, 4))
+    return replicate(rng, number, "si", (0, 1, 2, 3, 4, 7))
 
 
 def random_shape(rng):

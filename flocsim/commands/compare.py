@@ -3,7 +3,7 @@
 from argparse import Namespace
 from typing import Any
 
-from flocsim.io.results.schema import POOLED_PROBABILITIES, PROBABILITIES
+from flocsim.io.results.schema import COMPARED
 
 
 def add_parser(subparsers: Any) -> None:
@@ -17,9 +17,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("first", help="results file that flocsim ensemble wrote")
     parser.add_argument("second", help="another one")
-    known = "; ".join(f"{name} {PROBABILITIES[name]}" for name in POOLED_PROBABILITIES)
+    known = "; ".join(f"{name} {words}" for name, words in COMPARED.items())
     parser.add_argument(
-        "--probability", default="pr_a", choices=POOLED_PROBABILITIES,
+        "--probability", default="pr_a", choices=COMPARED,
         help=f"{known} (default: %(default)s)",
     )  # fmt: skip
     parser.set_defaults(run=run)

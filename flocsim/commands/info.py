@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import checked_line, efficiency_lines, format_table, undecided_line
@@ -28,7 +29,7 @@ from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "settling")  # fmt: skip
+         "warnings", "settling", "size_classes")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -243,6 +244,8 @@ def sizes(results, totals):
         if i > 0.0 and j > 0.0
     ]
     facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
+    if classes := class_words(stored(results.run, "size_classes")):
+        facts.insert(0, ("size classes", visible(classes.partition(": ")[2], "")))
     units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
     words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
     for name, (low, high) in totals.spans.items():

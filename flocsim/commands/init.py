@@ -192,6 +192,14 @@ MEASURED = (
     ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
     (
         """\
+preset = "tang2014"        # the paper's values; or "si": quartz in water, of its real weight
+""",
+        """\
+preset = "si"              # quartz in water, of its real weight; "tang2014": the paper's values
+""",
+    ),
+    (
+        """\
 types = ["I", "II", "III"] # the paper's sizes
 # pairs = [["10 um", "20 um"]]        # or sizes of your own: [receiving, approaching] radius
 """,

@@ -8,6 +8,7 @@ from math import inf
 import numpy as np
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
+from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.parallel.communicator import StopRequested
@@ -42,7 +43,10 @@ MOST_CHOOSING = 60.0
 def condition_lines(config, flocs):
     """A line for every collision type: sizes, zone, settling of the equivalent spheres."""
     facts = settling_facts(config, flocs)
-    spans = {each.name: each.spans for each in pairings(config, flocs)}
+    found = pairings(config, flocs)
+    if classes := class_words(class_facts(found)):
+        yield f"  {classes}"
+    spans = {each.name: each.spans for each in found}
     for name, pair in sphere_pairs(config, flocs):
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         falls = [1e3 * -velocity[1] for velocity, _ in pair.settling]

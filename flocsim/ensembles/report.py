@@ -13,6 +13,15 @@ from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.schema import Results
 
+ENDS = {
+    "n_missed": ("mis-", "sed"),
+    "n_held": ("", "held"),
+    "n_undecided": ("unde-", "cided"),
+    "n_failed": ("fail-", "ed"),
+}
+"""Columns of replicates that did not collide or have no class; those held only where there are any,
+as they take colloids that repel each other."""
+
 HEADER = (
     ("", "N"),
     ("del-", "ta"),
@@ -23,9 +32,6 @@ HEADER = (
     ("Pr[A]", "95 %  num."),
     ("of A", "hang"),
     *(("", name) for name in CLASSES),
-    ("mis-", "sed"),
-    ("unde-", "cided"),
-    ("fail-", "ed"),
 )
 
 
@@ -51,8 +57,9 @@ def format_table(
     a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
-    rows = [condition_row(vertices, delta, table, place) for place in conditions]
-    upper, lower = zip(*HEADER, strict=True)
+    ends = [name for name in ENDS if name != "n_held" or np.any(table[name])]
+    rows = [condition_row(vertices, delta, table, place, ends) for place in conditions]
+    upper, lower = zip(*HEADER, *(ENDS[name] for name in ends), strict=True)
     widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
     if sum(widths) + 2 * len(widths) <= WIDTH:
         widths = [width + 1 for width in widths]
@@ -121,10 +128,9 @@ def checked_line(results: Results) -> str:
     )
 
 
-def condition_row(vertices, delta, table, place):
+def condition_row(vertices, delta, table, place, ends):
     _, v, d = place
     counts = ("n_total", "n_collided", "n_inside")
-    ends = ("n_missed", "n_undecided", "n_failed")
     return (
         str(vertices[v]),
         f"{delta[d]:g}",

@@ -16,6 +16,7 @@ import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
+from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
@@ -54,6 +55,8 @@ from flocsim.io.results.file import read_results
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results
 from flocsim.io.terminal import Progress, tell
+
+COMPILING = "compiling what no run on this machine has compiled before …"
 
 
 @attrs.define
@@ -126,7 +129,7 @@ def run_to_file(
             )  # fmt: skip
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
-        doubts = [] if quiet else study_doubts(config, joint.study.flocs)
+        doubts = study_doubts(config, joint.study.flocs)
         for remark in [*remarks, *start.remarks, *(f"warning: {line}" for line in doubts)]:
             progress.warn(remark)
         ended = lead(joint.study, start, comm, progress, output)
@@ -193,6 +196,8 @@ def chosen(study: Study, comm: Communicator, records: Sequence[dict], quiet: boo
     with sharing_errors(comm):
         choice = recorded_choice(study, records)
         if choice is None:
+            if not quiet:
+                tell(f"a pilot chooses method and tolerance; {COMPILING}")
             choice = choose(study, lambda study, jobs: share_jobs(study, comm, jobs, True))
         if not quiet:
             for line in choice_lines(choice.record):
@@ -265,10 +270,13 @@ def lead(
     remaining = state.schedule.remaining
     key = short(start.identity)
     progress.say(announcement(study, comm.size, study.size - remaining))
+    if classes := class_words(class_facts(study.pairings)):
+        progress.say(classes)
     comm.broadcast(Plan(remaining, key))
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
+        progress.say(COMPILING)
         compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
         progress.say(f"compiled or loaded in {time.monotonic() - began:.1f} s")
     progress.start(remaining)
@@ -410,6 +418,7 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",
+        "size_classes": storable(json.dumps(class_facts(study.pairings))),
         "warnings": storable(json.dumps(study_doubts(config, study.flocs))),
         "settling": storable(json.dumps(settling_facts(config, study.flocs))),
     }

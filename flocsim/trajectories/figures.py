@@ -3,19 +3,24 @@
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.io.outputs import figure_rule
-from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
+from flocsim.io.plots.collision import (
+    draw_distance,
+    draw_energies,
+    draw_forces,
+    draw_strip,
+    write_animation,
+)
 from flocsim.io.plots.style import CLASS_WORDS, Figure
 from flocsim.io.trajectory import centre_distance
-from flocsim.trajectories.frames import Frames, frames_at, seen_from_first, travelled
-from flocsim.trajectories.replay import hermite
+from flocsim.trajectories.frames import Frames, frames_at, travelled
+from flocsim.trajectories.replay import motion_at
 
-FIGURES = ("strip", "distance", "forces")
+FIGURES = ("strip", "distance", "forces", "energies")
 MOST_FRAMES = 500
 
 
@@ -28,24 +33,15 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     wanted = np.linspace(0.0, way[-1], count)
     # What stays where it is is seen at its start and its end.
     times = np.interp(wanted, way, trajectory.t) if way[-1] > 0.0 else trajectory.t[[0, -1]]
-    found = frames_at(np.arange(len(times)), shapes, times, places_at(trajectory, times))
-    whole = seen_from_first(position)
-    return attrs.evolve(found, paths=[whole[:, n, :2] for n in range(len(shapes))])
+    return frames_at(shapes, times, places_at(trajectory, times), position)
 
 
 def places_at(trajectory: Any, times: np.ndarray) -> np.ndarray:
     """The places (f, n, 3) at some times; of a motion from a file by Hermite's cubic."""
     if hasattr(trajectory, "at"):
         return trajectory.at(times).position
-    t = trajectory.t
-    steps = np.searchsorted(t[1:-1], times, side="right") if len(t) > 1 else None
-    if steps is None:
-        return trajectory.position[np.zeros(len(times), dtype=int)]
     states = np.concatenate([trajectory.position, trajectory.velocity], axis=2)
-    return np.array([
-        hermite(t[step], t[step + 1], states[step], states[step + 1], time)[:, :3]
-        for step, time in zip(steps, times, strict=True)
-    ])  # fmt: skip
+    return np.array([motion_at(trajectory.t, states, time)[:, :3] for time in times])
 
 
 def title_of(trajectory: Any) -> str:
@@ -69,6 +65,10 @@ def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
             seen_from=0 if len(trajectory.shapes) > 1 else None,
             centre_distance=seen.centre_distance.tolist() if pair else None,
         )  # fmt: skip
+    if figure == "energies":
+        found = trajectory.energies()
+        kinetic = found.kinetic.sum(axis=1)
+        return draw_energies(found.t, found.work, kinetic.tolist(), title)
     check_pair(trajectory)
     if figure == "distance":
         return draw_distance(*distances(trajectory), title=title)
@@ -98,5 +98,6 @@ def distances(trajectory: Any) -> tuple[list[float], list[float]]:
 def check_pair(trajectory):
     if len(trajectory.shapes) != 2:
         raise UsageError(
-            f'this figure is of two bodies, and the run has {len(trajectory.shapes)}: draw "strip"'
+            f'this figure is of two bodies, and the run has {len(trajectory.shapes)}: draw "strip" '
+            'or "energies"'
         )

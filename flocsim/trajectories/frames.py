@@ -51,15 +51,16 @@ def rows_along(way: np.ndarray, count: int) -> np.ndarray:
 
 
 def frames_at(
-    rows: np.ndarray, shapes: Sequence[Shape], times: np.ndarray, position: np.ndarray
+    shapes: Sequence[Shape], times: np.ndarray, places: np.ndarray, position: np.ndarray
 ) -> Frames:
-    """The Frames at some rows of times (k,) [s] and positions (k, n, 3)."""
-    relative = seen_from_first(position)
+    """The Frames at some times (f,) [s], where the bodies are at ``places`` (f, n, 3); their paths
+    are those of all of the motion, ``position`` (k, n, 3)."""
+    seen, whole = seen_from_first(places), seen_from_first(position)
     apart = len(shapes) > 1
     return Frames(
-        times[rows],
-        [[shape.outline(*relative[row, n]) for n, shape in enumerate(shapes)] for row in rows],
-        [placed_contacts(shapes, relative[row]) for row in rows],
-        [relative[:, n, :2] for n in range(len(shapes))],
-        centre_distance(position[rows]) if apart else np.zeros(len(rows)),
+        times,
+        [[shape.outline(*each[n]) for n, shape in enumerate(shapes)] for each in seen],
+        [placed_contacts(shapes, each) for each in seen],
+        [whole[:, n, :2] for n in range(len(shapes))],
+        centre_distance(places) if apart else np.zeros(len(times)),
     )

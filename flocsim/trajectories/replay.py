@@ -255,6 +255,16 @@ def step_motion(
     return cubic(stage_weights((time - begin) / whole), *stages)
 
 
+def motion_at(times: np.ndarray, states: np.ndarray, time: float) -> np.ndarray:
+    """The motion (n, 6) at a time among those (k,) of states (k, n, 6) [s]: at one of them, that
+    state; between two, Hermite's cubic."""
+    step = int(np.searchsorted(times, time, side="right")) - 1
+    if times[step] == time:
+        return states[step]
+    step = min(step, len(times) - 2)  # the times of a file may not rise
+    return hermite(times[step], times[step + 1], states[step], states[step + 1], time)
+
+
 def hermite(
     begin: float, end: float, start: np.ndarray, stop: np.ndarray, time: float
 ) -> np.ndarray:

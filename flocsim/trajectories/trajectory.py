@@ -18,7 +18,7 @@ from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Status
 from flocsim.run import Run
 from flocsim.trajectories.energies import Energies, energies_of
-from flocsim.trajectories.replay import Contact, Origin, Replay, hermite
+from flocsim.trajectories.replay import Contact, Origin, Replay, motion_at
 
 ENDED_FOR_GOOD = (Status.STALLED, Status.TOO_DEEP, Status.NOT_FINITE)
 """Ends from which a run would not get any further."""
@@ -166,14 +166,11 @@ class Trajectory:
         for place in np.argsort(wanted, kind="stable"):
             time_ = wanted[place]
             step = int(np.searchsorted(times, time_, side="right")) - 1
-            if times[step] == time_:
-                found[place] = states[step]
-            elif implicit:
+            if implicit and times[step] != time_:
                 replay = replay or Replay(self.known())
                 found[place] = replay.within(float(time_), step, times)[0]
             else:
-                ends = times[step], times[step + 1], states[step], states[step + 1]
-                found[place] = hermite(*ends, time_)
+                found[place] = motion_at(times, states, time_)
         if np.ndim(t) == 0:
             return State(float(wanted[0]), found[0, :, :3], found[0, :, 3:])
         return State(wanted, found[:, :, :3], found[:, :, 3:])
@@ -239,11 +236,12 @@ class Trajectory:
     def plot(
         self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES
     ) -> Any:
-        """A matplotlib Figure: "strip" of frames, "distance" of the centres or "forces" of a pair.
+        """A matplotlib Figure: "strip" of frames, "energies" (work of each force, kinetic), and of
+        a pair "distance" of the centres or "forces".
 
         Forces are those on the second body along the line of centres, above 0 where they push
         apart. Written to ``file`` if given. UsageError for an unknown one, and where there are not
-        two bodies but for the strip.
+        two bodies but for the strip and the energies.
         """
         from flocsim.io.outputs import figure_rule
         from flocsim.io.plots.style import save

@@ -10,6 +10,7 @@ from flocsim.commands import check
 from flocsim.ensembles.config.loader import load_config
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
+from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import write_small
 
 
@@ -195,3 +196,23 @@ def test_what_is_wrong_is_one_line(folder, capsys, words, said):
     [line] = errors.splitlines()
     assert said in line
     assert output == ""
+
+
+def ends(outcome, inside, distance):
+    """What a row says of its end."""
+    return {"outcome": OUTCOMES.index(outcome), "inside": inside, "d_c_collision": distance}
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "expected"),
+    [
+        (ends("missed", 255, math.nan), ends("D", 0, 1e-5), True),
+        (ends("B", 1, 1e-5), ends("missed", 255, math.nan), True),
+        (ends("missed", 255, math.nan), ends("C", 0, 1e-5), False),
+        (ends("A", 1, 1e-5), ends("C", 0, 1e-5 + 1e-10), True),
+        (ends("A", 1, 1e-5), ends("C", 0, 1.1e-5), False),
+        (ends("A", 1, 1e-5), ends("B", 1, 1e-5), False),
+    ],
+)
+def test_a_graze_and_the_border_of_the_zone_are_close_calls(one, two, expected):
+    assert check.is_close_call(one, two, 1e-9) is expected

@@ -106,6 +106,7 @@ def test_what_is_said_of_a_study_is_of_its_largest_flocs(folder):
     assert facts["from6um-from6um", "i"] == pytest.approx(13e-6)
     assert any("r_eq = 20 um" in line for line in study_doubts(config))
     said = dry_run(config, 1, pilot=False)
+    assert "size classes, r_eq: to6um 3 to 5 um (2 flocs), from6um 8 to 20 um (3 flocs)" in said
     assert "library" in said and "drawn by number" in said
     assert "r_i 3 to 5 um, r_j 8 to 20 um; delta_max and D_0 are those of each pair" in said
 
@@ -124,6 +125,10 @@ def test_pairs_of_size_classes_are_the_types_of_a_study(folder):
     config = load_text(folder, STUDY, SPHERES | {"scene": {"classes": 2, "weight": "number"}})
     results = run(config)
     assert results.types == ("q1-q1", "q1-q2", "q2-q2")
+    classes = json.loads(results.run["size_classes"])
+    assert [each["label"] for each in classes] == ["q1", "q2"]
+    assert sum(each["flocs"] for each in classes) == len(RATIOS)
+    assert (classes[0]["low"], classes[1]["high"]) == pytest.approx((3e-6, 20e-6))
     r_i, r_j = results.replicates["r_i"], results.replicates["r_j"]
     assert r_j[0].max() < 9e-6 and r_i[2].min() > 7e-6
     for name, values in (("r_i", r_i), ("r_j", r_j)):

@@ -42,13 +42,13 @@ def test_frames_are_seen_from_the_first_with_every_contact():
     times, position = fall()
     position[:, 2, :2] = position[:, 0, :2] + [1.5e-6, 0.0]
     shapes = [Sphere(1e-6), Sphere(1e-6), Sphere(1e-6)]
-    found = frames_at(np.array([0, 100]), shapes, times, position)
+    found = frames_at(shapes, times[[0, 100]], position[[0, 100]], position)
     assert found.times.tolist() == [0.0, 1.0]
     np.testing.assert_allclose(found.centre_distance, [10e-6, 3e-6])
     np.testing.assert_allclose(found.contacts[0], [[0.75e-6, 0.0]] * 2, atol=1e-20)
     assert np.abs(found.paths[0]).max() == 0.0
     np.testing.assert_allclose(found.outlines[1][0][0].mean(axis=0), 0.0, atol=1e-7)
-    alone = frames_at(np.array([100]), shapes[:1], times, position[:, :1])
+    alone = frames_at(shapes[:1], times[[100]], position[[100], :1], position[:, :1])
     assert alone.centre_distance.tolist() == [0.0]
     np.testing.assert_allclose(alone.paths[0][-1], [0.0, -10e-6])
     assert alone.contacts[0].shape == (0, 2)

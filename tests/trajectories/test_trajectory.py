@@ -137,7 +137,7 @@ def test_what_cannot_be_is_told(resting):
         system.run(until=1e-4, watch=3)
     with pytest.raises(UsageError, match="t must be a time such as '5 s', found 'now'"):
         run.at("now")
-    with pytest.raises(UsageError, match="figure must be one of strip, distance, forces"):
+    with pytest.raises(UsageError, match="figure must be one of strip, distance, forces, energies"):
         run.plot("histogram")
 
 

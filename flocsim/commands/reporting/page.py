@@ -79,7 +79,7 @@ def tables_of(results: Results) -> str:
     """The probabilities of every condition, and those pooled over displacements."""
     table = results.probabilities
     heads = ["type", "N", "δ/δ_max", "n", "collided", "inside", *SHOWN.values(), *CLASSES,
-             "missed", "undecided", "failed", "run again", "flipped"]  # fmt: skip
+             "missed", "held", "undecided", "failed", "run again", "flipped"]  # fmt: skip
     places = list(np.ndindex(*results.shape))
     rows = [condition_row(results, table, place) for place in places]
     firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
@@ -102,8 +102,8 @@ def tables_of(results: Results) -> str:
 def condition_row(results, table, place):
     t, v, d = place
     counts = [int(table[name][place]) for name in ("n_total", "n_collided", "n_inside")]
-    ends = [int(table[f"n_{name}"][place])
-            for name in ("missed", "undecided", "failed", "checked", "flipped")]  # fmt: skip
+    names = ("missed", "held", "undecided", "failed", "checked", "flipped")
+    ends = [int(table[f"n_{name}"][place]) for name in names]
     return [
         results.types[t], int(results.vertices[v]), f"{results.delta[d]:g}", *counts,
         *(with_errors(table, name, place) for name in SHOWN),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, MISSED
+from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
@@ -34,6 +34,9 @@ FAILED_ENDS = {Status.TOO_DEEP: "too deep", Status.NOT_FINITE: "not finite"}
 WHY = "why"
 """Key of a row, beside the columns, for the words on a failure."""
 
+APART = {MISSED: "missed", HELD: "held"}
+"""Outcomes of pairs that never touched."""
+
 CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): "D"}
 """Class by (inside, decision)."""
 
@@ -51,8 +54,8 @@ LONGEST_REASON = 300
 def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
     """(outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
-        if code == MISSED:
-            return OUTCOMES.index("missed"), 0
+        if code in APART:
+            return OUTCOMES.index(APART[code]), 0
         return OUTCOMES.index(CLASSES[int(observed[INSIDE]), int(code)]), 0
     if status in UNDECIDED_ENDS:
         return OUTCOMES.index("undecided"), FAILURES.index(UNDECIDED_ENDS[status])

@@ -1,9 +1,9 @@
-"""What becomes of two bodies: missed, or a collision that ends bound or departed.
+"""What becomes of two bodies: missed, held, or a collision that ends bound or departed.
 
 `watch_pair`, the observer, looks at the pair after every accepted step. Departed is a pair that
-touched and has parted for good (departure.py), missed one that parted so before it touched, or
-that hovers at rest over the other; bound is one that has touched and is proved to stay together
-(bonds.py).
+touched and has parted for good (departure.py), missed one that parted so before it touched; held is
+one that has not touched and rests so, one body over the other, in a secondary minimum say; bound is
+one that has touched and is proved to stay together (bonds.py).
 """
 
 from flocsim.arrays import NOW
@@ -26,7 +26,7 @@ from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.rhs.views import centre_line
 
-BOUND, DEPARTED, MISSED = 1, 2, 3
+BOUND, DEPARTED, MISSED, HELD = 1, 2, 3, 4
 """Codes of the observer."""
 
 
@@ -58,7 +58,7 @@ def follow(observed, distance):
 
 
 def watch_pair(scene, work, observed, time):
-    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED."""
+    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
     nx, ny, distance = centre_line(scene, work, NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
@@ -67,7 +67,6 @@ def watch_pair(scene, work, observed, time):
     if has_departed(scene, work, observed, time, nx, ny, distance, gap):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
     if observed[COLLIDED] == 0.0:
-        rests = rests_for_long(scene, work, observed, time)
-        return MISSED if rests else 0
+        return HELD if rests_for_long(scene, work, observed, time) else 0
     observed[BOND] = bond_of(scene, work, observed, time, gap, nx, ny, distance)
     return 0 if observed[BOND] == NO_BOND else BOUND

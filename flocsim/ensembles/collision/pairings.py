@@ -167,6 +167,29 @@ def size_classes(scene: SceneConfig, flocs: Sequence[Floc]) -> list[SizeClass]:
     return classes
 
 
+def class_facts(pairings: Sequence[Pairing]) -> list[dict]:
+    """[{label, low, high [m], flocs}] of the size classes of measured flocs, the smallest first."""
+    classes: dict[str, SizeClass] = {}
+    for pairing in pairings:
+        if isinstance(pairing, TwoClasses):
+            classes |= {each.label: each for each in (pairing.first, pairing.second)}
+    return [
+        {"label": each.label, "low": float(each.sizes[0]), "high": float(each.sizes[-1]),
+         "flocs": len(each.sizes)}
+        for each in classes.values()
+    ]  # fmt: skip
+
+
+def class_words(facts: Sequence[dict]) -> str:
+    """Size classes in a line; "" where there is one at most."""
+    told = (
+        f"{each['label']} {1e6 * each['low']:.4g} to {1e6 * each['high']:.4g} um "
+        f"({each['flocs']} flocs)"
+        for each in facts
+    )
+    return f"size classes, r_eq: {', '.join(told)}" if len(facts) > 1 else ""
+
+
 def in_words(sizes):
     return f"{1e6 * np.min(sizes):.3g} to {1e6 * np.max(sizes):.3g} um"
 

@@ -30,4 +30,4 @@ def frames_of(
     """The Frames of a replicate's motion: ``position`` (k, 2, 3), ``collision`` time [s] or nan."""
     size = 0.5 * sum(shape.bounding_radius for shape in shapes)
     rows = choose_instants(times, position, size, count, collision)
-    return frames_at(rows, shapes, times, position)
+    return frames_at(shapes, times[rows], position[rows], position)

@@ -15,6 +15,7 @@ from flocsim.ensembles.estimates.events import (
     AGGREGATED,
     DECIDED,
     FAILED,
+    HELD,
     HOOK,
     INSIDE_CLASSES,
     MISSED,
@@ -62,16 +63,17 @@ def tabulate(
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
     """Whole-number counts over the last axis.
 
-    n_total = n_missed + n_undecided + n_failed + Σ n_class. n_collided counts every replicate
-    whose outlines touched, whatever came later: a collision that ended undecided or failed still
-    happened inside or outside the zone, and is in n_collided and n_inside. Σ n_bond is the number
-    of aggregated ones, A + C.
+    n_total = n_missed + n_held + n_undecided + n_failed + Σ n_class. n_collided counts every
+    replicate whose outlines touched, whatever came later: a collision that ended undecided or
+    failed still happened inside or outside the zone, and is in n_collided and n_inside. Σ n_bond is
+    the number of aggregated ones, A + C.
     """
     classes = [np.sum(outcome == code, axis=-1) for code in range(len(CLASSES))]
     bonds = [np.sum(bond == 1 + place, axis=-1) for place in range(len(BONDS))]
     return {
         "n_total": np.sum(np.ones(outcome.shape, dtype=np.int64), axis=-1),
         "n_missed": np.sum(outcome == MISSED, axis=-1),
+        "n_held": np.sum(outcome == HELD, axis=-1),
         "n_undecided": np.sum(outcome == UNDECIDED, axis=-1),
         "n_failed": np.sum(outcome == FAILED, axis=-1),
         "n_collided": np.sum(inside != NOT_APPLICABLE, axis=-1),
@@ -123,7 +125,7 @@ def checked_codes(
         )
     touched_inside = (inside == 1) & np.isin(outcome, [*INSIDE_CLASSES, UNDECIDED, FAILED])
     touched_outside = (inside == 0) & np.isin(outcome, [*OUTSIDE_CLASSES, UNDECIDED, FAILED])
-    apart = (inside == NOT_APPLICABLE) & np.isin(outcome, [MISSED, UNDECIDED, FAILED])
+    apart = (inside == NOT_APPLICABLE) & np.isin(outcome, [MISSED, HELD, UNDECIDED, FAILED])
     known = (bond >= 1) & (bond <= len(BONDS))
     held = np.where(np.isin(outcome, AGGREGATED), known, bond == NOT_APPLICABLE)
     wrong = np.argwhere(~((touched_inside | touched_outside | apart) & held))

@@ -25,6 +25,9 @@ SETTLED = {
 }  # fmt: skip
 """A body at its terminal speed: flocsim.plausibility.reynolds.Settled."""
 
+SIZE_CLASS = {"label": str, "low": float, "high": float, "flocs": int}
+"""A size class of measured flocs: `flocsim.ensembles.collision.pairings.class_facts`."""
+
 FORMS: dict[str, tuple[Any, Any]] = {
     # name in the group ``run``: (pattern, what it is where there is none)
     "identity": ({}, {}),
@@ -35,6 +38,7 @@ FORMS: dict[str, tuple[Any, Any]] = {
     "accuracy": (CHOICE, {}),
     "warnings": ([str], []),
     "settling": ([SETTLED], []),
+    "size_classes": ([SIZE_CLASS], []),
 }
 
 

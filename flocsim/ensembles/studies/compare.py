@@ -5,13 +5,21 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED, HELD, MISSED
 from flocsim.ensembles.estimates.paired import between, newcombe
 from flocsim.ensembles.estimates.statistics import trials_of
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
+from flocsim.io.confidence import numerical_error
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
-from flocsim.io.results.schema import AXES, COORDINATES, POOLED_PROBABILITIES, PROBABILITIES
+from flocsim.io.results.schema import (
+    AXES,
+    COMPARED,
+    COORDINATES,
+    NOT_APPLICABLE,
+    PER_APPROACH,
+)
 
 MEANINGS = {
     "first": "the probability in the first file",
@@ -63,7 +71,7 @@ class Comparison:
                 name: Column(AXES, values, {"units": "1", "long_name": MEANINGS[name]})
                 for name, values in self.arrays[probability].items()
             },
-            {"probability": PROBABILITIES[probability], "paired": int(self.paired)},
+            {"probability": COMPARED[probability], "paired": int(self.paired)},
         )
 
     def to_xarray(self, probability: str = "pr_a") -> Dataset:
@@ -80,7 +88,7 @@ class Comparison:
         how = f"the {self.pairs} replicates that both have, paired" if self.paired else (
             "independent samples"
         )  # fmt: skip
-        lines = [*self.changes, f"{PROBABILITIES[probability]}, second minus first: {how}", ""]
+        lines = [*self.changes, f"{COMPARED[probability]}, second minus first: {how}", ""]
         lines.append(
             f"{'type':>10} {'N':>5} {'delta':>6} {'n':>13} {'first':>6} {'second':>6}  "
             "difference [95 %] num."
@@ -120,12 +128,15 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
         np.array_equal(rows[0][name][..., :pairs], rows[1][name][..., :pairs], equal_nan=True)
         for name in ("angle_i", "angle_j")
     )
-    codes = [[each[name] for name in ("outcome", "inside", "bond")] for each in rows]
-    trials = [trials_of(*each) for each in codes]
+    trials = [trials_in(each) for each in rows]
     arrays = {}
-    for name in POOLED_PROBABILITIES:
+    for name in COMPARED:
         found = differences_of(trials[0][name], trials[1][name], pairs if paired else None)
-        added = [numerical(each, name, wanted) for each in (first, second)]
+        added = (
+            [numerical_per_approach(each) for each in rows]
+            if name == PER_APPROACH
+            else [numerical(each, name, wanted) for each in (first, second)]
+        )
         arrays[name] = found | {"numerical": np.sum(added, axis=0)}
     changes = differences(first.stored("identity"), second.stored("identity"))
     return Comparison(
@@ -165,12 +176,33 @@ def places(results, wanted):
 def picked(results, wanted):
     """The columns that are compared, at the wanted conditions."""
     at = np.ix_(*places(results, wanted))
-    names = ("angle_i", "angle_j", "outcome", "inside", "bond")
+    names = ("angle_i", "angle_j", "outcome", "inside", "bond", "checked_outcome")
     return {name: results.replicates[name][at] for name in names}
 
 
 def numerical(results, name, wanted):
     return results.probabilities[f"{name}_numerical"][np.ix_(*places(results, wanted))]
+
+
+def trials_in(rows):
+    """{probability: (whether a replicate counts in it, whether as a success)} of COMPARED."""
+    found = trials_of(rows["outcome"], rows["inside"], rows["bond"])
+    return found | {PER_APPROACH: approaches(rows["outcome"])}
+
+
+def approaches(outcome):
+    """(which replicates were decided, which ended aggregated)."""
+    return np.isin(outcome, [*range(DECIDED), MISSED, HELD]), np.isin(outcome, AGGREGATED)
+
+
+def numerical_per_approach(rows):
+    """What numerics add to Pr[aggregation | decided approach]: flips of what was run again."""
+    again = rows["checked_outcome"]
+    checked = again != NOT_APPLICABLE
+    (trial, success), (trial_again, success_again) = map(approaches, (rows["outcome"], again))
+    flipped = checked & ((trial != trial_again) | (success != success_again))
+    counted = checked & (trial | trial_again)
+    return numerical_error(*(np.sum(each, axis=-1) for each in (flipped, counted, trial)))
 
 
 def differences_of(first, second, pairs):

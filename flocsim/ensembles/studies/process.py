@@ -5,12 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 from flocsim.ensembles.config.sources import INSTALLED
 from flocsim.ensembles.parallel.communicator import launched_size
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import FileError, FlocsimError, PlausibilityWarning, UsageError
 from flocsim.interruption import INTERRUPTED, STOPPED
 
 SAVING = 30.0
@@ -22,11 +23,18 @@ WORDS = {
 """What the command calls it → what a script calls it."""
 
 
+WARNING = "flocsim: warning: "
+
+STACK = 4
+"""From `listen` to the script that called Study.run."""
+
+
 def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> None:
     """Run `flocsim WORDS` in a folder with a text as its standard input.
 
-    What it prints is printed here, unless ``quiet``. Raises the FlocsimError that its exit code
-    stands for, with its last words; KeyboardInterrupt where it was interrupted, once it has saved.
+    What it prints is printed here, unless ``quiet``; then its warnings become Python's. Raises the
+    FlocsimError that its exit code stands for, with its last words; KeyboardInterrupt where it was
+    interrupted, once it has saved.
     """
     if (launched_size() or 0) > 1:
         raise UsageError(
@@ -75,6 +83,8 @@ def listen(process, text, quiet):
         said.append(line.rstrip("\n"))
         if not quiet:
             print(said[-1])
+        elif said[-1].startswith(WARNING):
+            warnings.warn(said[-1].removeprefix(WARNING), PlausibilityWarning, STACK)
     process.wait()
     return said
 

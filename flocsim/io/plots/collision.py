@@ -37,6 +37,9 @@ GRID = 24
 
 NANO = 1e9
 DECADES = 8
+FEMTO = 1e15
+ENERGY_DECADES = 4
+"""Decades of an axis of energies on either side of 0."""
 """Decades below the largest force that are shown."""
 FORCE_COLOURS = (*BODY_COLOURS, "0.5", CONTACT_COLOUR)
 
@@ -188,11 +191,15 @@ def draw_forces(
     with house_style():
         figure = new_figure(5.4, 2.6)
         axes = figure.subplots()
-        for colour, (name, force) in zip(FORCE_COLOURS, curves.items(), strict=False):
+        for place, (colour, (name, force)) in enumerate(
+            zip(FORCE_COLOURS, curves.items(), strict=False)
+        ):
             push = np.where(force > 0.0, force, np.nan)
             pull = np.where(force < 0.0, -force, np.nan)
-            axes.plot(time, push, color=colour, linewidth=1.1, label=name)
-            axes.plot(time, pull, color=colour, linewidth=1.1, linestyle=(0, (3, 1.5)))
+            # Drag balances weight: what lies under another curve is seen on both sides of it.
+            width = max(2.6 - 0.5 * place, 0.8)
+            axes.plot(time, push, color=colour, linewidth=width, label=name)
+            axes.plot(time, pull, color=colour, linewidth=width, linestyle=(0, (3, 1.5)))
         if collision is not None and np.isfinite(collision):
             axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":",
                          label="first touch")  # fmt: skip
@@ -204,6 +211,42 @@ def draw_forces(
         axes.set_title(title)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
                     alignment="left")  # fmt: skip
+        keep_titles_whole(figure)
+        return figure
+
+
+def draw_energies(
+    times: Sequence[float], work: Mapping[str, Sequence[float]], kinetic: Sequence[float],
+    title: str = "",
+) -> Figure:  # fmt: skip
+    """Work that each force has done since the start [J], and kinetic energies, against time [s].
+
+    ``work``: {name: (k,)}; ``kinetic`` (k,), of all bodies together. Returns the Figure. Energies
+    of settling flocs differ by many orders of magnitude: the axis is linear around 0 and
+    logarithmic beyond. Raises UsageError if the lengths disagree.
+    """
+    if any(len(each) != len(times) for each in (*work.values(), kinetic)):
+        raise UsageError("a figure of energies needs one energy per time")
+    unit, factor = time_unit(times)
+    time = np.asarray(times) * factor
+    curves = {f"work of {name}": np.asarray(each) * FEMTO for name, each in work.items()}
+    curves["kinetic energy"] = np.asarray(kinetic) * FEMTO
+    sizes = np.abs(np.concatenate(list(curves.values())))
+    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
+    with house_style():
+        figure = new_figure(5.4, 2.6)
+        axes = figure.subplots()
+        for place, (name, each) in enumerate(curves.items()):
+            colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
+            axes.plot(time, each, color=colour, linewidth=max(2.6 - 0.5 * place, 0.8), label=name)
+        axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
+        if largest > 0.0:
+            least = math.ceil(math.log10(largest)) - ENERGY_DECADES
+            axes.set_yscale("symlog", linthresh=10.0**least)
+        axes.set_ylabel("energy [fJ]")
+        axes.set_xlabel(f"time [{unit}]")
+        axes.set_title(title)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
         keep_titles_whole(figure)
         return figure
 

@@ -36,6 +36,7 @@ PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
 BARS = "\n(bars: 95 %;\nthin: and numerics)"
+HOLLOW = "\nhollow: n < 10"
 ENDS = ("", "_low", "_high", "_numerical")
 BOND_WORDS = {
     "certificate": "certificate: no load opens it",
@@ -51,6 +52,9 @@ LABELS = {
     "classes": "probability of class",
     "bonds": "share of aggregations",
 }
+FEW = 10
+"""Trials below which a point is hollow: its probability says little."""
+
 NO_EVENTS = {
     "pr_inside": "no collision",
     "pr_a_given_inside": "no decided collision\ninside the zone",
@@ -59,6 +63,14 @@ NO_EVENTS = {
     "classes": "no decided collision",
     "bonds": "no aggregation",
 }
+TRIALS = {
+    "pr_inside": ("n_collided", None),
+    "pr_a_given_inside": ("n_class", (0, 1)),
+    "pr_a_given_outside": ("n_class", (2, 3)),
+    "pr_a": ("n_class", (0, 1, 2, 3)),
+}
+"""Counts that a probability is of: their name, and the places of those that add up."""
+
 SIZE_COLOURS = "viridis"
 MOST_SIZES_NAMED = 6
 """Up to so many receiving sizes are all named beside their colours."""
@@ -158,13 +170,14 @@ def against_delta(results: Results) -> Figure:
             for index, colour in enumerate(colours[: len(results.vertices)]):
                 bands = [results.probabilities["pr_a" + end][number, index][order] for end in ENDS]
                 places = results.delta[order] + 0.12 * dodge(index, len(results.vertices))
-                draw_bars(axes, places, bands, index, colour)
+                few = trials_of(results, "pr_a")[number, index][order] < FEW
+                draw_bars(axes, places, bands, index, colour, few)
             note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
             axes.set_title(type_title(number, results.types[number]))
         for axes in panels[::PANELS_PER_ROW]:
             axes.set_ylabel(LABELS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
-        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "vertices $N$" + BARS)
+        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "vertices $N$" + BARS + HOLLOW)
         return figure
 
 
@@ -273,11 +286,18 @@ def draw_probability(axes, results, number, name):
     bands = [results.probabilities[name + end][number] for end in ENDS]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
-    count = results.delta.size
+    count, few = results.delta.size, trials_of(results, name)[number] < FEW
     for index, colour in enumerate(graded_colours(count)[:count]):
         line = [band[:, index] for band in bands]
-        draw_line(axes, results.vertices, line, index, count, colour)
+        draw_line(axes, results.vertices, line, index, count, colour, few[:, index])
     note_if_empty(axes, bands[0], NO_EVENTS[name])
+
+
+def trials_of(results, name):
+    """How many replicates a probability is of (type, vertices, delta)."""
+    counted, places = TRIALS[name]
+    counts = results.probabilities[counted]
+    return counts if places is None else counts[..., list(places)].sum(axis=-1)
 
 
 def draw_shares(axes, results, number, name):
@@ -326,17 +346,19 @@ def shares_of(results, number, name):
     return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
 
 
-def draw_line(axes, vertices, bands, index, count, colour):
+def draw_line(axes, vertices, bands, index, count, colour, few=None):
     """Line ``index`` of ``count``: points with bars, joined in the order of N.
 
-    Inner bars are intervals, outer ones, thin, these and the numerical error on either side.
+    Inner bars are intervals, outer ones, thin, these and the numerical error on either side;
+    points are hollow where there are ``few`` trials.
     """
     order = np.argsort(vertices)
     places = vertex_positions(vertices)[order] + dodge(index, count)
-    draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour)
+    few = None if few is None else few[order]
+    draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
 
 
-def draw_bars(axes, places, bands, index, colour):
+def draw_bars(axes, places, bands, index, colour, few=None):
     """A line of points with bars at these places: value, low, high, numerical error."""
     value, low, high, numerical = bands
     reach = np.clip([value - low, high - value], 0.0, None)
@@ -344,6 +366,9 @@ def draw_bars(axes, places, bands, index, colour):
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
                   marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
                   elinewidth=0.6 * width)  # fmt: skip
+    if few is not None and few.any():
+        axes.plot(places[few], value[few], linestyle="", marker=MARKERS[index % len(MARKERS)],
+                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3)  # fmt: skip
     if np.any(numerical > 0.0):
         beyond = np.nan_to_num(numerical)
         outer = [value - np.maximum(low - beyond, 0.0), np.minimum(high + beyond, 1.0) - value]
@@ -367,7 +392,7 @@ def add_delta_legend(axes, delta):
             zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
         )
     ]
-    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS)
+    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS + HOLLOW)
 
 
 def add_shares_legend(axes, name):

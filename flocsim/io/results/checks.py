@@ -108,7 +108,7 @@ def check_tables(results: Results) -> None:
             refuse(np.any(table[name] < 0), f"negative numbers in probabilities/{name}")
         else:
             refuse(beyond(table[name], 0.0, 1.0), f"values outside [0, 1] in probabilities/{name}")
-    ends = sum(table[name] for name in ("n_missed", "n_undecided", "n_failed"))
+    ends = sum(table[name] for name in ("n_missed", "n_held", "n_undecided", "n_failed"))
     refuse(
         np.any(table["n_total"] != results.count)
         or np.any(ends + table["n_class"].sum(axis=-1) != results.count)

@@ -1,6 +1,6 @@
 """The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
 
-Layout (schema version 3). Every group holds its own coordinates as dimension scales, and every
+Layout (`SCHEMA_VERSION`). Every group holds its own coordinates as dimension scales, and every
 dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_meanings``:
 
 - ``probabilities``  (type, vertices, delta[, class or bond]): counts, probabilities, bounds

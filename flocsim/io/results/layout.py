@@ -27,7 +27,7 @@ from flocsim.io.results.schema import (
 )
 
 FORMAT = "flocsim results"
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 
 class SparseImage(io.RawIOBase):

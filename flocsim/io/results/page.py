@@ -109,7 +109,8 @@ compares);
 command of those before), `computed` (replicates that the last of them ran), `wall_time` [s];
 `warnings` (JSON: lines on what was implausible), `settling` (JSON: type, body i or j, its
 equivalent `radius` [m], terminal `speed` [m/s], `reynolds` = 2 r ρ_f v/γ and `stokes` = τ v/r, the
-same at every N);
+same at every N); `size_classes` (JSON: label, least and largest r_eq `low` and `high` [m] and
+number of `flocs` of each class of measured flocs);
 `cpus` (JSON: every kind of CPU that rows were computed on: what LLVM calls it, what numba compiled
 for, the instructions that numpy used, the C library); `failed` (JSON: up to 1000 failed replicates
 with reasons).

@@ -10,8 +10,9 @@ import numpy as np
 
 from flocsim.errors import UsageError
 
-OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed")
-"""Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone."""
+OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
+"""Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone;
+missed, held: the outlines never touched, and the bodies have parted, or rest so."""
 CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
@@ -53,7 +54,8 @@ ROW_SIZE = sum(np.dtype(kind).itemsize for kind, _, _ in REPLICATES.values())
 
 COUNTS = {
     "n_total": "replicates",
-    "n_missed": "replicates whose outlines never touched",
+    "n_missed": "replicates whose bodies parted without touching",
+    "n_held": "replicates whose bodies rest over each other without touching",
     "n_undecided": "replicates that ran out of time or steps",
     "n_failed": "replicates that ended in an error",
     "n_collided": "replicates whose outlines touched",
@@ -107,6 +109,13 @@ POOLED = {
     f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
     for name in POOLED_PROBABILITIES
 }
+PER_APPROACH = "pr_a_per_approach"
+"""Of all approaches that were decided, misses among them: what efficiencies are sums of."""
+
+COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES} | {
+    PER_APPROACH: "Pr[aggregation | decided approach]"
+}
+"""{name: meaning} of the probabilities that are compared."""
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),
     "difference": ("f8", "1", "probability here minus that in the condition compared with"),

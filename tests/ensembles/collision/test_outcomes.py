@@ -15,6 +15,7 @@ from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
 from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
+from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.points import least_listed_gap
@@ -303,3 +304,18 @@ def test_a_pair_on_the_verge_of_touching_does_not_hold_steps_back(tmp_path):
     row = Study(small_config(tmp_path, words)).run(0, 16, 0.0, 35)
     assert OUTCOMES[row["outcome"]] == "C"
     assert row["steps"] < 1000
+
+
+@pytest.mark.parametrize(("distance", "ending"), [("30 nm", "held"), ("0.3 nm", "A")])
+def test_a_barrier_holds_two_spheres_apart(tmp_path, distance, ending):
+    """Head on, stable quartz comes to rest in the secondary minimum; without its barrier it
+    touches."""
+    layer = {"double_layer": {"debye_length": distance, "potential": "30 mV"}}
+    config = small_config(tmp_path, {"preset": "si", "forces": layer})
+    found = Study(config)
+    row = found.run(1, 1, 0.0, 0)
+    assert outcome(row) == ending
+    touched = ending == "A"
+    assert (row["inside"] == NOT_APPLICABLE) != touched
+    table = tabulate([[row["outcome"]]], [[row["inside"]]], [[row["bond"]]])
+    assert (table["n_held"][0], table["n_missed"][0]) == (int(not touched), 0)

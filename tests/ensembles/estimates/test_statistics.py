@@ -15,8 +15,8 @@ from tests.helpers.rounding import to_rounding
 from tests.helpers.synthetic_results import bonds_of, draw_codes, make_results
 
 Z = 1.959963984540054
-COUNTS = ("n_total", "n_missed", "n_undecided", "n_failed", "n_collided", "n_inside", "n_class",
-          "n_bond")  # fmt: skip
+COUNTS = ("n_total", "n_missed", "n_held", "n_undecided", "n_failed", "n_collided", "n_inside",
+          "n_class", "n_bond")  # fmt: skip
 
 
 @pytest.mark.parametrize("n", [1, 7, 50, 4000])
@@ -79,15 +79,16 @@ def test_wilson_refuses_impossible_confidence(confidence):
 
 
 def test_every_count_and_probability_of_a_small_case():
-    #           A  A  A  B  C  D  D  missed        undecided in, out, apart     failed in, apart
-    outcome = [[0, 0, 0, 1, 2, 3, 3, 4, 5, 5, 5, 6, 6]]
-    inside = [[1, 1, 1, 1, 0, 0, 0, 255, 1, 0, 255, 1, 255]]
-    bond = [[1, 1, 2, 255, 3, *[255] * 8]]
+    #           A  A  A  B  C  D  D  missed held   undecided in, out, apart     failed in, apart
+    outcome = [[0, 0, 0, 1, 2, 3, 3, 4, 7, 5, 5, 5, 6, 6]]
+    inside = [[1, 1, 1, 1, 0, 0, 0, 255, 255, 1, 0, 255, 1, 255]]
+    bond = [[1, 1, 2, 255, 3, *[255] * 9]]
     table = tabulate(outcome, inside, bond)
     counts = {name: table[name][0].tolist() for name in COUNTS}
     assert counts == {
-        "n_total": 13,
+        "n_total": 14,
         "n_missed": 1,
+        "n_held": 1,
         "n_undecided": 3,
         "n_failed": 2,
         "n_collided": 10,
@@ -114,7 +115,7 @@ def test_counts_are_whole_numbers_that_add_up():
     table = make_results().probabilities
     for name in COUNTS:
         assert table[name].dtype == np.int64
-    ends = table["n_missed"] + table["n_undecided"] + table["n_failed"]
+    ends = sum(table[name] for name in ("n_missed", "n_held", "n_undecided", "n_failed"))
     np.testing.assert_array_equal(table["n_total"], ends + table["n_class"].sum(axis=-1))
     aggregated = table["n_class"][..., [0, 2]].sum(axis=-1)
     np.testing.assert_array_equal(table["n_bond"].sum(axis=-1), aggregated)

@@ -131,3 +131,19 @@ def test_tables_have_the_numbers(files):
     comparison = flocsim.compare(flocsim.open(a), flocsim.open(b))
     frame, data = comparison.to_pandas("pr_a"), comparison.to_xarray("pr_a")
     np.testing.assert_array_equal(frame["difference"].to_numpy(), data["difference"].values.ravel())
+
+
+def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_path):
+    first, a, _ = files
+    outcome, inside = (first.replicates[name].copy() for name in ("outcome", "inside"))
+    departed = np.isin(outcome, (1, 3))
+    outcome[departed], inside[departed] = 4, 255
+    outcome[..., :2][departed[..., :2]] = 7
+    other = changed(tmp_path / "m.h5", first, outcome=outcome, inside=inside)
+    comparison = flocsim.compare(flocsim.open(a), flocsim.open(other))
+    # What departs in one file misses, or is held apart, in the other.
+    assert not np.nan_to_num(comparison.arrays["pr_a_per_approach"]["difference"]).any()
+    assert np.nan_to_num(comparison.arrays["pr_a"]["difference"]).max() == 0.0
+    ends = np.isin(first.replicates["outcome"], range(5)).sum(axis=-1)
+    np.testing.assert_array_equal(comparison.arrays["pr_a_per_approach"]["n_first"], ends)
+    assert "Pr[aggregation | decided approach]" in comparison.table("pr_a_per_approach")

@@ -10,7 +10,7 @@ import flocsim
 from flocsim.ensembles import run
 from flocsim.ensembles.studies.study import settings_of
 from flocsim.ensembles.studies.text import toml_text
-from flocsim.errors import ConfigError, FlocsimError, UsageError
+from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
 from tests.helpers.small_study import SMALL, command, write_small
 
 TABLES = {
@@ -150,3 +150,12 @@ def test_scripts_get_no_words_of_the_command():
     assert type(error) is FlocsimError
     assert str(error) == 'stopped by SIGTERM: go on with mode="resume"'
     assert "killed" in str(error_of(-9, []))
+
+
+def test_a_quiet_run_still_warns(tmp_path):
+    study = flocsim.Study(write_small(tmp_path)).with_(
+        {"shapes.vertices": [1], "fluid.viscosity": "0.5 Pa s", "replicates": 1}
+    )
+    with pytest.warns(PlausibilityWarning, match="viscosity") as found:
+        study.run()
+    assert found[0].filename == __file__

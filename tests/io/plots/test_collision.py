@@ -11,6 +11,7 @@ from PIL import Image
 from flocsim.errors import UsageError
 from flocsim.io.plots.collision import (
     draw_distance,
+    draw_energies,
     draw_forces,
     draw_strip,
     rounded_length,
@@ -120,6 +121,19 @@ def test_forces_of_nothing_can_be_drawn(tmp_path):
 def test_lengths_must_agree():
     with pytest.raises(UsageError, match="one force per time"):
         draw_forces([0.0], {"two": np.zeros(2)})
+
+
+def test_energies_are_drawn_one_by_one():
+    times, work = np.linspace(0.0, 1e-3, 4), {"Gravity": np.full(4, 3e-15)}
+    axes = draw_energies(times, work, np.full(4, 1e-17)).axes[0]
+    assert [line.get_label() for line in axes.get_lines()[:2]] == [
+        "work of Gravity", "kinetic energy",
+    ]  # fmt: skip
+    assert [line.get_ydata()[0] for line in axes.get_lines()[:2]] == pytest.approx([3.0, 1e-2])
+    assert axes.get_yscale() == "symlog"
+    assert draw_energies([0.0, 1.0], {}, np.zeros(2)).axes[0].get_yscale() == "linear"
+    with pytest.raises(UsageError, match="one energy per time"):
+        draw_energies([0.0], work, np.zeros(1))
 
 
 SMALL_SQUARE = 1e-6 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.estimates.statistics import tabulate, wilson
-from flocsim.io.plots.results import FIGURES, against_size, figure_4, figure_6, figure_8
+from flocsim.io.plots.results import FEW, FIGURES, against_size, figure_4, figure_6, figure_8
 from flocsim.io.plots.style import save
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
@@ -227,3 +227,20 @@ def test_without_sizes_or_pooled_numbers_the_figure_says_so(change, said):
     unknown = {"pooled": {}, "radii": make_results(made.types, vertices=(1, 8)).radii}[change]
     figure = against_size(attrs.evolve(made, **{change: unknown}))
     assert all(said in texts(axes) for axes in figure.axes)
+
+
+def test_points_of_few_trials_are_hollow():
+    results = make_results()
+    hollow = [line for axes in figure_4(results).axes for line in hollows(axes)]
+    assert not hollow  # every condition has ten collisions or more
+    counts = results.probabilities["n_collided"].copy()
+    counts[1, 2, 3] = FEW - 1
+    made = attrs.evolve(results, probabilities=results.probabilities | {"n_collided": counts})
+    found = [hollows(axes) for axes in figure_4(made).axes]
+    assert [len(each) for each in found] == [0, 1, 0]
+    assert found[1][0].get_ydata() == results.probabilities["pr_inside"][1, 2, 3]
+
+
+def hollows(axes):
+    """The points of a panel that are hollow."""
+    return [line for line in axes.get_lines() if str(line.get_markerfacecolor()) == "white"]

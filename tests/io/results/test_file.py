@@ -117,7 +117,7 @@ def test_xarray_opens_each_group_with_named_coordinates(written):
         assert outcome.dims == ("type", "vertices", "delta", "replicate")
         assert outcome.dtype == np.uint8
         assert tuple(outcome.attrs["flag_meanings"].split()) == OUTCOMES
-        assert outcome.attrs["flag_values"].tolist() == list(range(7))
+        assert outcome.attrs["flag_values"].tolist() == list(range(len(OUTCOMES)))
         assert replicates["t_end"].attrs["units"] == "s"
         assert replicates["t_end"].dtype == float
         assert set(replicates.data_vars) == set(REPLICATES)
