@@ -92,6 +92,10 @@ class Swarm:
         """The gap at which the last of the pair forces ends [m]."""
         return max(0.0, self.system.pieces.surface_reach, self.system.pieces.centre_reach)
 
+    def gauge(self) -> Gauge:
+        """What measures the gaps of its bodies, wherever they are."""
+        return Gauge(self.system.scene()._replace(box=self.box), self.fillings())
+
     def check_reach(self) -> None:
         """UsageError for forces that reach all bodies of many."""
         if len(self.bodies) > MANY and not self.all_pairs:
@@ -167,7 +171,7 @@ class Swarm:
         if not is_whole(threads) or threads < 1:
             raise UsageError(f"threads must be a whole number from 1, found {threads!r}")
         began = time.perf_counter()
-        gauge = Gauge(self.system.scene()._replace(box=self.box), self.fillings())
+        gauge = self.gauge()
         self.check_overlaps(gauge)
         progress = self.begin(end, threads=threads, max_steps=max_steps)
         seen, status = [progress.seen()], Status.FINISHED
