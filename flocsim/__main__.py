@@ -26,7 +26,6 @@ from flocsim.commands import (
     plot,
     report,
     shapes,
-    swarm,
     sweep,
     trajectory,
     work_precision,
@@ -35,7 +34,7 @@ from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.errors import FileError, FlocsimError
 
 COMMANDS = (
-    init, fit, shapes, check, ensemble, swarm, sweep, trajectory, plot, report, export, compare,
+    init, fit, shapes, check, ensemble, sweep, trajectory, plot, report, export, compare,
     work_precision, info,
 )  # fmt: skip
 

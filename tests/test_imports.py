@@ -64,7 +64,7 @@ INNER_ROWS = {
     ],
     "ensembles": [
         ["cli", "studies"],
-        ["dry_run", "runner", "report", "unfinished"],
+        ["dry_run", "runner", "report", "unfinished", "suspension"],
         ["parallel"],
         ["pilot"],
         ["estimates"],
@@ -101,6 +101,8 @@ HEAVYWEIGHTS = {
     "h5py": [
         "io/opening.py",
         "io/results/layout.py",
+        "io/results/groups.py",
+        "io/results/swarm_file.py",
         "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",

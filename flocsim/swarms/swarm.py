@@ -26,7 +26,7 @@ from flocsim.swarms.neighbours import find_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.trajectory import SwarmTrajectory
-from flocsim.system import System
+from flocsim.system import System, check_bodies, check_forces
 
 LEAST_BOX = 3.0
 """A box that repeats itself is so many times as wide as the largest body at least: two bodies must
@@ -68,8 +68,8 @@ class Swarm:
     gradient.
     """
 
-    bodies: tuple[Body, ...] = attrs.field(converter=tuple)
-    forces: tuple[Force, ...] = attrs.field(default=(), converter=tuple)
+    bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
+    forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
     integrator: Integrator = attrs.field(factory=Implicit)
     fluid: Fluid = attrs.field(factory=Fluid)
     box: tuple[float, float] = attrs.field(default=None, converter=read_box, kw_only=True)

@@ -40,6 +40,7 @@ from flocsim.io.terminal import Progress, tell
 from flocsim.plausibility.doubts import Names, doubts_of
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import Swarm
+from flocsim.system import System
 
 LAYOUT = "swarm 1"
 """The form of the journal's records."""
@@ -66,7 +67,8 @@ def run_swarms(
     """Run a config's study into its results file; the exit code, on all ranks."""
     output = config.output.file
     with contextlib.ExitStack() as resources:
-        journal, remarks = None, []
+        journal: Journal | None = None
+        remarks: list[str] = []
         if comm.rank == 0:
             journal, remarks = claim(output, mode, overwrite)
             resources.callback(journal.release)
@@ -244,7 +246,7 @@ class Lead:
         return self.found()
 
 
-def largest_pair(swarm: Swarm):
+def largest_pair(swarm: Swarm) -> System:
     """A System of the two largest bodies, for what is said of a swarm."""
     bodies = sorted((body for body in swarm.bodies if not body.fixed),
                     key=lambda body: -body.shape.equivalent_radius)[:2]  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from flocsim.body import Body
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import EXPONENTS, quantile
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
@@ -34,16 +35,22 @@ class Drawn:
     shapes: list[Shape]
 
 
+def scene_of(config: Config) -> SwarmScene:
+    """[scene] of a config that is known to be of a swarm."""
+    scene: Any = config.scene
+    return scene
+
+
 def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's swarm needs: none for spheres of given sizes."""
-    scene, shapes = config.scene, shapes_of(config)
+    scene, shapes = scene_of(config), shapes_of(config)
     needed = scene.is_measured or max(shapes.vertices) > 1
     return load_flocs(shapes, config.seed) if needed else []
 
 
-def shapes_of(config: Config):
+def shapes_of(config: Config) -> ShapesConfig:
     """[shapes], measured flocs keeping their sizes."""
-    own = config.scene.is_measured
+    own = scene_of(config).is_measured
     return attrs.evolve(config.shapes, size="own") if own else config.shapes
 
 
@@ -69,7 +76,7 @@ class SwarmStudy:
 
     @property
     def scene(self) -> SwarmScene:
-        return self.config.scene
+        return scene_of(self.config)
 
     @property
     def vertices(self) -> int:
@@ -136,6 +143,7 @@ class SwarmStudy:
         scene = self.scene
         if scene.box is not None:
             return scene.box
+        assert scene.area_fraction is not None, "a scene has one of the two"
         area = sum(shape.area for shape in shapes) / scene.area_fraction
         width = math.sqrt(area / scene.aspect)
         return width, area / width
@@ -177,6 +185,7 @@ def settling(system: System, body: Body) -> Body:
 
 def lognormal(scene: SwarmScene, numbers: np.ndarray) -> np.ndarray:
     """Equivalent radii [m] of a lognormal distribution between its limits, by uniform numbers."""
+    assert scene.radius is not None, "flocs of measured sizes are drawn otherwise"
     if scene.spread == 0.0:
         return np.full(len(numbers), scene.radius)
     from scipy.special import ndtr, ndtri

@@ -165,7 +165,7 @@ def cluster_colours(labels: np.ndarray) -> list:
     size = sizes_of(labels)
     own = np.full(len(labels), 0)
     own[labels >= 0] = size
-    firsts = {}
+    firsts: dict[int, int] = {}
     for body, label in enumerate(labels.tolist()):
         firsts.setdefault(label, body)
     return [

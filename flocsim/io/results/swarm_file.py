@@ -21,6 +21,7 @@ from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.opening import opened_file
+from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
 SCHEMA_VERSION = 1
@@ -147,25 +148,6 @@ def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> N
         for name, value in results.run.items():
             run[name] = value
     write_file(path, seal(image.getvalue()), rule)
-
-
-def write_labelled(group: Any, labelled: Labelled) -> None:
-    """Arrays along named axes into an open group, its coordinates as dimension scales."""
-    import h5py
-
-    for name, axis in labelled.axes.items():
-        words = axis.values.dtype.kind in "OU"
-        values = axis.values.astype(object) if words else axis.values
-        scale = group.create_dataset(
-            name, data=values, dtype=h5py.string_dtype() if words else None
-        )
-        scale.make_scale(name)
-        scale.attrs.update(axis.about)
-    for name, column in labelled.columns.items():
-        dataset = group.create_dataset(name, data=column.values)
-        dataset.attrs.update(column.about)
-        for number, axis in enumerate(column.axes):
-            dataset.dims[number].attach_scale(group[axis])
 
 
 def read_swarm(path: str | Path) -> SwarmResults:
