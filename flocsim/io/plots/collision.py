@@ -37,10 +37,10 @@ GRID = 24
 
 NANO = 1e9
 DECADES = 8
+"""Decades below the largest force that are shown."""
 FEMTO = 1e15
 ENERGY_DECADES = 4
 """Decades of an axis of energies on either side of 0."""
-"""Decades below the largest force that are shown."""
 FORCE_COLOURS = (*BODY_COLOURS, "0.5", CONTACT_COLOUR)
 
 MILLISECONDS = 80
