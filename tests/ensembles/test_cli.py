@@ -8,7 +8,7 @@ import pytest
 
 from flocsim.ensembles import cli
 from flocsim.io.results.file import read_results, same_data
-from tests.helpers.small_study import run_command, write_small, write_star_library
+from tests.helpers.small_study import problems, run_command, write_small, write_star_library
 
 
 def call(capsys, *words):
@@ -37,14 +37,17 @@ def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
     assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
 
 
-def test_quiet_prints_nothing(folder, capsys):
-    assert call(capsys, "small.toml", "--quiet") == (0, "", "")
+def test_quiet_prints_nothing_but_warnings(folder, capsys):
+    code, output, errors = call(capsys, "small.toml", "--quiet")
+    assert (code, output, problems(errors)) == (0, "", [])
+    assert errors.startswith("flocsim: warning: a body of r_eq = 23.02 um")
     assert (folder / "small.h5").exists()
 
 
 def test_options_replace_the_configs_values(folder, capsys):
     words = ["--seed", 9, "--replicates", 2, "--output", "other.h5", "--quiet"]
-    assert call(capsys, "small.toml", *words) == (0, "", "")
+    code, output, errors = call(capsys, "small.toml", *words)
+    assert (code, output, problems(errors)) == (0, "", [])
     assert not (folder / "small.h5").exists()
     results = read_results(folder / "other.h5")
     assert results.replicates["outcome"].shape[-1] == 2
@@ -200,7 +203,7 @@ def test_other_ends(folder, capsys, monkeypatch, error, code, said):
 
 def test_the_module_is_a_command(folder):
     done = run_command(folder, "small.toml", "--replicates", 1, "--quiet")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (done.returncode, done.stdout, problems(done.stderr)) == (0, "", [])
     outcome = read_results(folder / "small.h5").replicates["outcome"]
     assert np.all(outcome[:, :, 0] == 0)
 

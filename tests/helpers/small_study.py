@@ -89,6 +89,14 @@ ROOT = Path(__file__).resolve().parents[2]
 BESIDE_PYTHON = Path(sys.executable).parent
 
 
+def problems(errors):
+    """The lines on stderr but for warnings, each of which is said once."""
+    lines = errors.splitlines()
+    warned = [line for line in lines if line.startswith("flocsim: warning: ")]
+    assert len(warned) == len(set(warned))
+    return [line for line in lines if line not in warned]
+
+
 def write_small(folder, text=SMALL, name="small.toml", **changes):
     """A config file in the folder; ``changes`` replace whole "key = value" lines by key."""
     lines = text.splitlines()

@@ -24,7 +24,9 @@ RADIUS = number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH))
 class SwarmScene:
     """[scene] of a swarm: `kind = "swarm"`."""
 
-    kind: str = choice("swarm", shown="none, it must be given", help="many bodies, which this table describes")
+    kind: str = choice(
+        "swarm", shown="none, it must be given", help="many bodies, which this table describes"
+    )
     number: int = whole_field(1, MOST_BODIES, default=1000, help="bodies of each replicate")
     area_fraction: float | None = quantity(
         "",
