@@ -22,11 +22,10 @@ RADIUS = number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH))
 
 @attrs.frozen
 class SwarmScene:
-    """[scene] of a swarm: `kind = "swarm"`."""
+    """With `kind = "swarm"`: how many bodies of what sizes begin where, for how long they are
+    followed, and what is kept."""
 
-    kind: str = choice(
-        "swarm", shown="none, it must be given", help="many bodies, which this table describes"
-    )
+    kind: str = choice("swarm", default="swarm", help="many bodies, which this table describes")
     number: int = whole_field(1, MOST_BODIES, default=1000, help="bodies of each replicate")
     area_fraction: float | None = quantity(
         "",
@@ -38,7 +37,7 @@ class SwarmScene:
     )
     box: tuple[float, float] | None = read_by(
         vector(2, "m", above=0.0),
-        "a list of 2 numbers [m], each above 0",
+        "a list of 2 numbers, each above 0",
         default=None,
         unit="m",
         help="width and height of the box, instead of `area_fraction`",
