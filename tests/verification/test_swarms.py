@@ -31,9 +31,10 @@ def test_momentum_of_a_settling_swarm_is_weight_less_drag():
     ways = run.position[:, :, :2] - run.position[0, :, :2]
     impulse = -np.einsum("n,knc->kc", drag, ways)
     impulse[:, 1] -= weight * run.t
-    # They have met: what pushes two bodies apart pushes none of all.
     assert len(run.neighbours().pairs) > 2
-    assert np.abs(changes - impulse).max() < 1e-12 * weight * run.t[-1]
+    # Contacts alone leave 1e-15. Corrections of the last Newton step that turn a cluster keep its
+    # momentum, and not its drag: they leave some 1e-12.
+    assert np.abs(changes - impulse).max() < 1e-11 * weight * run.t[-1]
 
 
 def test_energy_never_grows_where_contacts_are_damped():
