@@ -139,9 +139,9 @@ class Body:
         return self.areal_density * self.shape.second_moment
 
     def buoyant_mass(self, fluid: Fluid) -> float:
-        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; a fixed body is not moved by it, and may be
-        of any ρ. UsageError where ρ is not known."""
-        if not fluid.buoyancy or self.fixed:
+        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known, but for a
+        fixed body, which no weight moves."""
+        if not fluid.buoyancy or (self.fixed and self.density is None):
             return self.mass
         if self.density is None:
             raise UsageError(

@@ -70,7 +70,7 @@ class Doublet:
 
     def bond(self, time=0.0, gap=-1e-9):
         """The kind of bond now."""
-        nx, ny, distance = centre_line(self.work, NOW, 1, 0)
+        nx, ny, distance = centre_line(self.scene, self.work, NOW, 1, 0)
         return bonds.bond_of(self.scene, self.work, self.observed, time, gap, nx, ny, distance)
 
     def rest(self, turns):
