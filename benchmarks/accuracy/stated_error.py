@@ -1,7 +1,7 @@
 """Whether the stated error covers the true one, on random runs of every family.
 
     python -m benchmarks.accuracy.stated_error [--runs 2000] [--processes 2] [--families …]
-                                               [--seconds S]
+                                               [--seconds S] [--first K]
 
 A run at the default tolerance is held against the same at 1e-12 m, and a companion of that, nudged
 by 1e-10 m, says by how much the motion amplifies a difference; runs that amplify it more than ten
@@ -164,15 +164,18 @@ def judge(family, tolerance, number):
     return true, found.error, growth
 
 
-def judged(family, tolerance, runs, processes, seconds):
+def judged(family, tolerance, runs, processes, seconds, first=0):
     """(runs that count as (true/stated, number, true, stated, amplification), amplified, not
-    ended): the first of them by number, for any number of processes; fewer where time is up."""
+    ended, the number after the last): the first of them from a number on, for any number of
+    processes; fewer where time is up."""
     until = time.monotonic() + seconds
     shares, left, failed = [], 0, 0
     context = multiprocessing.get_context("spawn")
     with context.Pool(processes) as pool:
-        results = pool.imap(partial(judge, family, tolerance), range(MOST_TRIED * runs))
-        for number, found in enumerate(results):
+        results = pool.imap(
+            partial(judge, family, tolerance), range(first, first + MOST_TRIED * runs)
+        )
+        for number, found in enumerate(results, first):
             if isinstance(found, str):
                 failed += found == "did not end"
             elif not found[2] < MOST_AMPLIFIED:
@@ -182,7 +185,7 @@ def judged(family, tolerance, runs, processes, seconds):
             if len(shares) == runs or time.monotonic() > until:
                 break
         pool.terminate()
-    return shares, left, failed
+    return shares, left, failed, number + 1
 
 
 def main():
@@ -192,21 +195,24 @@ def main():
     parser.add_argument("--tolerance", type=float, default=1e-9)
     parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first run: go on there")
     parser.add_argument("--seconds", type=float, default=math.inf, help="at most, for a family")
     parser.add_argument("--worst", type=int, default=0, help="list so many of the worst runs")
     arguments = parser.parse_args()
     runs = 20 if arguments.quick else arguments.runs
     print_heading()
-    columns = ("family", "runs", "amplified", "not ended", "covered [%]", "median true/stated",
-               "99th percentile", "largest")  # fmt: skip
+    columns = ("family", "numbers", "runs", "amplified", "not ended", "covered [%]",
+               "median true/stated", "99th percentile", "largest")  # fmt: skip
     table = Table(f"True error over stated error at {arguments.tolerance:g} m", columns)
     for family in arguments.families:
-        shares, left, failed = judged(
-            family, arguments.tolerance, runs, arguments.processes, arguments.seconds
-        )
+        shares, left, failed, following = judged(
+            family, arguments.tolerance, runs, arguments.processes, arguments.seconds,
+            arguments.first,
+        )  # fmt: skip
         values = np.array([each[0] for each in shares])
         table.add(
-            family, len(shares), left, failed, 100.0 * np.mean(values <= 1.0),
+            family, f"{arguments.first} to {following - 1}", len(shares), left, failed,
+            100.0 * np.mean(values <= 1.0),
             float(np.median(values)), float(np.quantile(values, 0.99)), float(values.max()),
         )  # fmt: skip
         for each in sorted(shares, reverse=True)[: arguments.worst]:

@@ -22,7 +22,7 @@ from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import CHUNK
 from flocsim.io.results.file import same_data
 from tests.ensembles.storage.test_resume import stop_after
-from tests.helpers.small_study import small_config
+from tests.helpers.small_study import problems, small_config
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
 FEWER = [
@@ -357,5 +357,5 @@ def test_the_lock_is_held_before_anything_is_grown_and_to_the_end(tmp_path, monk
 def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(locked_file, "lock", lambda *words: None)
     assert go_on(tmp_path, NEW).code == 0
-    [line] = capsys.readouterr().err.splitlines()
+    [line] = problems(capsys.readouterr().err)
     assert "has no locks: see that no two jobs write there" in line

@@ -188,7 +188,7 @@ def put(name, place, value):
 @pytest.mark.parametrize(
     ("name", "place", "value", "said"),
     [
-        ("replicates/outcome", (0, 0, 0, 0), 7, "outcome are impossible"),
+        ("replicates/outcome", (0, 0, 0, 0), 8, "outcome are impossible"),
         ("replicates/outcome", (0, 0, 0, 0), 200, "outcome are impossible"),
         ("replicates/inside", ..., 2, "inside are impossible"),
         ("replicates/crossed_zone", (0, 0, 0, 1), 9, "crossed_zone are impossible"),
