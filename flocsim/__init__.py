@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
     from flocsim.integrators.base import Status
+    from flocsim.io.results.swarm_file import SwarmResults
+    from flocsim.swarms.swarm import Swarm
+    from flocsim.swarms.trajectory import SwarmTrajectory
+    from flocsim.swarms.walls import floor, wall
     from flocsim.system import System
     from flocsim.trajectories.trajectory import State, Trajectory
 
@@ -32,6 +36,9 @@ HOMES = {
     "SpheroPolygon": "geometry.shapes.spheropolygon",
     "State": "trajectories.trajectory",
     "Status": "integrators.base",
+    "Swarm": "swarms.swarm",
+    "SwarmResults": "io.results.swarm_file",
+    "SwarmTrajectory": "swarms.trajectory",
     "Study": "ensembles.studies.study",
     "Comparison": "ensembles.studies.compare",
     "StudyResults": "ensembles.studies.opened",
@@ -39,8 +46,10 @@ HOMES = {
     "System": "system",
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.studies.compare",
+    "floor": "swarms.walls",
     "open": "ensembles.studies.sweep:open_any",
     "sweep": "ensembles.studies.sweep",
+    "wall": "swarms.walls",
 }
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked
 for: a job takes over Ctrl-C before it loads any."""
@@ -59,13 +68,18 @@ __all__ = [
     "Status",
     "Study",
     "StudyResults",
+    "Swarm",
+    "SwarmResults",
+    "SwarmTrajectory",
     "SweepResults",
     "System",
     "Trajectory",
     "__version__",
     "compare",
+    "floor",
     "open",
     "sweep",
+    "wall",
 ]
 
 

@@ -9,7 +9,7 @@ from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 from flocsim.limits import check_memory, is_limited
 
-if "ensemble" in sys.argv[1:2]:
+if {"ensemble", "swarm"}.intersection(sys.argv[1:2]):
     fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
@@ -39,6 +39,10 @@ COMMANDS = (
 )  # fmt: skip
 
 
+STUDIES = {"ensemble", "swarm"}
+"""Commands that run studies, also under mpirun."""
+
+
 def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="flocsim",
@@ -56,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with plain_streams():
         plain_warnings()
         words = sys.argv[1:] if argv is None else argv
-        if "ensemble" in words[:1]:
+        if STUDIES.intersection(words[:1]):
             arguments = parse_on_all_ranks(make_parser(), argv)
         else:
             with silent_unless_first():
@@ -66,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if problem:
             print(f"flocsim: {problem}", file=sys.stderr)
         # The results of a study are whole, whether anybody reads its table or not.
-        needed = arguments.command != "ensemble" or arguments.dry_run
+        needed = arguments.command not in STUDIES or arguments.dry_run
         return FileError.exit_code if problem and needed else code
 
 

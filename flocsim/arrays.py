@@ -52,13 +52,14 @@ along the tangent; displacements and such offsets that are set aside while the l
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    FRAMES,
-) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16  # fmt: skip
+    SHORTENED, LEADER_FORCE, LEADER_RATE, FRAMES,
+) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s]; what all steps' errors, and those of switches, have led to; its frames at the
-stages of an implicit step."""
+of velocity [m/s]; what all steps' errors, and those of switches, have led to; of the
+first body of a cluster: the share to which the carried error is shortened, the sums of forces, and
+of masses times accelerations (x, y); its frames at the stages of an implicit step."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
@@ -68,10 +69,18 @@ MOST_FRAMES = 3
 
 BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 
-VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING = range(8)
+(
+    VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING, PAIR,
+    CANDIDATE_COLUMNS,
+) = range(10)  # fmt: skip
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
 point of the edge; 1 where the pair is closed in this step, 1 where it may have a share of a surface
-force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks."""
+force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of the two
+bodies in ``Work.pairs``."""
+
+LATER, EARLIER, ACTING, PAIR_COLUMNS = range(4)
+"""Columns of ``Work.pairs``: two bodies, the later one first; 1 where they act on each other in
+this step."""
 
 (
     NORMAL_X,
@@ -91,15 +100,20 @@ the centroid of the vertex's body and about that of the edge's; the angle by whi
 for every metre of the vertex along t [1/m]; the share of a surface force that
 acts through it.  See flocsim.geometry.contact.points."""
 
-KEPT_VERTEX, KEPT_EDGE = range(2)
-"""Columns of ``Work.kept``: core point of the vertex, first core point of the edge."""
+KEPT_LATER, KEPT_EARLIER, KEPT_VERTEX, KEPT_EDGE, KEPT_COLUMNS = range(5)
+"""Columns of ``Work.kept``: the two bodies, the later one first; core point of the vertex, first
+core point of the edge."""
 
 DAMPING, STIFFNESS = range(2)
 """Matrices in ``Work.jacobian``: minus the derivatives of the forces by velocity and by place."""
 
-CANDIDATES, EVALUATIONS, REBUILDS, SOLVES, KEPT, TALLY_SIZE = range(6)
-"""Places in ``Work.tally``: pairs listed; forces evaluated, lists made, systems solved so far; one
-more than the displacements set aside for a list that found no room (0: none are)."""
+CANDIDATES, PAIRS, EVALUATIONS, REBUILDS, SOLVES, KEPT, FULL, TALLY_SIZE = range(8)
+"""Places in ``Work.tally``: pairs of features and pairs of bodies listed; forces evaluated, lists
+made, systems solved so far; one more than the displacements set aside for a list that found no room
+(0: none are); what has found no room."""
+
+NOTHING_FULL, CANDIDATES_FULL, PAIRS_FULL, BLOCKS_FULL = range(4)
+"""What ``FULL`` says."""
 
 (
     TIME,
@@ -120,8 +134,9 @@ more than the displacements set aside for a list that found no room (0: none are
     SETTLING,
     SETTLED_STEP,
     ESTIMATE_SHARE,
+    HORIZON,
     CLOCK_SIZE,
-) = range(19)
+) = range(20)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
 error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
@@ -129,7 +144,8 @@ the step whose stages are still there (0: none are) and the time at which it beg
 step that is expected to work at all; the error of the step just taken [m]; size and error over
 tolerance of the trial that was just rejected (0: none was); steps in a row that ended at a switch,
 until one has been taken that does not; the size of the last such step; the share of what the method
-estimates for its steps that counts in the stated error."""
+estimates for its steps that counts in the stated error; until when the run goes on, where UNTIL is
+but a stop on the way (0: it is not) [s]."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, COUNTS_SIZE = range(9)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
@@ -190,8 +206,10 @@ class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
     ``bodies`` (n, 7): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
-    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws;
-    ``smoothing``: see flocsim.forces.smoothing.
+    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws; ``surface_reach``
+    and ``centre_reach``: the gaps up to which such forces act [m], −1 where there are none;
+    ``smoothing``: see flocsim.forces.smoothing; ``box``: periods along x and y [m], inf where
+    nothing repeats.
     """
 
     bodies: np.ndarray
@@ -201,8 +219,36 @@ class Scene(NamedTuple):
     parameters: np.ndarray
     laws: Any
     surface_reach: float
+    centre_reach: float
     smoothing: tuple[float, float, float]
     events: int
+    box: tuple[float, float]
+
+
+class Elimination(NamedTuple):
+    """The sparse systems of a step of many bodies: flocsim.integrators.radau.elimination.
+
+    ``place`` (n,): where a body comes in the order of elimination, −1 for a fixed one; ``body``:
+    the body at a place.  ``lower`` (n + 1,) and ``upper`` (n,): where the blocks of a row left and
+    right of the diagonal begin in ``column`` (room,), which holds their places, and in ``blocks``
+    (room, 3, 3, 3): the parts of a block (see sparse REAL_PART), rows, columns.  ``pivot``
+    (n, 3, 3, 3): the inverses of the diagonal blocks; ``row``: the row that is worked on.
+    ``pairs`` (pairs,): 1 where a pair of bodies is in the pattern.  ``graph`` (room,) and
+    ``nodes`` (8, n + 1): scratch of the ordering.  ``found``: see elimination.PATTERN.
+    """
+
+    place: np.ndarray
+    body: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    column: np.ndarray
+    blocks: np.ndarray
+    pivot: np.ndarray
+    row: np.ndarray
+    pairs: np.ndarray
+    graph: np.ndarray
+    nodes: np.ndarray
+    found: np.ndarray
 
 
 class Work(NamedTuple):
@@ -213,13 +259,17 @@ class Work(NamedTuple):
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
     ``slip`` (21, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
-    ``bodies`` (n, 31): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    ``bodies`` (n, 36): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
-    ``jacobian`` (2, 3n, 3n): DAMPING and STIFFNESS.  ``system`` (2, 3n, 3n + 1), complex:
-    factorised systems, then the load.  ``pivots`` (2, 3n): which rows have changed places.
-    ``candidates`` (capacity, 8): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
-    ``kept`` (capacity, 2): the pairs whose displacements are set aside.
-    ``budget`` (n (n − 1)/2,): how far two bodies may move until the list must be made anew.
+    ``jacobian`` (2, 2 n + 2 pairs, 3, 3): blocks of DAMPING and STIFFNESS, see rhs.blocks.
+    ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.
+    ``system`` (2, 3 n, 3 n), complex: few bodies' factorised systems, and ``pivots`` (2, 3 n),
+    which rows have changed places; ``elimination``: those of many.
+    ``candidates`` (capacity, 9): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
+    ``kept`` (capacity, 4): the pairs whose displacements are set aside.
+    ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
+    (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),
+    ``order`` (n,) and ``starts`` (n + 1,): what the sweep for them works on.
     ``tally``: counts, see CANDIDATES.
     """
 
@@ -229,55 +279,143 @@ class Work(NamedTuple):
     bodies: np.ndarray
     cluster: np.ndarray
     jacobian: np.ndarray
+    loads: np.ndarray
     system: np.ndarray
     pivots: np.ndarray
+    elimination: Elimination
     candidates: np.ndarray
     geometry: np.ndarray
     kept: np.ndarray
+    pairs: np.ndarray
     budget: np.ndarray
+    discs: np.ndarray
+    order: np.ndarray
+    starts: np.ndarray
     tally: np.ndarray
 
 
-def work_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, capacity: int = 256) -> Work:
-    """Work arrays for a scene at the given position and velocity (n, 3), no contact yet."""
+ALL_PAIRS = 12
+"""Of so many bodies at most, all pairs are watched; of more, those that may come near."""
+
+DENSE = 6
+"""Of so many bodies at most, the linear systems are dense."""
+
+PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
+"""Room at first for the pairs of bodies, and for the blocks of sparse systems, of a body."""
+
+
+def elimination_of(n: int, pairs: int, room: int) -> Elimination:
+    """Arrays for the sparse systems of n bodies (none for few)."""
+    if n <= DENSE:
+        n = pairs = room = 0
+    return Elimination(
+        place=np.zeros(n, dtype=np.int64),
+        body=np.zeros(n, dtype=np.int64),
+        lower=np.zeros(n + 1, dtype=np.int64),
+        upper=np.zeros(n, dtype=np.int64),
+        column=np.zeros(room, dtype=np.int64),
+        blocks=np.zeros((room, 3, 3, 3)),
+        pivot=np.zeros((n, 3, 3, 3)),
+        row=np.zeros((n, 3, 3, 3)),
+        pairs=np.zeros(pairs, dtype=np.int64),
+        graph=np.zeros(room, dtype=np.int64),
+        nodes=np.zeros((8, n + 1), dtype=np.int64),
+        found=np.zeros(3, dtype=np.int64),
+    )
+
+
+def work_of(
+    scene: Scene,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    capacity: int = 256,
+    pairs: int | None = None,
+    blocks: int | None = None,
+    all_pairs: bool = True,
+) -> Work:
+    """Work arrays for a scene at the given position and velocity (n, 3), no contact yet; room for
+    so many pairs of features and of bodies, and blocks of sparse systems; ``all_pairs``: whether
+    all pairs of few bodies are watched."""
     n = len(scene.bodies)
     motion = np.zeros((MOTION_ROWS, n, MOTION_COLUMNS))
     motion[NOW] = np.hstack([position, velocity])
-    return Work(
+    dense = n if n <= DENSE else 0
+    if n <= ALL_PAIRS and all_pairs:
+        pairs = n * (n - 1) // 2
+    elif pairs is None:
+        pairs = PAIRS_A_BODY * n
+    work = Work(
         motion=motion,
         rates=np.zeros((STATES, n, MOTION_COLUMNS)),
         slip=np.zeros((SLIP_ROWS, capacity)),
         bodies=np.zeros((n, BODY_COLUMNS)),
         cluster=np.zeros(n, dtype=np.int64),
-        jacobian=np.zeros((2, 3 * n, 3 * n)),
-        system=np.zeros((2, 3 * n, 3 * n + 1), dtype=complex),
-        pivots=np.zeros((2, 3 * n), dtype=np.int64),
-        candidates=np.zeros((capacity, SLIDING + 1), dtype=np.int64),
+        jacobian=np.zeros((2, 2 * n + 2 * pairs, 3, 3)),
+        loads=np.zeros((2, 3 * n), dtype=complex),
+        system=np.zeros((2, 3 * dense, 3 * dense), dtype=complex),
+        pivots=np.zeros((2, 3 * dense), dtype=np.int64),
+        elimination=elimination_of(n, pairs, BLOCKS_A_BODY * n if blocks is None else blocks),
+        candidates=np.zeros((capacity, CANDIDATE_COLUMNS), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
-        kept=np.zeros((capacity, 2), dtype=np.int64),
-        budget=np.full(n * (n - 1) // 2, -1.0),
+        kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
+        pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
+        budget=np.full(pairs, -1.0),
+        discs=np.zeros((n, 8)),
+        order=np.arange(n, dtype=np.int64),
+        starts=np.zeros(n + 1, dtype=np.int64),
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
+    if n <= ALL_PAIRS and all_pairs:
+        work.pairs[:, LATER], work.pairs[:, EARLIER] = np.tril_indices(n, -1)
+        work.tally[PAIRS] = pairs
+    return work
 
 
 def copy_of(work: Work) -> Work:
     """The same work in arrays of its own."""
-    return Work(*(array.copy() for array in work))
+    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
+    elimination = Elimination(*(array.copy() for array in work.elimination))
+    return Work(elimination=elimination, **copies)
+
+
+def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
+    """The array with room for more along an axis, zeros behind what is there."""
+    shape = list(array.shape)
+    shape[axis] = size
+    larger = np.zeros(shape, dtype=array.dtype)
+    larger[tuple(slice(each) for each in array.shape)] = array
+    return larger
+
+
+def with_room(work: Work) -> Work:
+    """The same work with twice the room for what has found none: see FULL."""
+    full = work.tally[FULL]
+    work.tally[FULL] = NOTHING_FULL
+    if full == PAIRS_FULL:
+        n, pairs = len(work.bodies), 2 * len(work.pairs)
+        elimination = work.elimination._replace(pairs=grown(work.elimination.pairs, 0, pairs))
+        return work._replace(
+            jacobian=grown(work.jacobian, 1, 2 * n + 2 * pairs),
+            pairs=grown(work.pairs, 0, pairs),
+            budget=grown(work.budget, 0, pairs),
+            elimination=elimination,
+        )
+    if full == BLOCKS_FULL:
+        room = 2 * len(work.elimination.column)
+        elimination = work.elimination._replace(
+            column=grown(work.elimination.column, 0, room),
+            blocks=grown(work.elimination.blocks, 0, room),
+            graph=grown(work.elimination.graph, 0, room),
+        )
+        return work._replace(elimination=elimination)
+    return with_capacity(work, 2 * len(work.candidates))
 
 
 def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
-
-    def grown(array: np.ndarray, axis: int) -> np.ndarray:
-        shape = list(array.shape)
-        shape[axis] = capacity
-        larger = np.zeros(shape, dtype=array.dtype)
-        larger[tuple(slice(size) for size in array.shape)] = array
-        return larger
-
     return work._replace(
-        slip=grown(work.slip, 1),
-        candidates=grown(work.candidates, 0),
-        geometry=grown(work.geometry, 1),
-        kept=grown(work.kept, 0),
+        slip=grown(work.slip, 1, capacity),
+        candidates=grown(work.candidates, 0, capacity),
+        geometry=grown(work.geometry, 1, capacity),
+        kept=grown(work.kept, 0, capacity),
     )

@@ -21,6 +21,9 @@ NO_LAWS = (None,) * len(LAWS)
 NO_SMOOTHING = (1.0, 0.0, 0.0)
 """``Scene.smoothing`` of a scene without surface forces."""
 
+NO_BOX = (math.inf, math.inf)
+"""``Scene.box`` where nothing repeats."""
+
 
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
     """``length`` finite numbers, or texts such as "5 um", as a tuple of floats; UsageError for
@@ -136,8 +139,9 @@ class Body:
         return self.areal_density * self.shape.second_moment
 
     def buoyant_mass(self, fluid: Fluid) -> float:
-        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known."""
-        if not fluid.buoyancy:
+        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known, but for a
+        fixed body, which no weight moves."""
+        if not fluid.buoyancy or (self.fixed and self.density is None):
             return self.mass
         if self.density is None:
             raise UsageError(
@@ -153,8 +157,10 @@ def scene_of(
     parameters: Sequence[float] = (),
     laws: Any = NO_LAWS,
     surface_reach: float = -1.0,
+    centre_reach: float = -1.0,
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
+    box: tuple[float, float] = NO_BOX,
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
     (flocsim.forces.codegen.Pieces); without, a scene that has no laws."""
@@ -174,6 +180,8 @@ def scene_of(
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),
+        centre_reach=float(centre_reach),
         smoothing=smoothing,
         events=int(events),
+        box=box,
     )

@@ -19,7 +19,7 @@ from flocsim.arrays import (
     Scene,
     Work,
     copy_of,
-    with_capacity,
+    with_room,
 )
 from flocsim.integrators.base import Integrator, Status
 
@@ -76,7 +76,7 @@ class Run:
                 self.saved.append(self.record[: self.counts[RECORDED]].copy())
                 self.counts[RECORDED] = 0
             if code == Status.NO_ROOM:
-                self.work = with_capacity(self.work, 2 * len(self.work.candidates))
+                self.work = with_room(self.work)
             elif code != Status.RECORD_FULL:
                 return Status(code)
 

@@ -14,6 +14,7 @@ from flocsim.arrays import (
     EVALUATIONS,
     NOW,
     RADIUS,
+    REBUILDS,
     TIME,
     TOLERANCE,
     UNTIL,
@@ -137,7 +138,7 @@ class System:
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
             laws=self.laws(jit=jit),
-            surface_reach=pieces.surface_reach, 
+            surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach, 
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
         )  # fmt: skip
@@ -258,6 +259,7 @@ class System:
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
+        run.work.tally[REBUILDS] = 0
         run.work.tally[EVALUATIONS] = 0
         run.clock[TIME] = start.t[-1]
         if np.isfinite(start.error) and np.isfinite(run.clock[TOLERANCE]):

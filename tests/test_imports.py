@@ -22,6 +22,7 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
+    ["swarms"],
     ["system"],
     ["trajectories"],
     ["io"],
@@ -44,6 +45,14 @@ INNER_ROWS = {
         ["disk_cache", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
+    "swarms": [
+        ["swarm"],
+        ["trajectory"],
+        ["progress"],
+        ["runner", "clusters"],
+        ["contacts", "islands", "neighbours", "placement", "walls"],
+        ["arrays"],
+    ],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
@@ -55,7 +64,7 @@ INNER_ROWS = {
     ],
     "ensembles": [
         ["cli", "studies"],
-        ["dry_run", "runner", "report", "unfinished"],
+        ["dry_run", "runner", "report", "unfinished", "suspension"],
         ["parallel"],
         ["pilot"],
         ["estimates"],
@@ -92,6 +101,8 @@ HEAVYWEIGHTS = {
     "h5py": [
         "io/opening.py",
         "io/results/layout.py",
+        "io/results/groups.py",
+        "io/results/swarm_file.py",
         "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",

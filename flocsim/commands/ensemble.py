@@ -1,14 +1,21 @@
-"""`flocsim ensemble cfg.toml`: the same as `python -m flocsim.ensemble cfg.toml`."""
+"""`flocsim ensemble cfg.toml`: the same as `python -m flocsim.ensemble cfg.toml`; and by another
+name, `flocsim swarm`, for a config whose scene is a swarm."""
 
 from argparse import Namespace
 from typing import Any
 
 from flocsim.ensembles.cli import add_arguments, run_command
 
+NAMES = {
+    "ensemble": "run the ensemble of a config file",
+    "swarm": 'run a study of many bodies (scene.kind = "swarm"), as ensemble does',
+}
+
 
 def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser("ensemble", help="run the ensemble of a config file")
-    add_arguments(parser).set_defaults(run=run)
+    for name, words in NAMES.items():
+        parser = subparsers.add_parser(name, help=words, description=words)
+        add_arguments(parser).set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> int:

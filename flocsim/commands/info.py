@@ -5,6 +5,7 @@ import math
 import sys
 from argparse import Namespace
 from collections import Counter
+from functools import partial
 from typing import Any
 
 import attrs
@@ -21,7 +22,7 @@ from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io import trajectory
 from flocsim.io.opening import kind_of
-from flocsim.io.results import sweep_file
+from flocsim.io.results import swarm_file, sweep_file
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview, read_results
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import BONDS, Results
@@ -33,6 +34,9 @@ APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
+
+WALL = -2
+"""In `bodies/floc` of a swarm: a wall."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -60,7 +64,9 @@ def run(args: Namespace) -> int:
     if not args.config:
         print(text_of(args.results))
         return 0
-    results = read_results(args.results, replicates=False)
+    swarm = kind_of(args.results) == swarm_file.FORMAT
+    read = swarm_file.read_swarm if swarm else partial(read_results, replicates=False)
+    results = read(args.results)
     if results.run.get("config"):
         sys.stdout.write(str(results.run["config"]))
     else:
@@ -75,9 +81,34 @@ def text_of(path):
         return trajectory_text(path)
     if kind == sweep_file.FORMAT:
         return sweep_text(path)
+    if kind == swarm_file.FORMAT:
+        return swarm_text(path)
     if kind != FORMAT and is_library(path):
         return library_text(path)
     return results_text(path, *read_overview(path))
+
+
+def swarm_text(path):
+    """What a results file of a swarm study holds."""
+    from flocsim.ensembles.suspension.assembly import table_of
+
+    results = swarm_file.read_swarm(path)
+    bodies, ends = results.groups["bodies"], results.groups["ends"]
+    free = bodies["floc"][0] != WALL
+    radii = 1e6 * bodies["r_eq"][:, free]
+    width, height = 1e6 * bodies["box"].mean(axis=0)
+    facts = [
+        ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
+         f"{int(ends['finished'].sum())} came to their end"),
+        ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
+        ("box [um]", f"{width:.5g} x {height:.5g}"),
+        ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
+         f"{ends['rejected'].sum()} rejected"),
+        *origin(results.run),
+    ]  # fmt: skip
+    lines = [f"{name:<19} {value}" for name, value in facts]
+    lines += [f"warning: {visible(line, '')}" for line in stored(results.run, "warnings")]
+    return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table_of(results)])
 
 
 def library_text(path):

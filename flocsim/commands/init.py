@@ -188,6 +188,34 @@ vertices = [1, 16]
 hamaker = "10 zJ"          # replaced by the values of --over
 """
 
+SWARM = """\
+# Many flocs settle in a periodic box, meet and hang together; run it with `flocsim swarm`.
+# docs/swarm.md; docs/config.md has all keys.
+preset = "si"              # quartz in water, of its real weight
+seed = 1
+replicates = 2             # swarms, each with other flocs at other places
+
+[scene]
+kind = "swarm"
+number = 60
+area_fraction = 0.12       # of the box, which follows from it; or box = ["300 um", "300 um"]
+radius = "8 um"            # median r_eq of a lognormal distribution; without it: measured flocs
+spread = 0.3               # standard deviation of ln r_eq
+duration = "1 s"
+every = "0.1 s"            # snapshots
+# classes = ["10 um", "20 um"]        # clusters are counted by size
+# periodic = "x"           # with floor = true: a bed
+# floor = true
+
+[shapes]
+source = "library"
+file = "synthetic"         # ships with flocsim; or "shapes.h5", your own
+vertices = [16]            # one number: 1 for spheres
+
+[forces.van_der_waals]
+cut = "1 um"               # bodies further apart do not attract each other
+"""
+
 MEASURED = (
     ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
     (
@@ -242,6 +270,7 @@ KINDS = {
     "pictures": (PICTURES, "flocs fitted to pictures"),
     "force": (FORCE, "a force of your own, its module too"),
     "sweep": (SWEEP, "several values of a key"),
+    "swarm": (SWARM, "many bodies in a box"),
 }
 """What there is to begin with: {name: (text, help)}."""
 
@@ -279,5 +308,6 @@ def run(args: Namespace) -> int:
     for each, content in files.items():
         write_file(each, content.encode(), rule)
     wrote = " and ".join(map(str, files))
-    print(f"wrote {wrote}; run it with: flocsim ensemble {args.file}")
+    command = "swarm" if args.kind == "swarm" else "ensemble"
+    print(f"wrote {wrote}; run it with: flocsim {command} {args.file}")
     return 0

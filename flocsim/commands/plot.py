@@ -9,6 +9,7 @@ from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rul
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import FORMATS, mark_figure, save
+from flocsim.io.plots.swarm import SWARM_FIGURES, write_swarm_animation
 from flocsim.io.plots.sweep import SWEEP_FIGURES
 
 DESCRIPTION = """\
@@ -21,6 +22,8 @@ Of a trajectory file (flocsim trajectory --save, Trajectory.save):
 {motion}
 Of the joined file of flocsim sweep:
 {sweep}
+Of a swarm study:
+{swarm}
 Of a study that still runs, its figures so far are drawn, marked as unfinished.
 Figures are numbered as in Tang et al. (2014)."""
 
@@ -60,6 +63,7 @@ def add_parser(subparsers: Any) -> None:
             shapes=listed(POPULATION_FIGURES),
             motion=listed(MOTION_FIGURES),
             sweep=listed(SWEEP_FIGURES),
+            swarm=listed(SWARM_FIGURES),
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -70,6 +74,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
     parser.add_argument("--figures", metavar="LIST",
         help="figures with commas between them (default: all that the file has)")  # fmt: skip
+    parser.add_argument("--animation", metavar="FILE.gif",
+        help="of a swarm study: also write its first swarm as an animation")  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -91,14 +97,31 @@ def run(args: argparse.Namespace) -> int:
         ) from error
     stem, rule = Path(args.results).stem, figure_rule(args.overwrite)
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
-    check_outputs([Output(path, rule) for path in paths.values()], [args.results])
+    drawn = [*paths.values(), *animation_of(args, content)]
+    check_outputs([Output(path, rule) for path in drawn], [args.results])
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:
             mark_figure(figure, remark)
         save(figure, path, rule)
         print(path)
+    for path in drawn[len(paths) :]:
+        write_swarm_animation(path, content, rule=rule)
+        print(path)
     return 0
+
+
+def animation_of(args, content):
+    """[path of the animation asked for]; UsageError where there can be none."""
+    if not args.animation:
+        return []
+    if getattr(content, "groups", None) is None:
+        raise UsageError(
+            "--animation is of swarm studies; of one collision: flocsim trajectory --animation"
+        )
+    if Path(args.animation).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {args.animation} must end in .gif")
+    return [Path(args.animation)]
 
 
 def label(name):
@@ -110,7 +133,7 @@ def read_content(path):
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
     from flocsim.io import trajectory
     from flocsim.io.opening import kind_of
-    from flocsim.io.results import sweep_file
+    from flocsim.io.results import swarm_file, sweep_file
     from flocsim.io.results.file import read_results
     from flocsim.io.results.layout import FORMAT
     from flocsim.io.shapes.library import is_library, read_library
@@ -124,6 +147,11 @@ def read_content(path):
         return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
     if kind == sweep_file.FORMAT:
         return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
+    if kind == swarm_file.FORMAT:
+        found = swarm_file.read_swarm(path)
+        many = len(found.scales["class"]) > 1
+        kept = {name: draw for name, draw in SWARM_FIGURES.items() if many or name != "classes"}
+        return found, kept, ""
     if kind != FORMAT and is_library(path):
         return read_library(path), POPULATION_FIGURES, ""
     return read_results(path, replicates=False), FIGURES, ""
@@ -132,7 +160,7 @@ def read_content(path):
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES)
+    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES)
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

@@ -91,11 +91,16 @@ def overrides(arguments: argparse.Namespace) -> dict:
 
 def checked_config(arguments, sources):
     """The config, found to make a study whose results can be written where they should go."""
-    from flocsim.ensembles.config.loader import load_config
+    from flocsim.ensembles.config.loader import load_any_config
     from flocsim.ensembles.preflight import check_study, inputs_of
 
-    config = load_config(arguments.config, overrides(arguments), sources)
-    check_study(config)
+    config = load_any_config(arguments.config, overrides(arguments), sources)
+    if config.is_swarm:
+        from flocsim.ensembles.suspension.runner import check_swarm
+
+        check_swarm(config)
+    else:
+        check_study(config)
     if not arguments.dry_run:
         check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
     return config
@@ -130,7 +135,7 @@ def own_config(comm, arguments):
 
     So an edited file is read before or after the edit, by all.
     """
-    from flocsim.ensembles.config.loader import load_config
+    from flocsim.ensembles.config.loader import load_any_config
     from flocsim.ensembles.config.sources import Sources
     from flocsim.ensembles.parallel.agreement import Launch, refuse_other_words
 
@@ -150,7 +155,7 @@ def own_config(comm, arguments):
         return None
     refuse_other_words(comm.rank, launch, words)
     try:
-        return load_config(arguments.config, overrides(arguments), launch.sources)
+        return load_any_config(arguments.config, overrides(arguments), launch.sources)
     except ConfigError as error:
         raise ConfigError(f"rank {comm.rank}: {error}") from error
 
@@ -212,6 +217,8 @@ def run_rank(comm, arguments):
     config, code = agree(comm, arguments)
     if config is None:
         return code
+    if config.is_swarm:
+        return swarm_study(config, comm, arguments)
     if arguments.dry_run:
         from flocsim.ensembles.dry_run import dry_run
 
@@ -220,6 +227,18 @@ def run_rank(comm, arguments):
             tell(dry_run(config, ranks, not arguments.no_pilot))
         return 0
     return study(config, comm, arguments)
+
+
+def swarm_study(config, comm, arguments):
+    """Run a study of swarms, or say what it would do; the exit code."""
+    from flocsim.ensembles.suspension.dry_run import dry_run
+    from flocsim.ensembles.suspension.runner import run_swarms
+
+    if arguments.dry_run:
+        if comm.rank == 0:
+            tell(dry_run(config, max(comm.size, arguments.jobs)))
+        return 0
+    return run_swarms(config, comm, arguments.mode, arguments.overwrite, arguments.quiet)
 
 
 def end_all(comm: Communicator, text: str, code: int) -> int:

@@ -21,7 +21,7 @@ from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
 from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.errors import FileError, UsageError
 from flocsim.io.journal.journal import SUFFIX, journal_path
-from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
+from flocsim.io.journal.records import CHUNK, SESSION, SNAPSHOT, Record, scan
 from flocsim.io.json_text import matches
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.schema import Results
@@ -78,6 +78,7 @@ def read_unfinished(path: str | Path) -> Unfinished:
     sessions = [each for each in sessions if is_session(each)]
     if not sessions:
         raise FileError(f"{path} is no journal of an unfinished run, or has just begun: try again")
+    refuse_swarm(path, sessions[-1], found)
     current = any(each["layout"] == layout() for each in sessions)
     chunks = [each for each in found if each.kind == CHUNK and current]
     whole = [each for each in chunks if fits(each.description, each.length)]
@@ -112,6 +113,23 @@ def read_unfinished(path: str | Path) -> Unfinished:
     )  # fmt: skip
     return Unfinished(
         path, results, done, axes["replicates"] * len(conditions), notes, sessions, unread
+    )
+
+
+def refuse_swarm(path: Path, session: dict, found: list[Record]) -> None:
+    """FileError for a swarm study, with how far it is: what it has is read once it has ended."""
+    replicates, moments = session.get("replicates"), session.get("moments")
+    if not isinstance(replicates, int) or not isinstance(moments, int):
+        return
+    kept = {
+        (each.description.get("replicate"), str(each.description.get("facts", {})))
+        for each in found
+        if each.kind == SNAPSHOT and each.description.get("of") == "moment"
+    }
+    raise FileError(
+        f"{path} is of swarms that still run, or were stopped: {len(kept)} of "
+        f"{replicates * moments} snapshots so far; --resume goes on, and its results can be read "
+        "once it has ended"
     )
 
 

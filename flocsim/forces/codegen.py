@@ -45,13 +45,14 @@ another kind leave the text of a law as it is."""
 @attrs.define
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
-    numbers, the gap up to which surface forces reach (−1: there are none) and how their
-    gap is smoothed (smoothing.py), how many events its contact forces have, and which forces are
-    used and left out."""
+    numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
+    gap of outlines is smoothed (smoothing.py), how many events its contact forces have, and which
+    forces are used and left out."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
     surface_reach: float = -1.0
+    centre_reach: float = -1.0
     smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
     events: int = 0
     used: dict[str, Force] = attrs.Factory(dict)
@@ -260,6 +261,8 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     write_pair_laws(sources["centre"], kinds["centre"], "centre")
     write_pair_laws(sources["surface"], kinds["surface"], "surface")
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
+    if kinds["centre"]:
+        pieces.centre_reach = max(map(reach_of, kinds["centre"]))
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
         pieces.smoothness = smoothness(kinds["surface"], fluid)

@@ -7,22 +7,23 @@ import attrs
 from flocsim.constants import NEGLIGIBLE_FORCE, VACUUM_PERMITTIVITY, WATER_PERMITTIVITY
 from flocsim.fields import choice, quantity
 from flocsim.forces.base import PairForce
-from flocsim.forces.van_der_waals import GAPS
+from flocsim.forces.van_der_waals import CUT_HELP, GAPS, cut_at
 
 
 @attrs.frozen
 class DoubleLayer(PairForce):
     """Repulsion F = 4π ε0 ε_r κ φ² r* exp(−κ d), r* = r_i r_j/(r_i + r_j).
 
-    Parameters: ``potential`` φ [V]; ``debye_length`` 1/κ [m]; ``permittivity`` ε_r [-]; ``gap`` as
-    for VanDerWaals. Bodies in contact count as d = 0.  Source: Tang et al. (2014), eq. 6, whose
-    minus sign means "against attraction".
+    Parameters: ``potential`` φ [V]; ``debye_length`` 1/κ [m]; ``permittivity`` ε_r [-]; ``gap`` and
+    ``cut`` as for VanDerWaals. Bodies in contact count as d = 0.  Source: Tang et al. (2014), eq.
+    6, whose minus sign means "against attraction".
     """
 
     potential: float = quantity("V", default=15e-3)
     debye_length: float = quantity("m", above=0.0, default=0.98e-6)
     permittivity: float = quantity("", above=0.0, default=WATER_PERMITTIVITY)
     gap: str = choice(*GAPS, default="equivalent_spheres")
+    cut: float | None = quantity("m", above=0.0, default=None, help=CUT_HELP)
 
     @property
     def acts_on(self) -> str:
@@ -41,8 +42,8 @@ class DoubleLayer(PairForce):
 
     @property
     def reach(self) -> float:
-        """The gap at which the repulsion has become negligible [m]."""
-        return -math.log(NEGLIGIBLE_FORCE) * self.debye_length
+        """The gap at which the repulsion has become negligible, or ``cut`` [m]."""
+        return cut_at(self.cut, -math.log(NEGLIGIBLE_FORCE) * self.debye_length)
 
     @property
     def absent(self) -> str:

@@ -12,13 +12,12 @@ from flocsim.arrays import (
     NOW,
     SLIP_RATES,
     TIME,
-    UNTIL,
     VELOCITY,
 )
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
-from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces, take_stage
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
@@ -116,7 +115,7 @@ class DormandPrince54(Integrator):
         """One step: error over tolerance, or −1 where the motion is no longer finite."""
         time = clock[TIME]
         evaluate_stages(scene, work, time, step)
-        weigh_velocities(scene, work, time, max(clock[UNTIL] - time, step))
+        weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
         combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
         return error_ratio(scene, work, clock, step)
 

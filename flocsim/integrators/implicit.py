@@ -5,6 +5,7 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.arrays import (
+    CHANGE,
     DEVIATION,
     FIRST_STAGE,
     FORCE,
@@ -13,7 +14,6 @@ from flocsim.arrays import (
     PACE,
     STIFFNESS,
     TIME,
-    UNTIL,
     VELOCITY,
     X,
 )
@@ -27,9 +27,10 @@ from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.overlap_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
-from flocsim.integrators.radau.systems import factorise_systems, solve, sum_over_clusters
+from flocsim.integrators.radau.systems import factorise_systems, solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
-from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.blocks import subtract_product
+from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.stated_error import carry_vector, overlap_error
 from flocsim.integrators.rhs.views import inertia
@@ -53,32 +54,29 @@ def estimated_rate(work, row, first, step):
 
 
 def write_error_load(scene, work, step):
-    size = work.jacobian.shape[1]
-    damped = step / EIGENVALUES[REAL].real
-    for row in range(size):
-        body, axis = row // 3, row % 3
-        load = work.rates[NOW, body, FORCE + axis]
-        load += inertia(scene, body, axis) * estimated_rate(work, row, VELOCITY, step)
-        for column in range(size):
-            drift = work.motion[NOW, column // 3, VELOCITY + column % 3]
-            drift += estimated_rate(work, column, X, step)
-            load -= damped * work.jacobian[STIFFNESS, row, column] * drift
-        work.system[REAL, row, size] = load * scene.bodies[body, FREE]
+    """The load of the estimate; the mean rates of places stay in CHANGE."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            row = 3 * body + axis
+            load = work.rates[NOW, body, FORCE + axis]
+            load += inertia(scene, body, axis) * estimated_rate(work, row, VELOCITY, step)
+            work.loads[REAL, row] = load
+            drift = work.motion[NOW, body, VELOCITY + axis]
+            work.motion[CHANGE, body, axis] = drift + estimated_rate(work, row, X, step)
+    subtract_product(work, STIFFNESS, step / EIGENVALUES[REAL].real)
 
 
 def estimate_error(scene, work, step):
     write_error_load(scene, work, step)
-    size = work.jacobian.shape[1]
-    sum_over_clusters(work, REAL, size, size + 1)
-    solve(work.system, work.pivots, REAL)
+    solve_for_free(scene, work)
     damped = step / EIGENVALUES[REAL].real
-    for row in range(size):
-        body, axis = row // 3, row % 3
-        speed = work.system[REAL, row, size].real
-        drift = work.motion[NOW, body, VELOCITY + axis] + estimated_rate(work, row, X, step)
+    for body in range(work.motion.shape[1]):
         free = scene.bodies[body, FREE]
-        work.motion[DEVIATION, body, axis] = free * damped * (speed + drift)
-        work.motion[DEVIATION, body, VELOCITY + axis] = free * speed
+        for axis in range(3):
+            speed = work.loads[REAL, 3 * body + axis].real
+            drift = work.motion[CHANGE, body, axis]
+            work.motion[DEVIATION, body, axis] = free * damped * (speed + drift)
+            work.motion[DEVIATION, body, VELOCITY + axis] = free * speed
 
 
 def wide_skin():
@@ -108,7 +106,7 @@ class Implicit(Integrator):
         time = clock[TIME]
         evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
         gather_clusters(scene, work)
-        assemble_jacobian(scene, work, time, max(clock[UNTIL] - time, step))
+        assemble_jacobian(scene, work, time, max(end_of_run(clock) - time, step))
         if not factorise_systems(scene, work, step):
             return -1.0
         if not solve_stages(scene, work, clock, step):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY
+from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of
 from flocsim.compiler.composer import compose
 from flocsim.compiler.reads import where
 from flocsim.forces.check import asked_at
@@ -132,7 +132,7 @@ def force_to_blame(system: Any, run: Run) -> str:
     start = run.work.motion[NOW].copy()
     if not np.isfinite(start).all():
         return ""
-    work = type(run.work)(*(np.copy(each) for each in run.work))
+    work = copy_of(run.work)
     pieces = [(force, laws_of([force], system.fluid)) for force in system.pieces.used.values()]
     for ahead in AHEAD:
         work.motion[NOW] = start

@@ -151,7 +151,8 @@ class Replay:
         return self.run.scene._replace(
             laws=law_table(pieces.laws, jit=False),
             parameters=np.array(pieces.parameters, dtype=float),
-            surface_reach=float(pieces.surface_reach), events=int(pieces.events),
+            surface_reach=float(pieces.surface_reach),
+            centre_reach=float(pieces.centre_reach), events=int(pieces.events),
         )  # fmt: skip
 
     @functools.cached_property

@@ -4,12 +4,15 @@ import shutil
 
 import pytest
 
-from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.suspension.runner import check_swarm
 from flocsim.io.results.file import read_results
+from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library
 
-EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+SWARM = ROOT / "examples" / "swarm.toml"
+EXAMPLES = sorted(path for path in (ROOT / "examples").glob("*.toml") if path != SWARM)
 
 
 def test_there_are_examples():
@@ -51,3 +54,18 @@ def test_a_reduced_example_runs(path, examples):
     assert table["n_failed"].sum() == 0
     assert table["n_undecided"].sum() == 0
     assert table["n_collided"].sum() > 0
+
+
+def test_the_swarm_describes_itself(examples):
+    check_swarm(load_any_config(examples / SWARM.name))
+    done = run_command(examples.parent, f"examples/{SWARM.name}", "--dry-run")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "2 swarms of 60 bodies, N = 16" in done.stdout and "nothing was run" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_reduced_swarm_runs(examples):
+    words = ["--set", "scene.number=12", "--set", "scene.duration=0.2", "--quiet"]
+    done = run_command(examples, SWARM.name, *words, timeout=600)
+    assert (done.returncode, done.stdout, problems(done.stderr)) == (0, "", [])
+    assert read_swarm(examples / "swarm.h5").groups["ends"]["finished"].tolist() == [1, 1]

@@ -113,7 +113,7 @@ def can_meet_again(scene, work, observed, time):
     clear += turn_left(scene, work, time, BODY_I, passing)
     clear += turn_left(scene, work, time, BODY_J, passing)
     contact = scene.bodies[BODY_I, RADIUS] + scene.bodies[BODY_J, RADIUS]
-    turn_c, turn_s, x, y = pose_of(work, BODY_J, BODY_I)
+    turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
     c, s = math.cos(work.motion[NOW, BODY_I, ANGLE]), math.sin(work.motion[NOW, BODY_I, ANGLE])
     ux, uy = c * ux + s * uy, c * uy - s * ux
     for _ in range(MOST_ADVANCES):

@@ -59,7 +59,7 @@ def follow(observed, distance):
 
 def watch_pair(scene, work, observed, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
-    nx, ny, distance = centre_line(work, NOW, BODY_J, BODY_I)
+    nx, ny, distance = centre_line(scene, work, NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(observed, time, distance)

@@ -17,19 +17,42 @@ from flocsim.ensembles.config.schema import (
     TABLES,
     TOP_KEYS,
     Config,
+    SceneConfig,
     contradictions,
     implied,
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.config.swarm_scene import SwarmScene, swarm_problems
 from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
+SCENES: dict[str, type] = {"binary": SceneConfig, "swarm": SwarmScene}
+"""Kind of scene → class of the table [scene]."""
+
+
+FOR_PAIRS = {"zone", "stop"}
+"""Tables that a swarm has no use for."""
+
 
 def load_config(
+    path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
+) -> Config:
+    """The config file of a study of binary collisions: see `load_any_config`; ConfigError for one
+    of another kind."""
+    config = load_any_config(path, overrides, sources)
+    if config.is_swarm:
+        raise ConfigError(
+            f'{path} is of a swarm (scene.kind = "swarm"): run it with `flocsim swarm`, and look '
+            "at its results by `flocsim info` and `flocsim plot`"
+        )
+    return config
+
+
+def load_any_config(
     path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
 ) -> Config:
     """The config file at ``path`` as a Config, checked and with its preset filled in.
@@ -37,24 +60,36 @@ def load_config(
     ``overrides``: nested dict laid over the file, e.g. ``{"output": {"file": "b.h5"}}``; None
     values in it count as not given. ``sources``: what of the file and of the modules that it names
     has been read already; all that is read now is noted there. Raises ConfigError with one line per
-    problem, "FILE:LINE: key …: what was found, what is allowed".
+    problem, "FILE:LINE: key …: what was found, what is allowed". The Config's ``scene`` is one of
+    SCENES.
     """
     sources = sources or Sources()
     text = sources.text(path)
     overrides, folder = overrides or {}, Path(path).parent
     problems = Problems(file=str(path), text=text, overrides=overrides)
     table = lay_over(parse(path, text), overrides)
-    preset = table.get("preset")
+    given, preset = table.keys(), table.get("preset")
     if isinstance(preset, str):
         table = lay_over(PRESETS.get(preset, {}), table)
     table = lay_over(implied(table), table)
     reader = Reader(folder, problems, sources)
+    if scene_class(table) is SwarmScene:
+        for name in FOR_PAIRS & given:
+            problems.note((name,), "is for binary collisions: leave it out of a swarm")
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):
         stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
         parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
     return Config(text=text, folder=folder, overrides=overrides, **parts)
+
+
+def scene_class(table: dict) -> type:
+    """The class of a config's [scene], by its kind; an unknown kind is told as one of SceneConfig's
+    keys."""
+    scene = table.get("scene")
+    kind = scene.get("kind") if isinstance(scene, dict) else None
+    return SCENES.get(kind, SceneConfig) if isinstance(kind, str) else SceneConfig
 
 
 @attrs.frozen
@@ -75,12 +110,15 @@ class Reader:
                 self.problems.unknown((key,), TOP_KEYS)
         given = {key: table[key] for key in STUDY_KEYS if key in table}
         parts = self.values(STUDY_KEYS, given, ())
+        scene = scene_class(table)
         for name, table_class in TABLES.items():
+            table_class = scene if name == "scene" else table_class
             parts[name] = self.table(name, table_class, table.get(name, {}))
         forces = self.forces(table.get("forces", {}))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
         if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
-            for place, text in contradictions(parts):
+            problems = swarm_problems if scene is SwarmScene else contradictions
+            for place, text in problems(parts):
                 self.problems.note(place, text)
         return parts
 

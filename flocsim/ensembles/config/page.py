@@ -9,6 +9,7 @@ import re
 from flocsim.ensembles.config import presets
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, STUDY_KEYS, TABLES, keys_of
+from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.io.markdown import markdown_table
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
@@ -73,8 +74,19 @@ def schema_page() -> str:
     tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
     for name, table_class in tables.items():
         parts += [f"## [{name}]\n", about(table_class, name), key_table(keys_of(table_class))]
+    parts.insert(place_of_shapes(parts), swarm_section())
     parts += [OWN_CLASSES, "## Presets\n", about(presets, ""), preset_table()]
     return "\n".join(parts)
+
+
+def place_of_shapes(parts):
+    return parts.index("## [shapes]\n")
+
+
+def swarm_section():
+    """The keys of [scene] where it is a swarm."""
+    keys = key_table(keys_of(SwarmScene))
+    return f"## [scene] of a swarm\n\n{about(SwarmScene, 'scene')}\n{keys}"
 
 
 def about(documented, name):

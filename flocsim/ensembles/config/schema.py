@@ -76,6 +76,11 @@ def of_measured(value: Any) -> Any:
 class SceneConfig:
     """[scene]: who meets whom, and how the meeting begins and ends."""
 
+    kind: str = choice(
+        "binary",
+        default="binary",
+        help='encounters of two bodies; "swarm": many bodies in a box, with keys of its own below',
+    )
     pairs: tuple[tuple[float, float], ...] | str | None = read_by(
         word_or(
             MEASURED,
@@ -615,6 +620,11 @@ class Config:
     text: str = ""
     folder: Path = attrs.Factory(Path)
     overrides: dict[str, Any] = attrs.Factory(dict)
+
+    @property
+    def is_swarm(self) -> bool:
+        """Whether the scene is a SwarmScene, and the study one of many bodies."""
+        return bool(self.scene.kind == "swarm")
 
     @property
     def body_options(self) -> dict[str, Any]:

@@ -21,6 +21,8 @@ from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
 from flocsim.io.opening import kind_of
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
 from flocsim.io.results.schema import RADII
+from flocsim.io.results.swarm_file import FORMAT as SWARM_FORMAT
+from flocsim.io.results.swarm_file import SwarmResults, read_swarm
 from flocsim.io.results.sweep_file import FORMAT, Swept, read_sweep, write_sweep
 
 JOINED = ("probabilities", "pooled")
@@ -183,10 +185,13 @@ def open_sweep(path: str | os.PathLike) -> SweepResults:
 
 def open_any(
     path: str | os.PathLike, folder: str | os.PathLike | None = None
-) -> StudyResults | SweepResults:
-    """What a file of `flocsim ensemble` or `flocsim sweep` holds, checked.
+) -> StudyResults | SweepResults | SwarmResults:
+    """What a file of `flocsim ensemble`, `flocsim swarm` or `flocsim sweep` holds, checked.
 
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    return open_sweep(path) if kind_of(Path(path)) == FORMAT else open_results(path, folder)
+    kind = kind_of(Path(path))
+    if kind == SWARM_FORMAT:
+        return read_swarm(Path(path))
+    return open_sweep(path) if kind == FORMAT else open_results(path, folder)

@@ -1,7 +1,8 @@
 """Candidates: which vertex–edge pairs can touch before the bodies have moved much further.
 
 Pairs are listed while their gap is below a cut-off, and the list holds as long as the relative
-motion of the two bodies stays within a budget.
+motion of the two bodies stays within a budget. Which pairs of bodies are watched at all:
+body_pairs.py.
 """
 
 import math
@@ -10,9 +11,13 @@ from flocsim.arrays import (
     ANGLE,
     BOUNDING_RADIUS,
     CANDIDATES,
+    EARLIER,
     EQUIVALENT_RADIUS,
+    FREE,
+    LATER,
     LISTED,
     NOW,
+    PAIRS,
     RADIUS,
     REBUILDS,
     SPIN,
@@ -21,7 +26,9 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
+from flocsim.geometry.contact.separation import separation
 from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
 from flocsim.hooks import skin_factor
 
@@ -49,21 +56,34 @@ def skin_of(scene, a, b):
     return skin_factor() * max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
 
 
-def list_for_surface_force(scene, work, a, b, skin, reach):
+def list_for_surface_force(scene, work, pair, skin, reach):
     """List what can become the closest pair before the budget is spent; the budget [m]."""
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
     least = gap_between(scene, work, a, b)
     if least > reach + skin:
         return least - reach
     spend = max(0.5 * skin, 0.25 * least)
-    if list_polygons(scene, work, a, b, max(skin, least + 2.0 * spend)):
+    if list_polygons(scene, work, pair, max(skin, least + 2.0 * spend)):
         return spend
     return -math.inf
 
 
-def list_pair(scene, work, a, b):
+def widest_cut(scene):
+    """The gap of bounding circles from which on no two bodies act, nor are they listed [m]."""
+    largest, contact, edge = 0.0, 0.0, 0.0
+    for body in range(scene.bodies.shape[0]):
+        if scene.bodies[body, FREE] == 1.0:
+            largest = max(largest, scene.bodies[body, BOUNDING_RADIUS])
+            edge = max(edge, edge_length(scene, body))
+        contact = max(contact, scene.bodies[body, RADIUS])
+    skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
+    return max(0.0, scene.surface_reach, scene.centre_reach) + skin_factor() * skin
+
+
+def list_pair(scene, work, pair):
     """List the candidates of two bodies; how far they may move before it must be made again."""
-    ox = work.motion[NOW, a, X] - work.motion[NOW, b, X]
-    oy = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    ox, oy = separation(scene, work, NOW, a, b)
     reach = scene.surface_reach
     skin = skin_of(scene, a, b)
     apart = (
@@ -74,9 +94,9 @@ def list_pair(scene, work, a, b):
     if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
     if reach > 0.0:
-        return list_for_surface_force(scene, work, a, b, skin, reach)
+        return list_for_surface_force(scene, work, pair, skin, reach)
     before = work.tally[CANDIDATES]
-    if not list_polygons(scene, work, a, b, skin):
+    if not list_polygons(scene, work, pair, skin):
         return -math.inf
     if work.tally[CANDIDATES] == before:
         return max(skin, gap_between(scene, work, a, b))
@@ -107,10 +127,12 @@ def moved(scene, work, state, a, b, enough):
     times its size; seen from a, the same holds of b: a doublet that turns as one does not count.
     Where a plainer bound, which needs no turning, stays below ``enough``, that one is given.
     """
+    dx, dy = separation(scene, work, state, a, b)
+    # Of the same image of a as now.
     ox = work.bodies[a, LISTED + X] - work.bodies[b, LISTED + X]
     oy = work.bodies[a, LISTED + Y] - work.bodies[b, LISTED + Y]
-    dx = work.motion[state, a, X] - work.motion[state, b, X]
-    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    ox += dx - (work.motion[state, a, X] - work.motion[state, b, X])
+    oy += dy - (work.motion[state, a, Y] - work.motion[state, b, Y])
     turn_a = since_listing(work, state, a, ANGLE)
     turn_b = since_listing(work, state, b, ANGLE)
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
@@ -125,22 +147,24 @@ def moved(scene, work, state, a, b, enough):
 
 def spent(scene, work, state):
     """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
-    worst = 0.0
-    pair = 0
-    for a in range(scene.bodies.shape[0]):
-        for b in range(a):
-            budget = work.budget[pair]
-            if budget <= 0.0:
-                return math.inf
-            worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
-            pair += 1
+    worst, pairs = 0.0, work.pairs.shape[0]
+    if not watches_all(work):
+        if work.tally[REBUILDS] == 0:
+            return math.inf
+        worst, pairs = wandered(scene, work, state), work.tally[PAIRS]
+    for pair in range(pairs):
+        budget = work.budget[pair]
+        if budget <= 0.0:
+            return math.inf
+        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
     return worst
 
 
 def relative_speed(scene, work, a, b):
     """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
     v = work.motion
-    x, y = v[NOW, a, X] - v[NOW, b, X], v[NOW, a, Y] - v[NOW, b, Y]
+    x, y = separation(scene, work, NOW, a, b)
     vx, vy = v[NOW, a, VX] - v[NOW, b, VX], v[NOW, a, VY] - v[NOW, b, VY]
     spin_a, spin_b = v[NOW, a, SPIN], v[NOW, b, SPIN]
     turning = abs(spin_a - spin_b)
@@ -151,14 +175,11 @@ def relative_speed(scene, work, a, b):
 
 def time_within(scene, work, share):
     """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
-    longest = math.inf
-    pair = 0
-    for a in range(scene.bodies.shape[0]):
-        for b in range(a):
-            speed = relative_speed(scene, work, a, b)
-            if speed > 0.0:
-                longest = min(longest, share * work.budget[pair] / speed)
-            pair += 1
+    longest = math.inf if watches_all(work) else time_to_wander(scene, work, share)
+    for pair in range(work.tally[PAIRS]):
+        speed = relative_speed(scene, work, work.pairs[pair, LATER], work.pairs[pair, EARLIER])
+        if speed > 0.0:
+            longest = min(longest, share * work.budget[pair] / speed)
     return longest
 
 
@@ -170,14 +191,13 @@ def list_candidates(scene, work):
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
             work.bodies[body, LISTED + axis] = work.motion[NOW, body, axis]
-    pair = 0
+    if not list_pairs(scene, work, widest_cut(scene)):
+        return False
     room = True
-    for a in range(scene.bodies.shape[0]):
-        for b in range(a):
-            budget = list_pair(scene, work, a, b)
-            work.budget[pair] = budget
-            room = room and budget > 0.0
-            pair += 1
+    for pair in range(work.tally[PAIRS]):
+        budget = list_pair(scene, work, pair)
+        work.budget[pair] = budget
+        room = room and budget > 0.0
     if room:
         restore_slips(work, kept)
     return room

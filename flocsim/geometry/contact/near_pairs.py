@@ -8,12 +8,17 @@ import math
 from flocsim.arrays import (
     ANGLE,
     CANDIDATES,
+    CANDIDATES_FULL,
     CLOSED,
+    EARLIER,
     EDGE_BODY,
     EDGE_END,
     EDGE_START,
+    FULL,
+    LATER,
     NEAR,
     NOW,
+    PAIR,
     RADIUS,
     SLIDING,
     VERTEX,
@@ -35,23 +40,24 @@ from flocsim.geometry.contact.circle_tree import (
     side_of,
     within,
 )
+from flocsim.geometry.contact.separation import separation
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
 
 
-def pose_of(work, a, b):
+def pose_of(scene, work, a, b):
     """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
-    x = work.motion[NOW, a, X] - work.motion[NOW, b, X]
-    y = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
+    x, y = separation(scene, work, NOW, a, b)
     turn = work.motion[NOW, a, ANGLE] - work.motion[NOW, b, ANGLE]
     c, s = math.cos(work.motion[NOW, b, ANGLE]), math.sin(work.motion[NOW, b, ANGLE])
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
-def add_pair(work, a, point, b, start, end):
-    """Append a pair to the list; False where no room is left."""
+def add_pair(work, pair, a, point, b, start, end):
+    """Append a pair of features to the list; False where no room is left."""
     row = work.tally[CANDIDATES]
     if row == work.candidates.shape[0]:
+        work.tally[FULL] = CANDIDATES_FULL
         return False
     work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX] = a, point
     (
@@ -60,12 +66,12 @@ def add_pair(work, a, point, b, start, end):
         work.candidates[row, EDGE_END],
     ) = b, start, end
     work.candidates[row, CLOSED], work.candidates[row, NEAR] = 0, 0
-    work.candidates[row, SLIDING] = 0
+    work.candidates[row, SLIDING], work.candidates[row, PAIR] = 0, pair
     work.tally[CANDIDATES] = row + 1
     return True
 
 
-def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
+def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
     """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
     vertices = scene.vertices
     first_b, points_b, _, _ = side_b
@@ -81,20 +87,21 @@ def list_one_way(scene, work, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach)
                 x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
             )
             if distance2 < reach * reach:
-                room = add_pair(work, a, point, b, start, end) and room
+                room = add_pair(work, pair, a, point, b, start, end) and room
     return room
 
 
 @hook
-def list_polygons(scene, work, a, b, cutoff):
-    """List the pairs of two bodies, both ways round; False for a full list."""
+def list_polygons(scene, work, pair, cutoff):
+    """List the pairs of features of two bodies, both ways round; False for a full list."""
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
     side_a, side_b = side_of(scene, a), side_of(scene, b)
     _, points_a, _, _ = side_a
     _, points_b, _, _ = side_b
     if points_a == 1 and points_b == 1:
-        return list_spheres(scene, work, a, b, cutoff)
+        return list_spheres(scene, work, pair, cutoff)
     reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
-    pose = pose_of(work, a, b)
+    pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
     plan = plan_of(scene.tree, side_a, side_b)
     walk = START
@@ -104,26 +111,26 @@ def list_polygons(scene, work, a, b, cutoff):
             walk = passed(plan, walk)
         elif at_leaves(plan, walk):
             i, j, _, _ = walk
-            room = list_one_way(scene, work, pose, a, b, side_a, i, side_b, j, reach)
-            room = room and list_one_way(scene, work, back, b, a, side_b, j, side_a, i, reach)
+            room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
+            room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
             walk = passed(plan, walk)
         else:
             walk = descended(plan, walk)
     return room
 
 
-def list_spheres(scene, work, a, b, cutoff):
+def list_spheres(scene, work, pair, cutoff):
     """List the one pair of two spheres where its gap is below the cut-off; False if full."""
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
     point = scene.first[b]
-    return add_pair(work, a, scene.first[a], b, point, point)
+    return add_pair(work, pair, a, scene.first[a], b, point, point)
 
 
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
-    ox = work.motion[NOW, a, X] - work.motion[NOW, b, X]
-    oy = work.motion[NOW, a, Y] - work.motion[NOW, b, Y]
+    ox, oy = separation(scene, work, NOW, a, b)
     return math.sqrt(ox * ox + oy * oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
 
 
@@ -131,4 +138,4 @@ def sphere_gap(scene, work, a, b):
 def gap_between(scene, work, a, b):
     """The distance between two outlines now [m], negative where they overlap."""
     contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    return core_distance(scene, a, b, pose_of(work, a, b)) - contact
+    return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact

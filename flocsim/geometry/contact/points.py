@@ -36,6 +36,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.geometry.contact.separation import separation
 from flocsim.geometry.shapes.cores import closest_share
 from flocsim.hooks import hook
 
@@ -44,11 +45,16 @@ TINY = 1e-300
 
 
 @hook
+def turn_body(work, state, body):
+    """Cosine and sine of a body's angle in a state, into ``work.bodies``."""
+    work.bodies[body, COSINE] = math.cos(work.motion[state, body, ANGLE])
+    work.bodies[body, SINE] = math.sin(work.motion[state, body, ANGLE])
+
+
 def turn_bodies(work, state):
-    """Cosine and sine of every body's angle in a state, into ``work.bodies``."""
+    """The same of all bodies."""
     for body in range(work.bodies.shape[0]):
-        work.bodies[body, COSINE] = math.cos(work.motion[state, body, ANGLE])
-        work.bodies[body, SINE] = math.sin(work.motion[state, body, ANGLE])
+        turn_body(work, state, body)
 
 
 def turned(scene, work, body, point):
@@ -85,8 +91,7 @@ def locate_polygons(scene, work, state, row):
     px, py = turned(scene, work, a, point)
     sx, sy = turned(scene, work, b, start)
     ex, ey = turned(scene, work, b, end)
-    ox = work.motion[state, a, X] - work.motion[state, b, X]
-    oy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    ox, oy = separation(scene, work, state, a, b)
     share = closest_share(px + ox, py + oy, sx, sy, ex, ey)
     fx = sx + share * (ex - sx)
     fy = sy + share * (ey - sy)
@@ -108,8 +113,7 @@ def locate_spheres(scene, work, state, row):
     """Geometry of two spheres: nothing to turn."""
     a = work.candidates[row, VERTEX_BODY]
     b = work.candidates[row, EDGE_BODY]
-    ox = work.motion[state, a, X] - work.motion[state, b, X]
-    oy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    ox, oy = separation(scene, work, state, a, b)
     distance = math.sqrt(ox * ox + oy * oy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:

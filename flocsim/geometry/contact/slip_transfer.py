@@ -14,13 +14,16 @@ from flocsim.arrays import (
     EDGE_START,
     GAP,
     KEPT,
+    KEPT_EARLIER,
     KEPT_EDGE,
+    KEPT_LATER,
     KEPT_OFFSET,
     KEPT_SLIP,
     KEPT_VERTEX,
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    PAIR,
     RADIUS,
     SLIDING,
     SLIP_OFFSET,
@@ -43,6 +46,8 @@ def keep_slips(work):
     count = 0
     for row in range(work.tally[CANDIDATES]):
         if work.slip[NOW, row] != 0.0:
+            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+            work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = max(a, b), min(a, b)
             work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
             work.kept[count, KEPT_EDGE] = work.candidates[row, EDGE_START]
             work.slip[KEPT_SLIP, count] = work.slip[NOW, row]
@@ -52,16 +57,38 @@ def keep_slips(work):
     return count
 
 
+def comes_before(work, kept, later, earlier):
+    """Whether the bodies of a kept displacement come before two others in the list."""
+    if work.kept[kept, KEPT_LATER] != later:
+        return work.kept[kept, KEPT_LATER] < later
+    return work.kept[kept, KEPT_EARLIER] < earlier
+
+
 def restore_slips(work, count):
-    """Give the kept displacements back to the same pairs of the new list."""
+    """Give the kept displacements back to the same pairs of the new list; both are in the order of
+    their bodies."""
+    first = 0
     for row in range(work.tally[CANDIDATES]):
         work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = 0.0
-        for k in range(count):
+        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        later, earlier = max(a, b), min(a, b)
+        while first < count and comes_before(work, first, later, earlier):
+            first += 1
+        for k in range(first, count):
+            if work.kept[k, KEPT_LATER] != later or work.kept[k, KEPT_EARLIER] != earlier:
+                break
             same = work.kept[k, KEPT_VERTEX] == work.candidates[row, VERTEX]
             if same and work.kept[k, KEPT_EDGE] == work.candidates[row, EDGE_START]:
                 work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
                 work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
     work.tally[KEPT] = 0
+
+
+def first_of_pair(work, row):
+    """The first row of the two bodies of a row: their rows follow one another."""
+    while row > 0 and work.candidates[row - 1, PAIR] == work.candidates[row, PAIR]:
+        row -= 1
+    return row
 
 
 def same_corner(scene, body, point, other):
@@ -99,9 +126,10 @@ def heir_of(scene, work, row):
     high = max(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
     near = scene.bodies[low, RADIUS] + scene.bodies[high, RADIUS]
     x, y = contact_point(work, row, low)
-    for other in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[other, VERTEX_BODY], work.candidates[other, EDGE_BODY]
-        if work.geometry[NOW, other, GAP] < 0.0 and min(a, b) == low and max(a, b) == high:
+    for other in range(first_of_pair(work, row), work.tally[CANDIDATES]):
+        if work.candidates[other, PAIR] != work.candidates[row, PAIR]:
+            break
+        if work.geometry[NOW, other, GAP] < 0.0:
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
             if distance < least and (distance <= near or rolls_on_to(scene, work, row, other)):

@@ -5,13 +5,15 @@ The motion in the step is interpolated; the integrator then takes a shorter step
 
 from flocsim.arrays import (
     CANDIDATES,
+    EDGE_BODY,
     GAP,
     NEW,
     NOW,
     TRIAL,
     VELOCITY,
+    VERTEX_BODY,
 )
-from flocsim.geometry.contact.points import locate_polygons, turn_bodies
+from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import hook
 from flocsim.integrators.events.resolution import memory_of, release_resolution, touch_resolution
 from flocsim.integrators.rhs.views import normal_rate
@@ -24,21 +26,19 @@ MOST_TRIALS = 60
 
 
 @hook
-def interpolate(work, step, share):
-    """Write the motion at a share of the step into TRIAL: the cubic through both of its ends."""
+def interpolate(work, step, share, body):
+    """Write a body's motion at a share of the step into TRIAL: the cubic through both of its
+    ends."""
     motion = work.motion
     rest = 1.0 - share
-    for body in range(motion.shape[1]):
-        for axis in range(3):
-            change = motion[NEW, body, axis] - motion[NOW, body, axis]
-            start = step * motion[NOW, body, VELOCITY + axis] - change
-            end = change - step * motion[NEW, body, VELOCITY + axis]
-            bend = rest * start + share * end
-            motion[TRIAL, body, axis] = (
-                motion[NOW, body, axis] + share * change + share * rest * bend
-            )
-            slope = change + (rest - share) * bend + share * rest * (end - start)
-            motion[TRIAL, body, VELOCITY + axis] = slope / step
+    for axis in range(3):
+        change = motion[NEW, body, axis] - motion[NOW, body, axis]
+        start = step * motion[NOW, body, VELOCITY + axis] - change
+        end = change - step * motion[NEW, body, VELOCITY + axis]
+        bend = rest * start + share * end
+        motion[TRIAL, body, axis] = motion[NOW, body, axis] + share * change + share * rest * bend
+        slope = change + (rest - share) * bend + share * rest * (end - start)
+        motion[TRIAL, body, VELOCITY + axis] = slope / step
 
 
 def margin(work, state, row):
@@ -56,8 +56,10 @@ def margin_rate(work, state, row):
 
 def look_at(scene, work, step, share, row):
     """Locate a pair at a share of the step; the margin."""
-    interpolate(work, step, share)
-    turn_bodies(work, TRIAL)
+    for column in (VERTEX_BODY, EDGE_BODY):
+        body = work.candidates[row, column]
+        interpolate(work, step, share, body)
+        turn_body(work, TRIAL, body)
     locate_polygons(scene, work, TRIAL, row)
     return margin(work, TRIAL, row)
 

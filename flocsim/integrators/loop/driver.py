@@ -7,12 +7,14 @@ from flocsim.arrays import (
     CLOSED,
     CODE,
     EDGE_BODY,
+    FULL,
     GAP,
     GEOMETRY_COLUMNS,
     LOCATED,
     MAX_STEPS,
     MOTION_COLUMNS,
     NEW,
+    NOTHING_FULL,
     NOW,
     PAUSE_AT,
     RADIUS,
@@ -28,6 +30,7 @@ from flocsim.arrays import (
     VERTEX_BODY,
 )
 from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
@@ -39,7 +42,7 @@ from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject,
 from flocsim.integrators.rhs.friction import hold_slides
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
-from flocsim.laws import CONTACT_FORCE, has
+from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10
@@ -168,6 +171,7 @@ def advance(scene, work, observed, clock, counts, record):
     ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
     """
     lists = has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0
+    lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
     limit, trials = math.inf, 0
     while clock[TIME] < clock[UNTIL]:
         status = pause_reason(clock, counts, record)
@@ -179,6 +183,8 @@ def advance(scene, work, observed, clock, counts, record):
         if scene.surface_reach > 0.0:
             flag_near(scene, work, NOW, step)
         ratio = attempt(scene, work, clock, step)
+        if work.tally[FULL] != NOTHING_FULL:
+            return NO_ROOM
         if ratio < 0.0 and clock[TOLERANCE] == math.inf:
             return NOT_FINITE
         too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock)

@@ -23,14 +23,14 @@ from flocsim.arrays import (
     CHANGE,
     DEVIATION,
     FORCING,
-    FREE,
     MOTION_COLUMNS,
     STAGED_STEP,
     STIFFNESS,
     VELOCITY,
 )
-from flocsim.integrators.radau.systems import solve, sum_over_clusters
+from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, REAL
+from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.stated_error import bound_carried
 from flocsim.integrators.rhs.views import inertia
 
@@ -38,23 +38,20 @@ from flocsim.integrators.rhs.views import inertia
 def divide(scene, work, full, weight):
     """Divide CHANGE and ``weight`` times γh FORCING/M by 1 − γz, with the factors of a step of
     ``full`` [s]."""
-    size, motion = work.jacobian.shape[1], work.motion
+    motion = work.motion
     part = full / EIGENVALUES[REAL].real
-    for row in range(size):
-        body, axis = row // 3, row % 3
-        load = inertia(scene, body, axis) / part * motion[CHANGE, body, VELOCITY + axis]
-        load += weight * motion[FORCING, body, VELOCITY + axis]
-        for column in range(size):
-            stiffness = work.jacobian[STIFFNESS, row, column]
-            load -= stiffness * motion[CHANGE, column // 3, column % 3]
-        work.system[REAL, row, size] = load * scene.bodies[body, FREE]
-    sum_over_clusters(work, REAL, size, size + 1)
-    solve(work.system, work.pivots, REAL)
-    for row in range(size):
-        body, axis = row // 3, row % 3
-        speed = work.system[REAL, row, size].real
-        motion[CHANGE, body, VELOCITY + axis] = speed
-        motion[CHANGE, body, axis] += part * speed
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            load = inertia(scene, body, axis) / part * motion[CHANGE, body, VELOCITY + axis]
+            load += weight * motion[FORCING, body, VELOCITY + axis]
+            work.loads[REAL, 3 * body + axis] = load
+    subtract_product(work, STIFFNESS, 1.0)
+    solve_for_free(scene, work)
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            speed = work.loads[REAL, 3 * body + axis].real
+            motion[CHANGE, body, VELOCITY + axis] = speed
+            motion[CHANGE, body, axis] += part * speed
 
 
 def mix(work, of_change, of_carried):

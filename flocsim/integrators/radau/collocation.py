@@ -67,27 +67,27 @@ def weighted(work, body, axis, weights):
     )  # fmt: skip
 
 
-def write_cubic(work, weights, state):
-    """Write the motion at a share of the step, of these weights, into a state."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            work.motion[state, body, axis] = weighted(work, body, axis, weights)
+def write_cubic(work, weights, state, body):
+    """Write a body's motion at a share of the step, of these weights, into a state."""
+    for axis in range(6):
+        work.motion[state, body, axis] = weighted(work, body, axis, weights)
 
 
-def collocate(work, step, share):
-    """Write the motion at a share of the step into TRIAL: the cubic through the stages."""
-    write_cubic(work, stage_weights(share), TRIAL)
+def collocate(work, step, share, body):
+    """Write a body's motion at a share of the step into TRIAL: the cubic through the stages."""
+    write_cubic(work, stage_weights(share), TRIAL, body)
 
 
 def stiffness_of(scene, work, step):
     """How stiff a step is: the largest h² K/M + h D/M of a coordinate."""
     stiffest = 0.0
-    for row in range(work.jacobian.shape[1]):
-        if scene.bodies[row // 3, FREE] == 1.0:
-            mass = inertia(scene, row // 3, row % 3)
-            spring = abs(work.jacobian[STIFFNESS, row, row])
-            damping = abs(work.jacobian[DAMPING, row, row])
-            stiffest = max(stiffest, step * (step * spring + damping) / max(mass, TINY))
+    for body in range(work.bodies.shape[0]):
+        if scene.bodies[body, FREE] == 1.0:
+            for axis in range(3):
+                mass = inertia(scene, body, axis)
+                spring = abs(work.jacobian[STIFFNESS, body, axis, axis])
+                damping = abs(work.jacobian[DAMPING, body, axis, axis])
+                stiffest = max(stiffest, step * (step * spring + damping) / max(mass, TINY))
     return stiffest
 
 
@@ -102,7 +102,8 @@ def end_on_the_cubic(scene, work, step, ratio, share):
     if ratio > GOOD_CUBIC or stiffness_of(scene, work, step) > STIFF:
         return False
     weights, slip = stage_weights(share), work.slip
-    write_cubic(work, weights, NEW)
+    for body in range(work.motion.shape[1]):
+        write_cubic(work, weights, NEW, body)
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
             slip[NEW, row] = cubic(

@@ -15,10 +15,12 @@ Newton's method adds keeps their momentum however far it has come.
 import math
 
 from flocsim.arrays import (
+    ACTING,
     BODY_COLUMNS,
     CANDIDATES,
     CHANGE,
     CLOSED,
+    EARLIER,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
@@ -26,6 +28,7 @@ from flocsim.arrays import (
     FRAME_COLUMNS,
     FRAMES,
     FREE,
+    LATER,
     MASS,
     MASS_SUM,
     MOST_FRAMES,
@@ -33,6 +36,8 @@ from flocsim.arrays import (
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    PAIR,
+    PAIRS,
     SHARE,
     SHIFT_SUM,
     SHIFT_X,
@@ -62,25 +67,37 @@ def leads(work, row):
     )
 
 
-def join(scene, work, a, b):
-    """Make one cluster of those of two bodies, named by its first body, if both are free."""
-    one, other = work.cluster[a], work.cluster[b]
-    if one != other and scene.bodies[a, FREE] * scene.bodies[b, FREE] == 1.0:
-        for body in range(work.bodies.shape[0]):
-            if work.cluster[body] == max(one, other):
-                work.cluster[body] = min(one, other)
+def first_of(work, body):
+    """The first body of the cluster so far, by those that bodies have been joined to."""
+    while work.cluster[body] != body:
+        work.cluster[body] = work.cluster[work.cluster[body]]
+        body = work.cluster[body]
+    return body
+
+
+def join(scene, work, pair):
+    """Make one cluster of those of the bodies of a pair, if both are free."""
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    work.pairs[pair, ACTING] = 1
+    if scene.bodies[a, FREE] * scene.bodies[b, FREE] == 1.0:
+        one, other = first_of(work, a), first_of(work, b)
+        work.cluster[max(one, other)] = min(one, other)
 
 
 def gather_clusters(scene, work):
-    """Name, for each free body, the first one of those that it acts on, directly or not."""
+    """Name, for each free body, the first one of those that it acts on, directly or not; flag the
+    pairs that act."""
     for body in range(work.bodies.shape[0]):
         work.cluster[body] = body
-    if has(scene, CENTRE_FORCE):
-        for body in range(1, work.bodies.shape[0]):
-            join(scene, work, body - 1, body)
+    for pair in range(work.tally[PAIRS]):
+        work.pairs[pair, ACTING] = 0
+        if has(scene, CENTRE_FORCE):
+            join(scene, work, pair)
     for row in range(work.tally[CANDIDATES]):
-        if acts(work, row):
-            join(scene, work, work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
+        if acts(work, row) and work.pairs[work.candidates[row, PAIR], ACTING] == 0:
+            join(scene, work, work.candidates[row, PAIR])
+    for body in range(work.bodies.shape[0]):
+        work.cluster[body] = work.cluster[work.cluster[body]]
 
 
 def add_frame(work, row, stage):

@@ -22,7 +22,7 @@ from flocsim.arrays import (
 )
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
-from flocsim.integrators.radau.systems import solve, write_changes, write_loads
+from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
 from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces, take_stage
@@ -99,8 +99,7 @@ def newton_step(scene, work, time, step):
     evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
     follow_contacts(work)
     write_loads(scene, work, step)
-    for which in range(2):
-        solve(work.system, work.pivots, which)
+    solve_both(work)
     work.tally[SOLVES] += 1
     return correct_stages(scene, work, step)
 

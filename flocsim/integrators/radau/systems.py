@@ -1,18 +1,23 @@
 """The linear systems of a Newton step: from what the stages fail to balance to new velocities.
 
 Radau's stages are decoupled along two eigenvectors (tableau.py), in frames that go along with the
-contacts (contact_frames.py). Their small dense complex systems are factorised in place here, which
-compiles fast, unlike numpy.linalg in a kernel; system k is (m, m + 1): the matrix, then its
-factors; the load, then the solution.
+contacts (contact_frames.py). The systems of few bodies are factorised as they stand (dense.py),
+those of many in an order in which little fills in (elimination.py).
 """
 
 from flocsim.arrays import (
     CHANGE,
     DAMPING,
+    DENSE,
+    EARLIER,
     FIRST_STAGE,
     FORCE,
     FREE,
+    LATER,
+    LEADER_FORCE,
+    LEADER_RATE,
     NOW,
+    PAIRS,
     SPIN,
     STIFFNESS,
     VELOCITY,
@@ -20,6 +25,8 @@ from flocsim.arrays import (
     VY,
 )
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
+from flocsim.integrators.radau.dense import factorise, solve_dense
+from flocsim.integrators.radau.elimination import factorise_sparse, solve_sparse
 from flocsim.integrators.radau.tableau import (
     EIGENVALUES,
     FROM_VECTORS,
@@ -30,80 +37,42 @@ from flocsim.integrators.radau.tableau import (
     THIRD_STAGE,
     TO_VECTORS,
 )
+from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia
 
 
-def magnitude(value):
-    """|re| + |im|, which tells pivots apart as well as the modulus does, without its root."""
-    return abs(value.real) + abs(value.imag)
+def is_dense(work):
+    """Whether the systems are small."""
+    return work.bodies.shape[0] <= DENSE
 
 
-def factorise(system, pivots, which):
-    """Factorise a matrix with row pivoting (pivots (2, m)); False where it is singular.
-
-    In the places of the pivots are their reciprocals: complex division takes long.
-    """
-    size = system.shape[1]
-    for pivot in range(size):
-        best = pivot
-        largest = magnitude(system[which, best, pivot])
-        for row in range(pivot + 1, size):
-            entry = magnitude(system[which, row, pivot])
-            if entry > largest:
-                best = row
-                largest = entry
-        if not largest > 0.0:
-            return False
-        pivots[which, pivot] = best
-        if best != pivot:
-            for column in range(size):
-                kept = system[which, pivot, column]
-                system[which, pivot, column] = system[which, best, column]
-                system[which, best, column] = kept
-        # Subtract the pivot's row from all below it, and keep the shares in their places.
-        reciprocal = 1.0 / system[which, pivot, pivot]
-        system[which, pivot, pivot] = reciprocal
-        for row in range(pivot + 1, size):
-            if system[which, row, pivot] != 0.0:
-                share = system[which, row, pivot] * reciprocal
-                system[which, row, pivot] = share
-                for column in range(pivot + 1, size):
-                    system[which, row, column] -= share * system[which, pivot, column]
-    return True
-
-
-def solve(system, pivots, which):
-    """Replace the load of a factorised system by the solution."""
-    size = system.shape[1]
-    for row in range(size):
-        other = pivots[which, row]
-        kept = system[which, row, size]
-        system[which, row, size] = system[which, other, size]
-        system[which, other, size] = kept
-    for row in range(size):
-        for column in range(row):
-            system[which, row, size] -= system[which, row, column] * system[which, column, size]
-    for row in range(size - 1, -1, -1):
-        for column in range(row + 1, size):
-            system[which, row, size] -= system[which, row, column] * system[which, column, size]
-        system[which, row, size] *= system[which, row, row]
+def write_block(scene, work, which, step, block, body, other):
+    """Write a block of DAMPING + (h/µ) STIFFNESS to the dense system; fixed bodies stay."""
+    value, moves = EIGENVALUES[which], scene.bodies[body, FREE]
+    for i in range(3):
+        for j in range(3):
+            entry = work.jacobian[DAMPING, block, i, j]
+            entry = entry + step / value * work.jacobian[STIFFNESS, block, i, j]
+            work.system[which, 3 * body + i, 3 * other + j] = moves * entry
 
 
 def write_matrix(scene, work, which, step):
-    """(µ/h) M + DAMPING + (h/µ) STIFFNESS for one eigenvalue µ; fixed bodies stay."""
+    """(µ/h) M + DAMPING + (h/µ) STIFFNESS for one eigenvalue µ, dense."""
     value = EIGENVALUES[which]
-    for row in range(work.jacobian.shape[1]):
-        moves = scene.bodies[row // 3, FREE]
-        for column in range(work.jacobian.shape[1]):
-            entry = work.jacobian[DAMPING, row, column]
-            entry = entry + step / value * work.jacobian[STIFFNESS, row, column]
-            work.system[which, row, column] = moves * entry
-        mass = inertia(scene, row // 3, row % 3)
-        work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
-    sum_over_clusters(work, which, 0, work.jacobian.shape[1])
+    for body in range(work.bodies.shape[0]):
+        write_block(scene, work, which, step, body, body, body)
+        for axis in range(3):
+            row, mass = 3 * body + axis, inertia(scene, body, axis)
+            moves = scene.bodies[body, FREE]
+            work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
+    for pair in range(work.tally[PAIRS]):
+        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        write_block(scene, work, which, step, lower_block(work, pair), a, b)
+        write_block(scene, work, which, step, upper_block(work, pair), b, a)
+    sum_matrix(work, which)
 
 
-def sum_over_clusters(work, which, first, last):
+def sum_matrix(work, which):
     """Put the balance of a cluster's momentum in the place of that of its first body's.
 
     Mutual forces cancel in it, so that rounding in the solution of the rest leaves momentum alone.
@@ -112,18 +81,56 @@ def sum_over_clusters(work, which, first, last):
         leader = work.cluster[body]
         if leader != body:
             for axis in range(2):
-                for column in range(first, last):
+                for column in range(work.system.shape[1]):
                     entry = work.system[which, 3 * body + axis, column]
                     work.system[which, 3 * leader + axis, column] += entry
 
 
+def sum_loads(work, which):
+    """The same of a load."""
+    for body in range(work.bodies.shape[0]):
+        leader = work.cluster[body]
+        if leader != body:
+            for axis in range(2):
+                work.loads[which, 3 * leader + axis] += work.loads[which, 3 * body + axis]
+
+
 def factorise_systems(scene, work, step):
-    """Write and factorise both systems; False where one is singular."""
+    """Write and factorise both systems; False where one is singular, or where there is no room."""
+    if not is_dense(work):
+        return factorise_sparse(scene, work, step)
     for which in range(2):
         write_matrix(scene, work, which, step)
         if not factorise(work.system, work.pivots, which):
             return False
     return True
+
+
+def solve_real(work):
+    """Replace the load of the real system by the solution."""
+    if is_dense(work):
+        solve_dense(work.system, work.pivots, work.loads, REAL)
+    else:
+        solve_sparse(work, False)
+
+
+def solve_for_free(scene, work):
+    """The solution of the real system for its load: none for fixed bodies, and the cluster's sum
+    for first ones."""
+    for body in range(work.bodies.shape[0]):
+        for axis in range(3):
+            work.loads[REAL, 3 * body + axis] *= scene.bodies[body, FREE]
+    sum_loads(work, REAL)
+    solve_real(work)
+
+
+def solve_both(work):
+    """Replace the loads of both systems by the solutions."""
+    if is_dense(work):
+        for which in range(2):
+            solve_dense(work.system, work.pivots, work.loads, which)
+    else:
+        solve_sparse(work, True)
 
 
 def momentum_rate(scene, work, body, axis, stage, step):
@@ -143,14 +150,19 @@ def imbalance(scene, work, body, axis, stage, step):
     return work.rates[FIRST_STAGE + stage, body, FORCE + axis] - rate
 
 
-def cluster_imbalance(scene, work, leader, axis, stage, step):
-    """The same for all bodies of a cluster; forces first, so that what is mutual cancels."""
-    force, rate = 0.0, 0.0
-    for body in range(leader, work.bodies.shape[0]):
-        if work.cluster[body] == leader:
-            force += work.rates[FIRST_STAGE + stage, body, FORCE + axis]
-            rate += momentum_rate(scene, work, body, axis, stage, step)
-    return force - rate
+def sum_balances(scene, work, stage, step):
+    """Forces, and masses times accelerations, of every cluster at a stage into its first body's
+    LEADER_FORCE and LEADER_RATE; apart, so that what is mutual cancels."""
+    for body in range(work.bodies.shape[0]):
+        for axis in range(2):
+            work.bodies[body, LEADER_FORCE + axis] = work.bodies[body, LEADER_RATE + axis] = 0.0
+    for body in range(work.bodies.shape[0]):
+        leader = work.cluster[body]
+        for axis in range(2):
+            force = work.rates[FIRST_STAGE + stage, body, FORCE + axis]
+            work.bodies[leader, LEADER_FORCE + axis] += force
+            rate = momentum_rate(scene, work, body, axis, stage, step)
+            work.bodies[leader, LEADER_RATE + axis] += rate
 
 
 def stage_load(scene, work, body, stage, step):
@@ -160,33 +172,32 @@ def stage_load(scene, work, body, stage, step):
     torque = imbalance(scene, work, body, 2, stage, step)
     x, y, torque = force_back(work, body, stage, x, y, torque)
     if work.cluster[body] == body:
-        x = cluster_imbalance(scene, work, body, 0, stage, step)
-        y = cluster_imbalance(scene, work, body, 1, stage, step)
+        x = work.bodies[body, LEADER_FORCE] - work.bodies[body, LEADER_RATE]
+        y = work.bodies[body, LEADER_FORCE + 1] - work.bodies[body, LEADER_RATE + 1]
         x, y, _ = force_back(work, body, stage, x, y, 0.0)
     return x, y, torque
 
 
 def write_loads(scene, work, step):
     """What the stages fail to balance, in the start's frames, along both eigenvectors."""
-    size = work.jacobian.shape[1]
-    for body in range(work.motion.shape[1]):
-        for axis in range(3):
-            for which in range(2):
-                work.system[which, 3 * body + axis, size] = 0.0
-        if scene.bodies[body, FREE] == 1.0:
-            for stage in range(3):
+    for which in range(2):
+        for row in range(work.loads.shape[1]):
+            work.loads[which, row] = 0.0
+    for stage in range(3):
+        sum_balances(scene, work, stage, step)
+        for body in range(work.motion.shape[1]):
+            if scene.bodies[body, FREE] == 1.0:
                 load = stage_load(scene, work, body, stage, step)
                 for axis in range(3):
                     for which in range(2):
                         share = TO_VECTORS[which][stage] * load[axis]
-                        work.system[which, 3 * body + axis, size] += share
+                        work.loads[which, 3 * body + axis] += share
 
 
 def stage_change(work, row, stage):
     """The solution for one coordinate of one stage, taken back from the eigenvectors."""
-    size = work.jacobian.shape[1]
     of_real, of_pair = FROM_VECTORS[stage]
-    real, pair = work.system[REAL, row, size], work.system[PAIR, row, size]
+    real, pair = work.loads[REAL, row], work.loads[PAIR, row]
     return (of_real * real).real + 2.0 * (of_pair * pair).real
 
 

@@ -11,6 +11,7 @@ from flocsim.arrays import (
     BOUNDING_RADIUS,
     DAMPING,
     DEVIATION,
+    HORIZON,
     MEMORY,
     NEW,
     NOW,
@@ -20,6 +21,7 @@ from flocsim.arrays import (
     STEP_PLACE,
     STEP_SPEED,
     TOLERANCE,
+    UNTIL,
     VELOCITY,
     VX,
     VY,
@@ -48,26 +50,33 @@ def mean_velocity(work, axis):
     return total / work.motion.shape[1]
 
 
-def turnover_rate(scene, work, body):
+def turnover_rate(scene, work, body, mean_x, mean_y):
     """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
     motion = work.motion
-    vx = motion[NOW, body, VX] - mean_velocity(work, 3)
-    vy = motion[NOW, body, VY] - mean_velocity(work, 4)
+    vx = motion[NOW, body, VX] - mean_x
+    vy = motion[NOW, body, VY] - mean_y
     return math.hypot(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, SPIN])
 
 
 def remember_velocities(scene, work, remaining):
     """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
+    mean_x, mean_y = mean_velocity(work, VX), mean_velocity(work, VY)
     for body in range(scene.bodies.shape[0]):
         slowest, relaxation = math.inf, 0.0
+        turnover = turnover_rate(scene, work, body, mean_x, mean_y)
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            damping = max(work.jacobian[DAMPING, 3 * body + axis, 3 * body + axis], 0.0)
+            damping = max(work.jacobian[DAMPING, body, axis, axis], 0.0)
             relaxation = max(relaxation, mass / max(damping, TINY))
-            rate = mass * (turnover_rate(scene, work, body) + 1.0 / remaining) + damping
+            rate = mass * (turnover + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
         work.bodies[body, MEMORY] = 1.0 / slowest
         work.bodies[body, RELAXATION] = relaxation
+
+
+def end_of_run(clock):
+    """When a run ends [s]."""
+    return max(clock[UNTIL], clock[HORIZON])
 
 
 def step_tolerance(work, clock):

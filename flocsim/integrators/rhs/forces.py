@@ -7,11 +7,14 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
+    EARLIER,
     EVALUATIONS,
     FORCE,
     GEOMETRY_COLUMNS,
+    LATER,
     MOTION_COLUMNS,
     NEW,
+    PAIRS,
     SHARE,
     SLIP_RATES,
     VELOCITY,
@@ -59,13 +62,13 @@ def add_body_forces(scene, work, time, state):
 
 
 def add_centre_forces(scene, work, time, state):
-    for a in range(scene.bodies.shape[0]):
-        for b in range(a):
-            view = centre_view(scene, work, time, state, a, b)
-            nx, ny, _ = soft_centre_line(scene, work, state, a, b)
-            repulsion = centre_force(scene, view)
-            add_force(work, state, a, repulsion * nx, repulsion * ny, 0.0)
-            add_force(work, state, b, -repulsion * nx, -repulsion * ny, 0.0)
+    for pair in range(work.tally[PAIRS]):
+        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        view = centre_view(scene, work, time, state, a, b)
+        nx, ny, _ = soft_centre_line(scene, work, state, a, b)
+        repulsion = centre_force(scene, view)
+        add_force(work, state, a, repulsion * nx, repulsion * ny, 0.0)
+        add_force(work, state, b, -repulsion * nx, -repulsion * ny, 0.0)
 
 
 def add_surface_forces(scene, work, time, state):

@@ -16,14 +16,19 @@ from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     DAMPING,
+    EARLIER,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
     FORCING,
+    FREE,
     GAP,
+    LATER,
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    PAIR,
+    PAIRS,
     RADIUS,
     SHARE,
     SLIDING,
@@ -36,6 +41,7 @@ from flocsim.arrays import (
     VERTEX_BODY,
     ContactView,
 )
+from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.surface_gap import (
@@ -81,18 +87,31 @@ def tangent_rows(work, row):
     return (tx, ty, g[NOW, row, VERTEX_ARM_T]), (-tx, -ty, -g[NOW, row, EDGE_ARM_T])
 
 
-def add_product(work, which, a, b, out, by, weight):
-    """weight · outᵀ by of two directions, each with its entries on bodies a and b."""
-    if weight == 0.0:
-        return
+def add_outer(work, which, block, out, by, weight):
+    """weight · outᵀ by of the entries of two directions on two bodies, to a block."""
     matrix = work.jacobian
-    (out_a, out_b), (by_a, by_b) = out, by
     for i in range(3):
         for j in range(3):
-            matrix[which, 3 * a + i, 3 * a + j] += weight * out_a[i] * by_a[j]
-            matrix[which, 3 * a + i, 3 * b + j] += weight * out_a[i] * by_b[j]
-            matrix[which, 3 * b + i, 3 * a + j] += weight * out_b[i] * by_a[j]
-            matrix[which, 3 * b + i, 3 * b + j] += weight * out_b[i] * by_b[j]
+            matrix[which, block, i, j] += weight * out[i] * by[j]
+
+
+def add_product(scene, work, which, pair, a, b, out, by, weight):
+    """weight · outᵀ by of two directions, each with its entries on bodies a and b, which are the
+    ones of a pair."""
+    if weight == 0.0:
+        return
+    (out_a, out_b), (by_a, by_b) = out, by
+    ab, ba = upper_block(work, pair), lower_block(work, pair)
+    if a == work.pairs[pair, LATER]:
+        ab, ba = ba, ab
+    add_outer(work, which, a, out_a, by_a, weight)
+    add_outer(work, which, ab, out_a, by_b, weight)
+    add_outer(work, which, ba, out_b, by_a, weight)
+    add_outer(work, which, b, out_b, by_b, weight)
+    if scene.bodies[a, FREE] == 0.0:
+        add_outer(work, which, own_block(work, b), out_b, by_b, weight)
+    elif scene.bodies[b, FREE] == 0.0:
+        add_outer(work, which, own_block(work, a), out_a, by_a, weight)
 
 
 SHIFT_OF_X, SHIFT_OF_Y = (
@@ -130,23 +149,23 @@ def scaled(row, share):
 def add_turning(scene, work, row, normal, tangential):
     """Derivative by the places of a pair's force whose size stays the same."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    g, stiffness = work.geometry, work.jacobian
+    g, stiffness, pair = work.geometry, work.jacobian, work.candidates[row, PAIR]
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
     nx, ny, turning = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y], g[NOW, row, TURNING]
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
     torque_a = normal * arm_a - tangential * g[NOW, row, VERTEX_ARM_N]
     torque_b = normal * arm_b - tangential * g[NOW, row, EDGE_ARM_N]
-    stiffness[STIFFNESS, 3 * a + ANGLE, 3 * a + ANGLE] += torque_a
+    stiffness[STIFFNESS, a, ANGLE, ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
-        add_product(work, STIFFNESS, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
+        add_product(scene, work, STIFFNESS, pair, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
         on_b = NOTHING, (0.0, 0.0, 1.0)
-        add_product(work, STIFFNESS, a, b, on_b, (slide_a, slide_b), -normal)
+        add_product(scene, work, STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
     else:
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
         by = scaled(slide_a, turning), scaled(slide_b, turning)
-        add_product(work, STIFFNESS, a, b, out, by, -1.0)
-        stiffness[STIFFNESS, 3 * b + ANGLE, 3 * b + ANGLE] -= torque_b
+        add_product(scene, work, STIFFNESS, pair, a, b, out, by, -1.0)
+        stiffness[STIFFNESS, b, ANGLE, ANGLE] -= torque_b
 
 
 def sliding_slopes(scene, work, row, normal, tangential):
@@ -164,13 +183,14 @@ def sliding_slopes(scene, work, row, normal, tangential):
 
 def add_contact(scene, work, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    pair = work.candidates[row, PAIR]
     found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
     normal_slope, tangential_slope = found[2], found[3]
     if work.candidates[row, SLIDING] != 0:
         normal_slope, tangential_slope = sliding_slopes(scene, work, row, found[0], found[1])
-    add_product(work, STIFFNESS, a, b, along, along, normal_slope)
-    add_product(work, STIFFNESS, a, b, across, along, tangential_slope)
+    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal_slope)
+    add_product(scene, work, STIFFNESS, pair, a, b, across, along, tangential_slope)
     for axis in range(1, 4):
         # Sliding, ξ goes with the overlap alone.
         if axis == 2 and work.candidates[row, SLIDING] != 0:
@@ -178,8 +198,8 @@ def add_contact(scene, work, row):
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
         which = STIFFNESS if axis % 2 == 0 else DAMPING
-        add_product(work, which, a, b, along, by, sign * found[2 + 2 * axis])
-        add_product(work, which, a, b, across, by, sign * found[3 + 2 * axis])
+        add_product(scene, work, which, pair, a, b, along, by, sign * found[2 + 2 * axis])
+        add_product(scene, work, which, pair, a, b, across, by, sign * found[3 + 2 * axis])
     add_turning(scene, work, row, found[0], found[1])
     if work.candidates[row, SLIDING] == 0:
         offset = work.slip[SLIP_OFFSET, row]
@@ -209,7 +229,8 @@ def add_body(work, which, body, derivatives):
     for axis in range(3):
         for part in range(3):
             entry = derivatives[3 * axis + part]
-            work.jacobian[which, 3 * body + part, 3 * body + axis] -= entry
+            work.jacobian[which, body, part, axis] -= entry
+            work.jacobian[which, own_block(work, body), part, axis] -= entry
 
 
 def add_bodies(scene, work, time):
@@ -222,18 +243,18 @@ def add_bodies(scene, work, time):
 
 
 def add_centres(scene, work, time):
-    for a in range(scene.bodies.shape[0]):
-        for b in range(a):
-            view = centre_view(scene, work, time, NOW, a, b)
-            nx, ny, distance = soft_centre_line(scene, work, NOW, a, b)
-            along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
-            slope, damping = centre_derivatives(scene, view)
-            # The gradient (x, y)/d turns and, near d_c = 0, grows by (1 − n nᵀ)/d.
-            turning = -centre_force(scene, view) / distance
-            add_product(work, STIFFNESS, a, b, along, along, -slope - turning)
-            add_product(work, STIFFNESS, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
-            add_product(work, STIFFNESS, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
-            add_product(work, DAMPING, a, b, along, along, damping)
+    for pair in range(work.tally[PAIRS]):
+        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        view = centre_view(scene, work, time, NOW, a, b)
+        nx, ny, distance = soft_centre_line(scene, work, NOW, a, b)
+        along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
+        slope, damping = centre_derivatives(scene, view)
+        # The gradient (x, y)/d turns and, near d_c = 0, grows by (1 − n nᵀ)/d.
+        turning = -centre_force(scene, view) / distance
+        add_product(scene, work, STIFFNESS, pair, a, b, along, along, -slope - turning)
+        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
+        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
+        add_product(scene, work, DAMPING, pair, a, b, along, along, damping)
 
 
 def add_surfaces(scene, work, time):
@@ -242,20 +263,21 @@ def add_surfaces(scene, work, time):
     while row < work.tally[CANDIDATES]:
         end = run_end(work, row)
         a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        pair = work.candidates[row, PAIR]
         view = surface_view(scene, work, time, NOW, row, end)
         repulsion = surface_force(scene, view)
         slope, damping = surface_derivatives(scene, view)
         mean = mean_direction(work, row, end)
         spread = repulsion * sharpness(scene, view.gap)
-        add_product(work, STIFFNESS, a, b, mean, mean, -slope - spread)
-        add_product(work, DAMPING, a, b, mean, mean, damping)
+        add_product(scene, work, STIFFNESS, pair, a, b, mean, mean, -slope - spread)
+        add_product(scene, work, DAMPING, pair, a, b, mean, mean, damping)
         for each in range(row, end):
             share = work.geometry[NOW, each, SHARE]
             if share > 0.0:
                 c, d = work.candidates[each, VERTEX_BODY], work.candidates[each, EDGE_BODY]
                 along = normal_rows(work, each)
                 spread = share * repulsion * sharpness(scene, work.geometry[NOW, each, GAP])
-                add_product(work, STIFFNESS, c, d, along, along, spread)
+                add_product(scene, work, STIFFNESS, pair, c, d, along, along, spread)
                 add_turning(scene, work, each, share * repulsion, 0.0)
         row = end
 
@@ -263,9 +285,10 @@ def add_surfaces(scene, work, time):
 def weigh_velocities(scene, work, time, remaining):
     """Derivatives of the body forces, and from them how long each body remembers its velocity."""
     for which in range(2):
-        for row in range(work.jacobian.shape[1]):
-            for column in range(work.jacobian.shape[2]):
-                work.jacobian[which, row, column] = 0.0
+        for block in range(block_count(work)):
+            for row in range(3):
+                for column in range(3):
+                    work.jacobian[which, block, row, column] = 0.0
     add_bodies(scene, work, time)
     remember_velocities(scene, work, remaining)
 

@@ -42,6 +42,7 @@ from flocsim.arrays import (
     NORMAL_Y,
     NOW,
     RELAXATION,
+    SHORTENED,
     SLIP_OFFSET,
     SPIN,
     STEP_ERROR,
@@ -127,36 +128,36 @@ def carried_size(scene, work, body):
     return math.hypot(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
 
 
-def shorten(scene, work, leader):
-    """Shorten the carried error of a cluster to what its places can be wrong by.
+def shorten(scene, work):
+    """Shorten the carried error of every cluster to what its places can be wrong by.
 
     All of it by one factor, for it must not give the cluster a momentum that no step and no switch
     has given it, and velocities too: those of vibrations are what their places make them.
     """
-    share = 1.0
     for body in range(work.bodies.shape[0]):
-        if work.cluster[body] == leader:
-            most = work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
-            size = carried_size(scene, work, body)
-            if size > most:
-                share = min(share, most / size)
-    if share < 1.0:
-        for body in range(work.bodies.shape[0]):
-            if work.cluster[body] == leader:
-                for axis in range(MOTION_COLUMNS):
-                    work.motion[CARRIED, body, axis] *= share
-        for row in range(work.tally[CANDIDATES]):
-            if work.cluster[work.candidates[row, VERTEX_BODY]] == leader:
-                work.slip[SLIP_OFFSET, row] *= share
+        work.bodies[body, SHORTENED] = 1.0
+    for body in range(work.bodies.shape[0]):
+        leader = work.cluster[body]
+        most = work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
+        size = carried_size(scene, work, body)
+        if size > most:
+            work.bodies[leader, SHORTENED] = min(work.bodies[leader, SHORTENED], most / size)
+    for body in range(work.bodies.shape[0]):
+        share = work.bodies[work.cluster[body], SHORTENED]
+        if share < 1.0:
+            for axis in range(MOTION_COLUMNS):
+                work.motion[CARRIED, body, axis] *= share
+    for row in range(work.tally[CANDIDATES]):
+        share = work.bodies[work.cluster[work.candidates[row, VERTEX_BODY]], SHORTENED]
+        if share < 1.0:
+            work.slip[SLIP_OFFSET, row] *= share
 
 
 def bound_carried(scene, work):
     """Keep the vector of every cluster within the sums of its parts, which a mode that switches
     again and again would make it leave; the largest one of place [m]."""
     largest = 0.0
-    for body in range(work.bodies.shape[0]):
-        if work.cluster[body] == body:
-            shorten(scene, work, body)
+    shorten(scene, work)
     for body in range(work.bodies.shape[0]):
         largest = max(largest, carried_size(scene, work, body))
     return largest

@@ -24,6 +24,7 @@ from flocsim.arrays import (
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    PAIR,
     SHARE,
     VERTEX_ARM_N,
     VERTEX_BODY,
@@ -66,12 +67,8 @@ def gap_of(scene, measure):
 
 def run_end(work, row):
     """The end of the run of rows that belong to the same two bodies as this one."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    end = row + 1
-    while end < work.tally[CANDIDATES]:
-        c, d = work.candidates[end, VERTEX_BODY], work.candidates[end, EDGE_BODY]
-        if not ((c == a and d == b) or (c == b and d == a)):
-            break
+    pair, end = work.candidates[row, PAIR], row + 1
+    while end < work.tally[CANDIDATES] and work.candidates[end, PAIR] == pair:
         end += 1
     return end
 
@@ -147,7 +144,7 @@ def surface_view(scene, work, time, state, row, end):
     """The PairView of the two bodies of a run of rows, their gap being g̃."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     gap, rate = soften(scene, work, state, row, end)
-    _, _, distance = centre_line(work, state, a, b)
+    _, _, distance = centre_line(scene, work, state, a, b)
     return pair_view(scene, time, a, b, gap, rate, distance)
 
 

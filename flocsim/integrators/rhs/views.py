@@ -33,6 +33,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.constants import CENTRE_SOFTENING
+from flocsim.geometry.contact.separation import separation
 from flocsim.hooks import hook
 
 
@@ -137,10 +138,9 @@ def push_pair(work, state, row, normal, tangential):
     add_force(work, state, b, -fx, -fy, -torque_b)
 
 
-def centre_line(work, state, a, b):
+def centre_line(scene, work, state, a, b):
     """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
-    dx = work.motion[state, a, X] - work.motion[state, b, X]
-    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    dx, dy = separation(scene, work, state, a, b)
     distance = math.sqrt(dx * dx + dy * dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0
@@ -149,8 +149,7 @@ def centre_line(work, state, a, b):
 
 def soft_centre_line(scene, work, state, a, b):
     """The same of d = √(d_c² + ε²), whose gradient (n_x, n_y) fades out towards d_c = 0."""
-    dx = work.motion[state, a, X] - work.motion[state, b, X]
-    dy = work.motion[state, a, Y] - work.motion[state, b, Y]
+    dx, dy = separation(scene, work, state, a, b)
     reach = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
     softening = CENTRE_SOFTENING * reach
     distance = math.sqrt(dx * dx + dy * dy + softening * softening)

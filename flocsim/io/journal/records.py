@@ -30,8 +30,8 @@ BLOCK = 2**16
 MOST_WASTE = 2**28
 """Bytes that are read behind marks that turn out to be none, beside twice the file's own."""
 
-SESSION, CHUNK = 1, 2
-"""Kinds: what a run was started with; rows of finished replicates."""
+SESSION, CHUNK, SNAPSHOT = 1, 2, 3
+"""Kinds: what a run was started with; rows of finished replicates; a swarm at a moment."""
 
 
 @attrs.frozen

@@ -18,6 +18,7 @@ from flocsim.io.hdf5.expected import check_root, hold_against
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.opening import opened_file
+from flocsim.io.results.groups import write_labelled
 from flocsim.io.results.schema import (
     AXES,
     COORDINATES,
@@ -68,22 +69,7 @@ def write_sweep(
             {"format": FORMAT, "schema_version": SCHEMA_VERSION, "swept": json.dumps(about)}
         )
         for group, labelled in groups.items():
-            place = file.create_group(group)
-            inner = {name: each for name, each in labelled.axes.items() if each.axes != (name,)}
-            for name, axis in labelled.axes.items():
-                if name in inner:
-                    continue
-                words = axis.values.dtype.kind == "O"
-                kind = h5py.string_dtype() if words else None
-                scale = place.create_dataset(name, data=axis.values.tolist(), dtype=kind)
-                scale.make_scale(name)
-                scale.attrs.update(axis.about)
-            place.attrs["coordinates"] = " ".join(inner)
-            for name, column in (inner | labelled.columns).items():
-                dataset = place.create_dataset(name, data=column.values)
-                dataset.attrs.update(column.about)
-                for number, axis_name in enumerate(column.axes):
-                    dataset.dims[number].attach_scale(place[axis_name])
+            write_labelled(file.create_group(group), labelled)
     write_file(path, seal(image.getvalue()), rule)
 
 

@@ -70,7 +70,7 @@ class Doublet:
 
     def bond(self, time=0.0, gap=-1e-9):
         """The kind of bond now."""
-        nx, ny, distance = centre_line(self.work, NOW, 1, 0)
+        nx, ny, distance = centre_line(self.scene, self.work, NOW, 1, 0)
         return bonds.bond_of(self.scene, self.work, self.observed, time, gap, nx, ny, distance)
 
     def rest(self, turns):
@@ -126,7 +126,7 @@ def test_two_contacts_on_either_side_hold_against_prying(tmp_path, tilt, expecte
     doublet = Doublet(tmp_path, hamaker(1e-16), shapes, places)
     assert doublet.attraction() > 10.0 * bonds.SAFETY * doublet.load
     # By itself: at rest the bodies could not climb out of the attraction either.
-    nx, ny, distance = centre_line(doublet.work, NOW, 1, 0)
+    nx, ny, distance = centre_line(doublet.scene, doublet.work, NOW, 1, 0)
     known = doublet.scene, doublet.work, doublet.observed
     assert bonds.is_held(*known, 0.0, nx, ny, distance) == expected
 

@@ -106,7 +106,8 @@ def least_of(distances):
 def listed(scene, work, cutoff, a=1, b=0):
     """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
     work.tally[CANDIDATES] = 0
-    assert compose(list_polygons, {})(scene, work, a, b, cutoff)
+    work.pairs[0, :2] = a, b
+    assert compose(list_polygons, {})(scene, work, 0, cutoff)
     rows = work.candidates[: work.tally[CANDIDATES]]
     first = scene.first
     return [
@@ -174,8 +175,8 @@ def test_the_gap_is_that_of_all_pairs(drawn):
 @settings(max_examples=100)
 def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
     scene, work = arrays(*placed(drawn))
-    pose = pose_of(work, 0, 1)
-    assert reversed_pose(pose) == pytest.approx(pose_of(work, 1, 0), rel=1e-9, abs=1e-17)
+    pose = pose_of(scene, work, 0, 1)
+    assert reversed_pose(pose) == pytest.approx(pose_of(scene, work, 1, 0), rel=1e-9, abs=1e-17)
     assert core_distance(scene, 0, 1, pose) == pytest.approx(
         core_distance(scene, 1, 0, reversed_pose(pose)), rel=1e-9, abs=1e-18
     )

@@ -98,7 +98,8 @@ def worst_margin(scene, work, shares):
     closed = work.geometry[NOW, :rows, 2] < 0.0
     worst = []
     for share in shares:
-        interpolate(work, 1.0, share)
+        for body in range(len(scene.bodies)):
+            interpolate(work, 1.0, share, body)
         locate_contacts(scene, work, TRIAL)
         gaps = work.geometry[TRIAL, :rows, 2]
         worst.append(np.where(closed, -gaps, gaps).min(initial=math.inf))

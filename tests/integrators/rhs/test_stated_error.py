@@ -86,7 +86,7 @@ def test_an_error_goes_on_as_the_motion_does(steps, precision):
 
 def test_drag_uses_up_an_error_of_velocity():
     scene, work = at_start([StokesDrag()])
-    tau = scene.bodies[0, MASS] / work.jacobian[DAMPING, 0, 0]
+    tau = scene.bodies[0, MASS] / work.jacobian[DAMPING, 0, 0, 0]
     place, speed = carried([StokesDrag()], 0.0, 1e-6, 30.0 * tau, 300)
     assert place == pytest.approx(1e-6 * tau, rel=1e-3)
     assert abs(speed) < 1e-12

@@ -1,0 +1,164 @@
+"""What a swarm costs: a body and step, 1,000 flocs for 10 s, threads, memory, velocity Verlet.
+
+    python -m benchmarks.speed.swarms [--quick] [--parts cost flocs threads verlet memory]
+
+Swarms are those of studies (`[scene] kind = "swarm"`, preset `si`, van der Waals cut at 1 um). CPU
+time of this process, compiled code warm.
+"""
+
+import resource
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.reporting import Table, parser_of, print_heading
+from flocsim import System
+from flocsim.ensembles.config.loader import load_any_config
+from flocsim.ensembles.suspension.runner import warm
+from flocsim.ensembles.suspension.study import SwarmStudy
+from flocsim.integrators import VelocityVerlet
+from flocsim.integrators.base import Status
+
+STUDY = """\
+preset = "si"
+seed = 1
+replicates = 1
+[scene]
+kind = "swarm"
+number = {number}
+area_fraction = {fraction}
+radius = "5 um"
+spread = 0.3
+min_radius = "2.5 um"
+duration = "{duration} s"
+[shapes]
+source = "library"
+file = "synthetic"
+vertices = [{vertices}]
+[forces.van_der_waals]
+cut = "1 um"
+[forces.double_layer]
+debye_length = "9.6 nm"
+"""
+
+PARTS = ("cost", "flocs", "threads", "verlet", "memory")
+SAFE = 0.2
+"""Verlet's step over 1/ω of the contact: at 2 it is unstable, at .2 its error is some percent."""
+
+
+def swarm_of(number, fraction, vertices, duration=10.0):
+    """The Swarm of replicate 0 of such a study."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "swarm.toml"
+        text = STUDY.format(number=number, fraction=fraction, vertices=vertices, duration=duration)
+        path.write_text(text, "utf-8")
+        swarm, _, _ = SwarmStudy(load_any_config(path)).swarm(0)
+    warm(swarm)
+    return swarm
+
+
+def run(swarm, until, threads=1, most=np.inf):
+    """(CPU s, wall s, SwarmTrajectory) of a run that stops where ``most`` CPU seconds are spent."""
+    began, wall = time.process_time(), time.perf_counter()
+    found = swarm.run(until, threads=threads,
+                      watch=lambda _: time.process_time() - began > most)  # fmt: skip
+    return time.process_time() - began, time.perf_counter() - wall, found
+
+
+def cost(arguments, table):
+    """Microseconds for a body and an accepted step of its island, by number of bodies."""
+    counts = (100, 1000) if arguments.quick else (100, 1000, 10_000)
+    for name, fraction in (("dilute", 0.02), ("crowded", 0.2)):
+        first = None
+        for number in counts:
+            swarm = swarm_of(number, fraction, 1)
+            spent, _, found = run(swarm, 0.2, most=arguments.seconds)
+            each = 1e6 * spent / found.effort.body_steps
+            first = first or each
+            table.add(name, number, found.t[-1], found.effort.windows, found.effort.body_steps,
+                      each, each / first)  # fmt: skip
+
+
+def flocs(arguments, table):
+    """1,000 flocs of N = 16, area fraction .1, 10 s of settling."""
+    number, until = (100, 1.0) if arguments.quick else (1000, 10.0)
+    swarm = swarm_of(number, 0.1, 16)
+    spent, wall, found = run(swarm, until, most=arguments.seconds)
+    clusters = found.clusters()
+    table.add(number, found.t[-1], spent, wall, found.effort.body_steps, len(clusters),
+              clusters.mean_size, float(found.error[-1]), found.status.name)  # fmt: skip
+
+
+def threads(arguments, table):
+    """Wall time of one thread over that of two, and whether the bytes are the same."""
+    swarm = swarm_of(1000, 0.02, 1)
+    until = 0.02 if arguments.quick else 0.2
+    _, one, first = run(swarm, until)
+    _, two, second = run(swarm, until, threads=2)
+    same = first.position.tobytes() == second.position.tobytes()
+    table.add(len(swarm.bodies), one, two, one / two, "same" if same else "OTHER")
+
+
+def verlet(arguments, table):
+    """Velocity Verlet at its largest useful step, extrapolated from a stated piece."""
+    swarm = swarm_of(100, 0.1, 16)
+    spent, _, found = run(swarm, 1.0, most=arguments.seconds)
+    pieces = swarm.system.pieces
+    contact = next(force for force in pieces.used.values() if hasattr(force, "k_n"))
+    lightest = min(body.mass for body in swarm.bodies)
+    step = SAFE / np.sqrt(2.0 * contact.k_n / lightest)
+    system = System(swarm.bodies, swarm.forces, VelocityVerlet(step), swarm.fluid)
+    system.run(10 * step, record=False)
+    steps = 200 if arguments.quick else 2000
+    began = time.process_time()
+    done = system.run(steps * step, max_steps=10 * steps, record=False)
+    piece = time.process_time() - began
+    assert done.status == Status.FINISHED, done.status
+    whole = piece * found.t[-1] / (steps * step)
+    table.add(len(swarm.bodies), found.t[-1], spent, step, steps, whole, whole / spent)
+
+
+def memory(arguments, table):
+    """Kilobytes a body that running a swarm adds to the process."""
+    number = 2000 if arguments.quick else 10_000
+    swarm = swarm_of(number, 0.05, 16)
+    progress = swarm.begin(1.0)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    progress.advance(1e-3)
+    progress.advance(2e-3)
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    table.add(number, 1e-3 * before, 1e-3 * after, (after - before) / number)
+
+
+TABLES = {
+    "cost": (cost, "Discs with contact, van der Waals and double layer", (
+        "scene", "bodies", "time [s]", "windows", "body steps", "us/body step", "over n = 100")),
+    "flocs": (flocs, "Flocs of N = 16, area fraction .1", (
+        "bodies", "time [s]", "CPU [s]", "wall [s]", "body steps", "clusters", "mean size",
+        "stated error [m]", "ended")),
+    "threads": (threads, "Two threads, dilute discs", (
+        "bodies", "one [s]", "two [s]", "ratio", "bytes")),
+    "verlet": (verlet, "Velocity Verlet, extrapolated", (
+        "bodies", "time [s]", "implicit [s]", "step [s]", "steps run", "Verlet [s]", "ratio")),
+    "memory": (memory, "Memory", ("bodies", "before [MB]", "after [MB]", "kB a body")),
+}  # fmt: skip
+
+
+def main():
+    """Print the tables."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--seconds", type=float, default=900.0, help="CPU time of a run at most")
+    arguments = parser.parse_args()
+    print_heading(used="one used but for threads")
+    for part in arguments.parts:
+        measure, title, columns = TABLES[part]
+        table = Table(title, columns)
+        measure(arguments, table)
+        table.print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""From a journal of swarms to their results: what is there of each replicate, put together."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.suspension.records import (
+    BODIES,
+    END,
+    MOMENT,
+    STATE,
+    SUMMARY,
+    Part,
+    part_of,
+)
+from flocsim.ensembles.suspension.replicate import Left
+from flocsim.ensembles.suspension.study import SwarmStudy
+from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.records import SNAPSHOT, Record
+from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, SwarmResults
+from flocsim.swarms.progress import Effort
+
+EFFORT = tuple(field.name for field in attrs.fields(Effort))
+
+
+@attrs.define(eq=False)
+class Found:
+    """What a journal has of a replicate: records of its bodies, of its snapshots by place, of its
+    last state, and how it ended."""
+
+    bodies: Record | None = None
+    moments: dict[int, Record] = attrs.Factory(dict)
+    state: Part | None = None
+    ended: dict[str, Any] | None = None
+
+    @property
+    def left(self) -> Left | None:
+        """Where it goes on; None where it begins anew."""
+        if self.state is None or self.bodies is None:
+            return None
+        count = self.state.facts["moments"]
+        if not all(place in self.moments for place in range(count)):
+            return None
+        return Left(count, self.state.arrays)
+
+
+def found_in(journal: Journal, replicates: int, moments: int) -> tuple[dict[int, Found], list[str]]:
+    """({replicate: Found}, remarks) of a journal's whole records."""
+    found = {each: Found() for each in range(replicates)}
+    remarks = [
+        f"{journal.path}: damaged from byte {each.start} to {each.stop}: what is missing is "
+        "computed again" for each in journal.damage
+    ]  # fmt: skip
+    for record in journal.records:
+        about = record.description
+        if record.kind != SNAPSHOT or about.get("replicate") not in found:
+            continue
+        facts = about.get("facts", {})
+        own, of = found[about["replicate"]], about.get("of")
+        if of == BODIES:
+            own.bodies = record
+        elif of == MOMENT and facts.get("place") in range(moments):
+            own.moments[facts["place"]] = record
+        elif of == STATE and facts.get("moments") in range(1, moments + 1):
+            try:
+                own.state = part_of(record, journal.read(record.offset, record.length))
+            except ValueError as error:
+                remarks.append(f"{journal.path}: {error}: it is left out")
+        elif of == END and all(isinstance(facts.get(name), int) for name in EFFORT):
+            own.ended = facts
+    for own in found.values():
+        whole = own.bodies is not None and (
+            own.ended is None
+            or own.ended.get("status") != "FINISHED"
+            or all(place in own.moments for place in range(moments))
+        )
+        if not whole:
+            own.ended = None
+    return found, remarks
+
+
+def results_of(
+    study: SwarmStudy, found: dict[int, Found], journal: Journal, run: dict[str, Any]
+) -> tuple[SwarmResults, list[str]]:
+    """(the SwarmResults of finished replicates, a line for each that ended early)."""
+    stops, replicates = study.stops, len(found)
+    failed = []
+    arrays: dict[str, dict[str, np.ndarray]] = {}
+    per_body = [read(journal, own.bodies).arrays for own in found.values()]
+    n = len(per_body[0]["r_eq"])
+    points = max(len(each["points"]) for each in per_body)
+    counts = np.array([each["count"] for each in per_body])
+    ends = np.cumsum(counts, axis=1)
+    arrays["bodies"] = {
+        name: np.array([each[name] for each in per_body])
+        for name in ("r_eq", "spheroradius", "mass", "floc", "box")
+    } | {
+        "first_point": ends - counts, "point_count": counts,
+        "points": np.array([
+            np.pad(each["points"], ((0, points - len(each["points"])), (0, 0)))
+            for each in per_body
+        ]),
+    }  # fmt: skip
+    shape = replicates, len(stops)
+    classes = np.array([0.0, *study.scene.bounds])
+    numbers = {name: np.full(shape, np.nan) for name in (*SUMMARY, "error")}
+    by_class = np.full((*shape, len(classes)), np.nan)
+    motion = np.full((*shape, n, 6), np.nan)
+    labels = np.full((*shape, n), -1, dtype=np.int32)
+    tallies = {name: np.zeros(replicates, ENDS[name][0]) for name in ENDS}
+    for replicate, own in found.items():
+        ended = own.ended or {}
+        status = ended.get("status", "")
+        tallies["finished"][replicate] = status == "FINISHED"
+        tallies["end_time"][replicate] = ended.get("time") or 0.0
+        for name in ("steps", "rejected", "body_steps", "windows"):
+            tallies[name][replicate] = ended.get(name, 0)
+        if status != "FINISHED":
+            failed.append(
+                f"swarm {replicate} ended at {ended.get('time') or 0.0:.4g} s: {status.lower()}, "
+                f"in an island of bodies {', '.join(map(str, ended.get('failed', [])[:6]))}"
+            )
+        for place, record in own.moments.items():
+            part = read(journal, record)
+            for name, values in numbers.items():
+                value = part.facts.get(name)
+                values[replicate, place] = np.nan if value is None else value
+            motion[replicate, place] = part.arrays["motion"]
+            labels[replicate, place] = part.arrays["cluster"]
+            by_class[replicate, place] = part.arrays["counts"]
+    arrays["counts"] = numbers | {"n_class": by_class}
+    arrays["snapshots"] = {
+        "position": motion[..., :3], "velocity": motion[..., 3:], "cluster": labels,
+    }  # fmt: skip
+    arrays["ends"] = tallies
+    scales = {
+        "replicate": np.arange(replicates), "time": np.array(stops), "class": classes,
+        "body": np.arange(n), "component": np.array(COMPONENTS), "axis": np.array(AXES),
+        "point": np.arange(points),
+    }  # fmt: skip
+    return SwarmResults(scales, arrays, run), failed
+
+
+def read(journal: Journal, record: Record | None) -> Part:
+    """A record's Part."""
+    assert record is not None, "a finished replicate has its bodies"
+    return part_of(record, journal.read(record.offset, record.length))
+
+
+def table_of(results: SwarmResults) -> str:
+    """Numbers on the clusters over time, means over replicates, as text."""
+    counts = results.groups["counts"]
+    columns = {
+        "time [s]": (results.scales["time"], "{:.4g}"),
+        "clusters": (mean(counts["clusters"]), "{:.1f}"),
+        "largest": (mean(counts["largest"]), "{:.1f}"),
+        "mean size": (mean(counts["mean_size"]), "{:.2f}"),
+        "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
+        "porosity": (mean(counts["porosity"]), "{:.3f}"),
+        "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
+        "error [m]": (mean(counts["error"]), "{:.1e}"),
+    }
+    rows = [list(columns)]
+    for place in range(len(results.scales["time"])):
+        rows.append([form.format(values[place]) for values, form in columns.values()])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
+    many = len(results.scales["replicate"])
+    return "\n".join(lines + ([f"means over {many} swarms"] if many > 1 else []))
+
+
+def mean(values: np.ndarray) -> np.ndarray:
+    """The mean over replicates that got so far; NaN where none did."""
+    known = np.isfinite(values)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return total / known.sum(axis=0)

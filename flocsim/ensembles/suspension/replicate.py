@@ -1,0 +1,131 @@
+"""One replicate of a swarm study, from its start or from where it was left, to its end."""
+
+import time
+from collections.abc import Callable
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
+from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
+from flocsim.integrators.base import Status
+from flocsim.swarms.clusters import Clusters
+from flocsim.swarms.contacts import Gauge
+from flocsim.swarms.progress import Progress
+from flocsim.swarms.swarm import Swarm
+
+FIXED = -2
+"""Place among the flocs of a wall."""
+
+
+@attrs.frozen(eq=False)
+class Left:
+    """Where a replicate was left: how many snapshots it has, and the state of its Progress."""
+
+    moments: int
+    state: dict[str, np.ndarray]
+
+
+def run_replicate(
+    study: SwarmStudy, replicate: int, keep: Callable[[Part], None], left: Left | None = None,
+    halted: Callable[[], bool] | None = None,
+) -> bool:  # fmt: skip
+    """Run a replicate; whether it has come to its end.
+
+    ``keep`` takes its Parts as they come. ``halted()``, looked at between windows, makes it leave
+    off, its state kept.
+    """
+    swarm, drawn, box = study.swarm(replicate)
+    gauge = swarm.gauge()
+    swarm.check_overlaps(gauge)
+    progress = swarm.begin(study.scene.duration, max_steps=study.config.integrator.max_steps)
+    stops = study.stops
+    if left is None:
+        keep(bodies_part(replicate, swarm, drawn, box))
+        keep(moment_part(replicate, 0, study, swarm, gauge, progress))
+        moments = 1
+    else:
+        progress.restore(left.state)
+        moments = left.moments
+    kept_at, status = time.monotonic(), Status.FINISHED
+    for place in range(moments, len(stops)):
+        while (status := progress.advance(stops[place])) == Status.PAUSED:
+            late = time.monotonic() - kept_at > study.scene.checkpoint
+            stopped = halted is not None and halted()
+            if late or stopped:
+                keep(state_part(replicate, place, progress))
+                kept_at = time.monotonic()
+            if stopped:
+                return False
+        if status != Status.FINISHED:
+            break
+        keep(moment_part(replicate, place, study, swarm, gauge, progress))
+        if place + 1 < len(stops) and halted is not None and halted():
+            keep(state_part(replicate, place + 1, progress))
+            return False
+    keep(end_part(replicate, status, progress))
+    return True
+
+
+def bodies_part(
+    replicate: int, swarm: Swarm, drawn: Drawn, box: tuple[float, float]
+) -> Part:  # fmt: skip
+    """What is the same at all times: the bodies, a wall the last of them, and the box."""
+    shapes = [body.shape for body in swarm.bodies]
+    points = [shape.vertices for shape in shapes]
+    walls = len(shapes) - len(drawn.flocs)
+    return Part(replicate, BODIES, {
+        "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
+        "spheroradius": np.array([shape.radius for shape in shapes]),
+        "mass": np.array([body.mass for body in swarm.bodies]),
+        "floc": np.append(drawn.flocs, np.full(walls, FIXED)).astype(np.int32),
+        "count": np.array([len(each) for each in points], dtype=np.int64),
+        "points": np.concatenate(points),
+        "box": np.array(box),
+    })  # fmt: skip
+
+
+def moment_part(
+    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress
+) -> Part:
+    """A snapshot, its clusters with it."""
+    now, motion, error = progress.seen()
+    position, velocity = motion[:, :3], motion[:, 3:]
+    near = gauge.neighbours(position, study.scene.link)
+    found = Clusters.of(swarm.bodies, position, velocity, near)
+    facts = {"place": place, "time": now, "error": error} | summary_of(found)
+    arrays = {"motion": motion, "cluster": found.label.astype(np.int32)}
+    bounds = np.array([0.0, *study.scene.bounds, np.inf])
+    arrays["counts"] = found.counts(bounds).astype(np.int64)
+    return Part(replicate, MOMENT, arrays, facts)
+
+
+def summary_of(clusters: Clusters) -> dict[str, float]:
+    """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first two."""
+    share = clusters.mass / clusters.mass.sum()
+    return {
+        "clusters": len(clusters),
+        "largest": int(clusters.size.max()),
+        "mean_size": clusters.mean_size,
+        "gyration": float(share @ clusters.gyration),
+        "porosity": float(share @ clusters.porosity),
+        "fractal_dimension": clusters.fractal_dimension(),
+        "settling": float(-share @ clusters.velocity[:, 1]),
+    }
+
+
+def state_part(replicate: int, moments: int, progress: Progress) -> Part:
+    """What the rest of the replicate follows from."""
+    return Part(replicate, STATE, progress.state(), {"moments": moments})
+
+
+def end_part(replicate: int, status: Status, progress: Progress) -> Part:
+    """How it ended, and what it took."""
+    effort = attrs.asdict(progress.effort)
+    failed = [] if progress.failed is None else progress.failed.tolist()[:MOST_NAMED]
+    return Part(replicate, END, {}, {"status": status.name, "failed": failed, "time": progress.time}
+                | effort)  # fmt: skip
+
+
+MOST_NAMED = 20
+"""Bodies of an island that failed which are named."""

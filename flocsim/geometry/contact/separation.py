@@ -1,0 +1,31 @@
+"""How far two bodies lie apart: the one place that knows whether space repeats itself."""
+
+import math
+from collections.abc import Callable
+
+from flocsim.arrays import X, Y
+from flocsim.hooks import hook
+
+
+@hook
+def separation(scene, work, state, a, b):
+    """(x, y) of body a as seen from body b, in a state [m]."""
+    motion = work.motion
+    return motion[state, a, X] - motion[state, b, X], motion[state, a, Y] - motion[state, b, Y]
+
+
+def nearest_image(scene, work, state, a, b):
+    """The same where space repeats itself: of a's image that is nearest to b."""
+    motion = work.motion
+    x = motion[state, a, X] - motion[state, b, X]
+    y = motion[state, a, Y] - motion[state, b, Y]
+    width, height = scene.box
+    if width < math.inf:
+        x -= width * math.floor(x / width + 0.5)
+    if height < math.inf:
+        y -= height * math.floor(y / height + 0.5)
+    return x, y
+
+
+PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
+"""The replacement for scenes that repeat themselves."""

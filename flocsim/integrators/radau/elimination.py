@@ -1,0 +1,278 @@
+"""Sparse systems of many bodies, in blocks of 3 × 3: written, factorised and solved by rows.
+
+Both systems of a Newton step (tableau.py) have one pattern (ordering.py), and are worked on at
+once: a block holds the real one's numbers, then the real and the imaginary parts of the complex
+one's. There is no pivoting but inside the blocks on the diagonal: masses and drag make the systems
+dominated by them, as far as stiffness does not, which is symmetric and positive all but for what
+turning and friction add.
+
+The rows of x and y of a cluster's first body are the sums of all its bodies'. What bodies do to
+each other cancels in these, so that they are written without it, and momentum is exact.
+"""
+
+from flocsim.arrays import DAMPING, EARLIER, LATER, PAIRS, STIFFNESS
+from flocsim.integrators.radau.ordering import NONE, find_pattern, is_leader
+from flocsim.integrators.radau.tableau import EIGENVALUES, PAIR, REAL
+from flocsim.integrators.rhs.blocks import lower_block, own_block, upper_block
+from flocsim.integrators.rhs.views import inertia
+
+REAL_PART, PAIR_RE, PAIR_IM = range(3)
+"""Parts of a block: the real system, the complex one's real and imaginary parts."""
+
+
+def slot_of(e, row, column):
+    """Where the block of a row and a column is."""
+    first, last = e.upper[row], e.lower[row + 1]
+    if column < row:
+        first, last = e.lower[row], e.upper[row]
+    while first < last - 1:
+        middle = (first + last) // 2
+        if e.column[middle] <= column:
+            first = middle
+        else:
+            last = middle
+    return first
+
+
+def weights_of(step):
+    """h/µ of both systems: real, real and imaginary part."""
+    pair = step / EIGENVALUES[PAIR]
+    return step / EIGENVALUES[REAL].real, pair.real, pair.imag
+
+
+def write_into(target, slot, work, block, first_row, last_row, weights):
+    """Write rows of DAMPING + (h/µ) STIFFNESS of a block."""
+    of_real, re, im = weights
+    for i in range(first_row, last_row):
+        for j in range(3):
+            damping = work.jacobian[DAMPING, block, i, j]
+            stiffness = work.jacobian[STIFFNESS, block, i, j]
+            target[slot, REAL_PART, i, j] = damping + of_real * stiffness
+            target[slot, PAIR_RE, i, j] = damping + re * stiffness
+            target[slot, PAIR_IM, i, j] = im * stiffness
+
+
+def add_inertia(scene, target, slot, body, first_axis, last_axis, step):
+    """Add (µ/h) M to the diagonal of a block."""
+    for axis in range(first_axis, last_axis):
+        mass = inertia(scene, body, axis) / step
+        target[slot, REAL_PART, axis, axis] += EIGENVALUES[REAL].real * mass
+        target[slot, PAIR_RE, axis, axis] += EIGENVALUES[PAIR].real * mass
+        target[slot, PAIR_IM, axis, axis] += EIGENVALUES[PAIR].imag * mass
+
+
+def write_momentum(scene, work, body, weights, step):
+    """Write a body's share of the momentum balance of its cluster."""
+    e = work.elimination
+    leader, place = e.place[work.cluster[body]], e.place[body]
+    own = own_block(work, body)
+    if leader == place:
+        write_into(e.pivot, place, work, own, 0, 2, weights)
+        add_inertia(scene, e.pivot, place, body, 0, 2, step)
+    else:
+        slot = slot_of(e, leader, place)
+        write_into(e.blocks, slot, work, own, 0, 2, weights)
+        add_inertia(scene, e.blocks, slot, body, 0, 2, step)
+
+
+def write_coupling(work, body, other, block, weights):
+    """Write the derivatives of a body's forces by another one's coordinates."""
+    e = work.elimination
+    row, column = e.place[body], e.place[other]
+    if row != NONE and column != NONE:
+        first = 2 if is_leader(work, body) else 0
+        write_into(e.blocks, slot_of(e, row, column), work, block, first, 3, weights)
+
+
+def write_systems(scene, work, step):
+    """(µ/h) M + DAMPING + (h/µ) STIFFNESS of both systems, in the pattern."""
+    e, weights = work.elimination, weights_of(step)
+    n = work.bodies.shape[0]
+    for slot in range(e.lower[n]):
+        for part in range(3):
+            for i in range(3):
+                for j in range(3):
+                    e.blocks[slot, part, i, j] = 0.0
+    for body in range(n):
+        place = e.place[body]
+        if place != NONE:
+            first = 2 if is_leader(work, body) else 0
+            write_into(e.pivot, place, work, body, first, 3, weights)
+            add_inertia(scene, e.pivot, place, body, first, 3, step)
+            write_momentum(scene, work, body, weights, step)
+    for pair in range(work.tally[PAIRS]):
+        if e.pairs[pair] == 1:
+            a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+            write_coupling(work, a, b, lower_block(work, pair), weights)
+            write_coupling(work, b, a, upper_block(work, pair), weights)
+
+
+def copy_block(target, to, source, slot):
+    for part in range(3):
+        for i in range(3):
+            for j in range(3):
+                target[to, part, i, j] = source[slot, part, i, j]
+
+
+def write_product(target, to, left, one, right, other):
+    """A product of two blocks, of both systems."""
+    for i in range(3):
+        for j in range(3):
+            real, re, im = 0.0, 0.0, 0.0
+            for k in range(3):
+                real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
+                a, b = left[one, PAIR_RE, i, k], left[one, PAIR_IM, i, k]
+                c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
+                re += a * c - b * d
+                im += a * d + b * c
+            target[to, REAL_PART, i, j] = real
+            target[to, PAIR_RE, i, j] = re
+            target[to, PAIR_IM, i, j] = im
+
+
+def subtract_product(target, to, left, one, right, other):
+    """Subtract a product of two blocks, of both systems."""
+    for i in range(3):
+        for j in range(3):
+            real, re, im = 0.0, 0.0, 0.0
+            for k in range(3):
+                real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
+                a, b = left[one, PAIR_RE, i, k], left[one, PAIR_IM, i, k]
+                c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
+                re += a * c - b * d
+                im += a * d + b * c
+            target[to, REAL_PART, i, j] -= real
+            target[to, PAIR_RE, i, j] -= re
+            target[to, PAIR_IM, i, j] -= im
+
+
+def inverse(a, b, c, d, e, f, g, h, i):
+    """The determinant of a matrix and its adjugate."""
+    one, two, three = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * one + b * two + c * three
+    return (
+        determinant,
+        one, c * h - b * i, b * f - c * e,
+        two, a * i - c * g, c * d - a * f,
+        three, b * g - a * h, a * e - b * d,
+    )  # fmt: skip
+
+
+def entry(blocks, slot, i, j):
+    """A number of the complex system."""
+    return complex(blocks[slot, PAIR_RE, i, j], blocks[slot, PAIR_IM, i, j])
+
+
+def invert(blocks, slot):
+    """Replace a block by its inverse, of both systems; False where it has none."""
+    m = blocks[slot, REAL_PART]
+    found = inverse(m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2])
+    if found[0] == 0.0:
+        return False
+    share = 1.0 / found[0]
+    for k in range(9):
+        m[k // 3, k % 3] = share * found[1 + k]
+    both = inverse(
+        entry(blocks, slot, 0, 0), entry(blocks, slot, 0, 1), entry(blocks, slot, 0, 2),
+        entry(blocks, slot, 1, 0), entry(blocks, slot, 1, 1), entry(blocks, slot, 1, 2),
+        entry(blocks, slot, 2, 0), entry(blocks, slot, 2, 1), entry(blocks, slot, 2, 2),
+    )  # fmt: skip
+    if both[0] == 0.0:
+        return False
+    part = 1.0 / both[0]
+    for k in range(9):
+        number = part * both[1 + k]
+        blocks[slot, PAIR_RE, k // 3, k % 3] = number.real
+        blocks[slot, PAIR_IM, k // 3, k % 3] = number.imag
+    return True
+
+
+def factorise_row(e, row):
+    """Subtract the rows above from a row; False where its pivot is singular."""
+    for slot in range(e.lower[row], e.lower[row + 1]):
+        copy_block(e.row, e.column[slot], e.blocks, slot)
+    copy_block(e.row, row, e.pivot, row)
+    for slot in range(e.lower[row], e.upper[row]):
+        above = e.column[slot]
+        write_product(e.blocks, slot, e.row, above, e.pivot, above)
+        for each in range(e.upper[above], e.lower[above + 1]):
+            subtract_product(e.row, e.column[each], e.blocks, slot, e.blocks, each)
+    for slot in range(e.upper[row], e.lower[row + 1]):
+        copy_block(e.blocks, slot, e.row, e.column[slot])
+    copy_block(e.pivot, row, e.row, row)
+    return invert(e.pivot, row)
+
+
+def factorise_sparse(scene, work, step):
+    """Write and factorise both systems; False where one is singular, or where there is no room."""
+    if not find_pattern(scene, work):
+        return False
+    write_systems(scene, work, step)
+    e = work.elimination
+    for row in range(work.bodies.shape[0]):
+        if e.body[row] != NONE and not factorise_row(e, row):
+            return False
+    return True
+
+
+def subtract_real(e, loads, slot, row, column):
+    """Subtract a block's share in a row of the real system."""
+    for i in range(3):
+        total = loads[REAL, row + i].real
+        for j in range(3):
+            total -= e.blocks[slot, REAL_PART, i, j] * loads[REAL, column + j].real
+        loads[REAL, row + i] = total
+
+
+def subtract_pair(e, loads, slot, row, column):
+    """The same of the complex one."""
+    for i in range(3):
+        re, im = loads[PAIR, row + i].real, loads[PAIR, row + i].imag
+        for j in range(3):
+            a, b = e.blocks[slot, PAIR_RE, i, j], e.blocks[slot, PAIR_IM, i, j]
+            c, d = loads[PAIR, column + j].real, loads[PAIR, column + j].imag
+            re -= a * c - b * d
+            im -= a * d + b * c
+        loads[PAIR, row + i] = complex(re, im)
+
+
+def divide_real(e, loads, place, row):
+    """Divide by the block on the diagonal, of the real system."""
+    x, y, z = loads[REAL, row].real, loads[REAL, row + 1].real, loads[REAL, row + 2].real
+    for i in range(3):
+        m = e.pivot[place, REAL_PART]
+        loads[REAL, row + i] = m[i, 0] * x + m[i, 1] * y + m[i, 2] * z
+
+
+def divide_pair(e, loads, place, row):
+    """The same of the complex one."""
+    x, y, z = loads[PAIR, row], loads[PAIR, row + 1], loads[PAIR, row + 2]
+    for i in range(3):
+        total = entry(e.pivot, place, i, 0) * x
+        total += entry(e.pivot, place, i, 1) * y
+        loads[PAIR, row + i] = total + entry(e.pivot, place, i, 2) * z
+
+
+def solve_sparse(work, both):
+    """Replace the load of the real system, or of ``both``, by the solution."""
+    e, loads = work.elimination, work.loads
+    n = work.bodies.shape[0]
+    for place in range(n):
+        body = e.body[place]
+        if body != NONE:
+            for slot in range(e.lower[place], e.upper[place]):
+                other = 3 * e.body[e.column[slot]]
+                subtract_real(e, loads, slot, 3 * body, other)
+                if both:
+                    subtract_pair(e, loads, slot, 3 * body, other)
+    for place in range(n - 1, -1, -1):
+        body = e.body[place]
+        if body != NONE:
+            for slot in range(e.upper[place], e.lower[place + 1]):
+                other = 3 * e.body[e.column[slot]]
+                subtract_real(e, loads, slot, 3 * body, other)
+                if both:
+                    subtract_pair(e, loads, slot, 3 * body, other)
+            divide_real(e, loads, place, 3 * body)
+            if both:
+                divide_pair(e, loads, place, 3 * body)

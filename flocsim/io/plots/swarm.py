@@ -1,0 +1,244 @@
+"""Figures of a swarm study: snapshots with clusters in colours, clusters over time, an animation.
+
+A figure is a function of SwarmResults, and stands in SWARM_FIGURES under the name that
+`flocsim plot` gives it.
+"""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.io.files import Rule, write_file
+from flocsim.io.outputs import redrawn
+from flocsim.io.own_mark import marked
+from flocsim.io.plots.style import Figure, graded_colours, house_style, new_figure
+from flocsim.io.results.swarm_file import SwarmResults
+
+MICRO = 1e6
+MOST_POINTS = 160
+"""Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
+
+ALONE, WALL = "0.78", "0.35"
+"""Colours of bodies that belong to no cluster of two or more, and of walls."""
+
+SNAPSHOTS = 4
+"""Times that the figure of snapshots shows."""
+
+MILLISECONDS, LAST = 120, 1500
+"""Of every frame of an animation, and of the last."""
+
+
+def snapshots(results: SwarmResults) -> Figure:
+    """Snapshots of the first swarm, each cluster in a colour; single bodies are grey."""
+    times = results.scales["time"]
+    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS).round().astype(int))
+    width, height = results.groups["bodies"]["box"][0]
+    with house_style():
+        tall = min(max(2.3 * height / width, 1.2), 5.0)
+        figure = new_figure(2.3 * len(chosen), tall + 0.3)
+        panels = figure.subplots(1, len(chosen), squeeze=False)[0]
+        for axes, place in zip(panels, chosen, strict=True):
+            draw_bodies(axes, results, 0, int(place))
+            axes.set_title(f"{times[place]:.4g} s")
+        return figure
+
+
+def clusters(results: SwarmResults) -> Figure:
+    """Clusters over time: their number, sizes, radius of gyration and settling, of all swarms."""
+    counts, times = results.groups["counts"], results.scales["time"]
+    shown = [
+        ("clusters", 1.0, "clusters"),
+        ("mean_size", 1.0, "bodies of a body's cluster"),
+        ("gyration", MICRO, "radius of gyration [µm]"),
+        ("settling", 1e3, "settling [mm/s]"),
+    ]
+    with house_style():
+        figure = new_figure(7.4, 2.3)
+        panels = figure.subplots(1, len(shown))
+        for axes, (name, factor, label) in zip(panels, shown, strict=True):
+            values = factor * counts[name]
+            for each in values if len(values) > 1 else ():
+                axes.plot(times, each, color="0.8", linewidth=0.7)
+            axes.plot(times, mean(values), color="#0072B2")
+            axes.set_xlabel("time [s]")
+            axes.set_title(label, fontsize=8.0)
+            axes.set_ylim(bottom=0.0)
+        if len(values) > 1:
+            panels[0].plot([], [], color="0.8", linewidth=0.7, label="a swarm")
+            panels[0].plot([], [], color="#0072B2", label="mean")
+            panels[0].legend()
+        return figure
+
+
+def sizes(results: SwarmResults) -> Figure:
+    """Share of bodies in clusters of each size or less, at several times, all swarms together."""
+    labels, times = results.groups["snapshots"]["cluster"], results.scales["time"]
+    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS + 1).round().astype(int))
+    with house_style():
+        figure = new_figure(4.4, 2.6)
+        axes = figure.subplots()
+        for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
+            found = np.concatenate([sizes_of(each) for each in labels[:, place]])
+            values, number = np.unique(found, return_counts=True)
+            share = np.cumsum(number) / number.sum()
+            axes.step(np.append(values, values[-1] * 1.3), np.append(share, 1.0), where="post",
+                      color=colour, label=f"{times[place]:.4g} s")  # fmt: skip
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_xlabel("bodies of a cluster")
+        axes.set_ylabel("share of bodies in clusters\nup to that size")
+        axes.set_ylim(0.0, 1.03)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        return figure
+
+
+def classes(results: SwarmResults) -> Figure:
+    """Clusters of each size class over time, by equivalent radius, in the mean over swarms."""
+    numbers = mean(results.groups["counts"]["n_class"])
+    low, times = MICRO * results.scales["class"], results.scales["time"]
+    words = [
+        f"from {a:.4g} µm" if b is None else (f"{a:.4g} to {b:.4g} µm" if a else f"to {b:.4g} µm")
+        for a, b in zip(low, [*low[1:], None], strict=True)
+    ]
+    with house_style():
+        figure = new_figure(4.8, 2.6)
+        axes = figure.subplots()
+        for colour, word, each in zip(graded_colours(len(low)), words, numbers.T, strict=True):
+            axes.plot(times, each, color=colour, label=word if len(low) > 1 else "all")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("clusters in the box")
+        axes.set_ylim(bottom=0.0)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="r_eq = √(A/π)",
+                    alignment="left")  # fmt: skip
+        return figure
+
+
+def last_known(results: SwarmResults) -> int:
+    """The place of the last time that the first swarm has reached."""
+    known = np.isfinite(results.groups["snapshots"]["position"][0, :, :, 0]).all(axis=1)
+    return int(np.flatnonzero(known)[-1])
+
+
+def sizes_of(labels: np.ndarray) -> np.ndarray:
+    """The size of every body's cluster."""
+    own = labels[labels >= 0]
+    return np.bincount(own)[own] if len(own) else np.zeros(0, dtype=int)
+
+
+def mean(values: np.ndarray) -> np.ndarray:
+    """The mean over swarms that got so far; NaN where none did."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
+
+
+def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
+    """The shape of a body, made of what the file has of it."""
+    bodies = results.groups["bodies"]
+    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
+    radius = float(bodies["spheroradius"][replicate, body])
+    if count == 1:
+        return Sphere(radius)
+    return SpheroPolygon(bodies["points"][replicate, first : first + count], radius)
+
+
+def outlines_of(results: SwarmResults, replicate: int) -> list[np.ndarray]:
+    """The outer outline of every body about its centroid, (k, 2) [m]."""
+    bodies = results.groups["bodies"]["r_eq"].shape[1]
+    found = []
+    for body in range(bodies):
+        ring = shape_of(results, replicate, body).outline(0.0, 0.0, 0.0)[0]
+        found.append(ring[:: max(1, len(ring) // MOST_POINTS)])
+    return found
+
+
+def cluster_colours(labels: np.ndarray) -> list:
+    """A colour for every body: that of its cluster, which follows from its first body."""
+    import matplotlib
+
+    palette = matplotlib.colormaps["tab20"]
+    size = sizes_of(labels)
+    own = np.full(len(labels), 0)
+    own[labels >= 0] = size
+    firsts: dict[int, int] = {}
+    for body, label in enumerate(labels.tolist()):
+        firsts.setdefault(label, body)
+    return [
+        WALL if label < 0 else (palette(firsts[label] % 20) if own[body] > 1 else ALONE)
+        for body, label in enumerate(labels.tolist())
+    ]
+
+
+def draw_bodies(axes, results, replicate, place, outlines=None):
+    """All bodies at a time, inside the box, which repeats itself where it does."""
+    from matplotlib.collections import PolyCollection
+
+    outlines = outlines_of(results, replicate) if outlines is None else outlines
+    width, height = results.groups["bodies"]["box"][replicate]
+    repeats = str(results.run.get("periodic", "xy"))
+    position = results.groups["snapshots"]["position"][replicate, place]
+    colours = cluster_colours(results.groups["snapshots"]["cluster"][replicate, place])
+    polygons, shades = [], []
+    for outline, (x, y, angle), colour in zip(outlines, position, colours, strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        turned = outline @ np.array([[c, s], [-s, c]])
+        if colour != WALL:
+            x, y = (x % width if "x" in repeats else x), (y % height if "y" in repeats else y)
+        reach = np.hypot(*outline.T).max()
+        for i in shifts(x, reach, width, "x" in repeats and colour != WALL):
+            for j in shifts(y, reach, height, "y" in repeats and colour != WALL):
+                polygons.append(MICRO * (turned + [x + i, y + j]))
+                shades.append(colour)
+    axes.add_collection(PolyCollection(polygons, facecolors=shades, edgecolors="0.25", lw=0.2))
+    axes.set_xlim(0.0, MICRO * width)
+    low = 0.0 if "y" in repeats else float(np.nanmin([each[:, 1].min() for each in polygons]))
+    high = MICRO * height
+    axes.set_ylim(max(min(low, 0.0), -0.1 * high) if "y" not in repeats else 0.0, high)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [µm]")
+    for spine in axes.spines.values():
+        spine.set_visible(True)
+
+
+def shifts(place, reach, side, repeats):
+    """By how much a body is shifted to be seen at both sides of a seam that it lies across."""
+    if not repeats:
+        return (0.0,)
+    return (0.0, side) if place < reach else ((0.0, -side) if place > side - reach else (0.0,))
+
+
+def write_swarm_animation(
+    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = redrawn
+) -> None:
+    """Write a swarm at all its times as a GIF that loops; FileError if it cannot be written."""
+    from PIL import Image
+
+    outlines, pictures = outlines_of(results, replicate), []
+    width, height = results.groups["bodies"]["box"][replicate]
+    for place in range(last_known(results) + 1):
+        with house_style():
+            figure = new_figure(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3)
+            axes = figure.subplots()
+            draw_bodies(axes, results, replicate, place, outlines)
+            axes.set_title(f"{results.scales['time'][place]:.4g} s")
+            figure.canvas.draw()
+            pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
+        pictures.append(Image.fromarray(np.ascontiguousarray(pixels)).quantize(64))
+    lasting = [MILLISECONDS] * (len(pictures) - 1) + [LAST]
+    buffer = io.BytesIO()
+    pictures[0].save(buffer, "GIF", save_all=True, append_images=pictures[1:], duration=lasting,
+                     loop=0, optimize=False)  # fmt: skip
+    write_file(path, marked(buffer.getvalue(), ".gif"), rule)
+
+
+SWARM_FIGURES: dict[str, Callable[[SwarmResults], Figure]] = {
+    "snapshots": snapshots,
+    "clusters": clusters,
+    "sizes": sizes,
+    "classes": classes,
+}

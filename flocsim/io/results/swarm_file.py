@@ -1,0 +1,233 @@
+"""The results file of a swarm study: HDF5 with a checksum behind, groups with dimension scales.
+
+- ``counts``     numbers on the clusters of every replicate over time, and clusters by size class
+- ``snapshots``  places, velocities and clusters of all bodies at every time
+- ``bodies``     the bodies of every replicate: sizes, masses, core points, and its box
+- ``ends``       how every replicate ended, and what it took
+- ``run``        scalars: config text, versions, machine
+"""
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.files import Rule, keep, seal, write_file
+from flocsim.io.hdf5.expected import Column as Expected
+from flocsim.io.hdf5.expected import check_root, hold_against
+from flocsim.io.labelled import Column, Labelled
+from flocsim.io.opening import opened_file
+from flocsim.io.results.groups import write_labelled
+
+FORMAT = "flocsim swarm"
+SCHEMA_VERSION = 1
+ROOT = {"format": "text", "schema_version": "i8"}
+
+MOMENTS = ("replicate", "time")
+COUNTS = {
+    "clusters": ("f8", "1", "clusters, single bodies among them"),
+    "largest": ("f8", "1", "bodies of the largest cluster"),
+    "mean_size": ("f8", "1", "bodies of a body's cluster, in the mean over bodies"),
+    "gyration": ("f8", "m", "radius of gyration of a cluster, in the mean over mass"),
+    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass"),
+    "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
+    "settling": ("f8", "m s-1", "downward velocity of clusters, in the mean over mass"),
+    "error": ("f8", "m", "largest stated error of position of a body"),
+}
+"""Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
+
+BY_CLASS = {"n_class": ("f8", "1", "clusters of each size class")}
+SNAPSHOTS = {
+    "position": ("f8", "m, m, rad", "x, y and angle; places go on through a box that repeats"),
+    "velocity": ("f8", "m s-1, m s-1, rad s-1", "velocity and spin"),
+}
+"""Columns (replicate, time, body, component)."""
+
+CLUSTER = {"cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known")}
+BODIES = {
+    "r_eq": ("f8", "m", "equivalent radius"),
+    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core"),
+    "mass": ("f8", "kg", "mass"),
+    "floc": ("i4", "1", "floc of the library or the pool; -1 a sphere, -2 a wall"),
+    "first_point": ("i8", "1", "place in points of the first core point"),
+    "point_count": ("i8", "1", "number of core points"),
+}
+"""Columns (replicate, body)."""
+
+POINTS = {"points": ("f8", "m", "core points of all bodies, about their centroids")}
+BOX = {"box": ("f8", "m", "width and height of the box")}
+ENDS = {
+    "finished": ("i4", "1", "1: came to its end; 0: stopped before it"),
+    "end_time": ("f8", "s", "time at which it ended"),
+    "steps": ("i8", "1", "accepted steps of islands"),
+    "rejected": ("i8", "1", "rejected steps of islands"),
+    "body_steps": ("i8", "1", "accepted steps times the bodies of their islands"),
+    "windows": ("i8", "1", "common times"),
+}
+"""Columns (replicate,)."""
+
+SCALES = {
+    "replicate": ("i8", "1", "number of the replicate"),
+    "time": ("f8", "s", "time since the start"),
+    "class": ("f8", "m", "least equivalent radius of the size class"),
+    "body": ("i8", "1", "number of the body"),
+    "component": ("text", "1", "of a place, and of its rate"),
+    "axis": ("text", "1", "of a point"),
+    "point": ("i8", "1", "number of the core point"),
+}
+COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
+
+GROUPS: dict[str, list[tuple[dict, tuple[str, ...]]]] = {
+    "counts": [(COUNTS, MOMENTS), (BY_CLASS, (*MOMENTS, "class"))],
+    "snapshots": [(SNAPSHOTS, (*MOMENTS, "body", "component")), (CLUSTER, (*MOMENTS, "body"))],
+    "bodies": [
+        (BODIES, ("replicate", "body")), (POINTS, ("replicate", "point", "axis")),
+        (BOX, ("replicate", "axis")),
+    ],
+    "ends": [(ENDS, ("replicate",))],
+}  # fmt: skip
+"""Groups → columns and their axes."""
+
+
+@attrs.frozen(eq=False)
+class SwarmResults:
+    """What a swarm study has found: ``scales`` {axis: values}, ``groups`` {group: {column: array}}
+    as in GROUPS, ``run`` scalars."""
+
+    scales: dict[str, np.ndarray]
+    groups: dict[str, dict[str, np.ndarray]]
+    run: dict[str, Any]
+
+    def __repr__(self) -> str:
+        shape = self.groups["snapshots"]["cluster"].shape
+        return f"SwarmResults({shape[0]} replicates × {shape[1]} times × {shape[2]} bodies)"
+
+    def labelled(self, group: str = "counts") -> Labelled:
+        """A group's arrays with their axes; UsageError for an unknown one."""
+        if group not in GROUPS:
+            raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
+        columns = {
+            name: Column(axes, self.groups[group][name], about_of(schema[name]))
+            for schema, axes in GROUPS[group]
+            for name in schema
+        }
+        used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
+        axes = {
+            axis: Column((axis,), np.asarray(self.scales[axis]), about_of(SCALES[axis]))
+            for axis in used
+        }
+        return Labelled(axes, columns)
+
+    def to_xarray(self, group: str = "counts") -> Any:
+        """A group as an xarray Dataset."""
+        return self.labelled(group).to_xarray()
+
+    def to_pandas(self) -> Any:
+        """The counts as a pandas DataFrame, a row for every replicate and time."""
+        return self.labelled().to_pandas(MOMENTS)
+
+
+def about_of(schema):
+    return {"units": schema[1], "long_name": schema[2]}
+
+
+def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> None:
+    """Write the file, whole or not at all; FileError if that is impossible."""
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
+        for name in GROUPS:
+            write_labelled(file.create_group(name), results.labelled(name))
+        run = file.create_group("run")
+        for name, value in results.run.items():
+            run[name] = value
+    write_file(path, seal(image.getvalue()), rule)
+
+
+def read_swarm(path: str | Path) -> SwarmResults:
+    """The SwarmResults in a file; FileError for one that is absent, damaged, of another kind or
+    version."""
+    with opened_file(path, lambda why: f"{path} holds no readable results of a swarm: {why}") as (
+        file,
+        nodes,
+    ):
+        check_root(nodes, ROOT)
+        found = str(file.attrs["format"]), int(file.attrs["schema_version"])
+        if found != (FORMAT, SCHEMA_VERSION):
+            raise ValueError(f"it is no {FORMAT} of version {SCHEMA_VERSION}")
+        hold_against(nodes, {**expected(), "run": scalars(nodes)}, [*GROUPS, "run"])
+        scales: dict[str, np.ndarray] = {}
+        groups: dict[str, dict[str, np.ndarray]] = {}
+        for name, parts in GROUPS.items():
+            groups[name] = {
+                column: file[name][column][()] for schema, _ in parts for column in schema
+            }
+            for axis in axes_of(parts):
+                dataset = file[name][axis]
+                words = SCALES[axis][0] == "text"
+                values = np.array(dataset.asstr()[()].tolist()) if words else dataset[()]
+                if axis in scales and not np.array_equal(scales[axis], values):
+                    raise ValueError(f"{name}/{axis} is not that of the other groups")
+                scales[axis] = values
+        run = {name: scalar(dataset) for name, dataset in file["run"].items()}
+        check_swarm(scales, groups)
+        return SwarmResults(scales, groups, run)
+
+
+def axes_of(parts: Sequence[tuple[dict, tuple[str, ...]]]) -> list[str]:
+    """The axes of a group, each once."""
+    return list(dict.fromkeys(axis for _, axes in parts for axis in axes))
+
+
+def expected() -> dict[str, dict[str, Expected]]:
+    """{group: {dataset: Expected}}."""
+    groups = {}
+    for name, parts in GROUPS.items():
+        columns = {
+            column: Expected(about[0], axes) for schema, axes in parts
+            for column, about in schema.items()
+        }  # fmt: skip
+        groups[name] = columns | {
+            axis: Expected(SCALES[axis][0], (axis,)) for axis in axes_of(parts)
+        }
+    return groups
+
+
+def scalars(nodes: Mapping[str, Any]) -> dict[str, Expected]:
+    """What the group ``run`` holds: any scalars."""
+    inside = [path for path, node in nodes.items() if path.startswith("run/") and node.type]
+    return {
+        path.partition("/")[2]: Expected(nodes[path].type) for path in inside
+        if nodes[path].type in ("text", "i8", "f8")
+    }  # fmt: skip
+
+
+def scalar(dataset: Any) -> Any:
+    """A scalar of the group ``run``."""
+    value = dataset[()]
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value.item()
+
+
+def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:
+    """ValueError for what no swarm can have been."""
+    bodies = groups["bodies"]
+    first, count = bodies["first_point"], bodies["point_count"]
+    total = bodies["points"].shape[1]
+    if np.any(first < 0) or np.any(count < 1) or np.any(first > total - count):
+        raise ValueError("its bodies have core points that are not there")
+    for name in ("r_eq", "spheroradius"):
+        if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
+            raise ValueError(f"bodies/{name} holds what is no radius")
+    if not np.all((bodies["box"] > 0.0) & np.isfinite(bodies["box"])):
+        raise ValueError("its box has no size")
+    if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
+        raise ValueError("its times do not rise")
+    labels = groups["snapshots"]["cluster"]
+    if np.any(labels < -1) or np.any(labels >= max(labels.shape[-1], 1)):
+        raise ValueError("snapshots/cluster holds what is no cluster")

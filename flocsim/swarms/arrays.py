@@ -1,0 +1,126 @@
+"""The arrays of a swarm: what is known of every body between two common times."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from flocsim.arrays import MOTION_COLUMNS, Scene
+from flocsim.geometry.contact.sweep import DISC_COLUMNS
+
+ERROR_COLUMNS = 4
+"""Columns of ``errors``: ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE and SWITCH_SPEED of a run."""
+
+BEGIN, END, HORIZON_AT, TIME_COUNT = range(4)
+"""Places in ``times``: when the window begins and ends, and when the run does [s]."""
+
+LATER_BODY, EARLIER_BODY, AT_VERTEX, AT_EDGE, LINK_COLUMNS = range(5)
+"""Columns of ``links``: the bodies of a contact with a tangential displacement, the later one
+first; core point of the vertex and first one of the edge, of all bodies'."""
+
+SLIP, OFFSET = range(2)
+"""Columns of ``slips``: the displacement [m] and the error that it is carried with."""
+
+STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
+"""Columns of ``costs``, of every island."""
+
+(
+    START_X, START_Y, PATH_VX, PATH_VY, SINCE, ALLOWED, FURTHEST, TRACK_COLUMNS,
+) = range(8)  # fmt: skip
+"""Columns of what an island's observer sees, of every body: the straight path that it is expected
+to go, and from when; how far it may stray from it, and how far it has [m]."""
+
+
+class Swarm(NamedTuple):
+    """n bodies at a common time.
+
+    ``bodies`` (n, 7), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
+    ``carried`` (n, 6), ``errors`` (n, 4), ``steps`` (n,): the state, the vector of its error, what
+    the errors of steps and switches have led to, the size of the next step [s].  ``wander`` (n,):
+    how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),
+    ``links`` (k, 4), ``slips`` (k, 2): contacts with a tangential displacement, those of later body
+    b from ``first_link[b]`` on.  ``new_motion`` … ``strayed``: the same at the window's end, the
+    stated error of every body [m], and how far it strayed.  ``discs``, ``order``, ``starts``: what
+    the sweep for neighbours works on.  ``times``: see BEGIN.
+    """
+
+    bodies: np.ndarray
+    first: np.ndarray
+    vertices: np.ndarray
+    tree: np.ndarray
+    motion: np.ndarray
+    carried: np.ndarray
+    errors: np.ndarray
+    steps: np.ndarray
+    wander: np.ndarray
+    first_link: np.ndarray
+    links: np.ndarray
+    slips: np.ndarray
+    new_motion: np.ndarray
+    new_carried: np.ndarray
+    new_errors: np.ndarray
+    new_steps: np.ndarray
+    stated: np.ndarray
+    strayed: np.ndarray
+    discs: np.ndarray
+    order: np.ndarray
+    starts: np.ndarray
+    times: np.ndarray
+
+
+def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float) -> Swarm:
+    """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet."""
+    n = len(scene.bodies)
+    motion = np.ascontiguousarray(np.hstack([position, velocity]))
+    return Swarm(
+        bodies=scene.bodies,
+        first=scene.first,
+        vertices=scene.vertices,
+        tree=scene.tree,
+        motion=motion,
+        carried=np.zeros((n, MOTION_COLUMNS)),
+        errors=np.zeros((n, ERROR_COLUMNS)),
+        steps=np.full(n, float(first_step)),
+        wander=np.zeros(n),
+        first_link=np.zeros(n + 1, dtype=np.int64),
+        links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
+        slips=np.zeros((0, 2)),
+        new_motion=motion.copy(),
+        new_carried=np.zeros((n, MOTION_COLUMNS)),
+        new_errors=np.zeros((n, ERROR_COLUMNS)),
+        new_steps=np.full(n, float(first_step)),
+        stated=np.zeros(n),
+        strayed=np.zeros(n),
+        discs=np.zeros((n, DISC_COLUMNS)),
+        order=np.arange(n, dtype=np.int64),
+        starts=np.zeros(n + 1, dtype=np.int64),
+        times=np.zeros(TIME_COUNT),
+    )
+
+
+class Found(NamedTuple):
+    """What islands have left behind: ``links`` (room, 4) and ``slips`` (room, 2), filled up to
+    ``filled[0]``."""
+
+    links: np.ndarray
+    slips: np.ndarray
+    filled: np.ndarray
+
+
+def found_of(room: int) -> Found:
+    """Room for so many contacts."""
+    return Found(
+        np.zeros((room, LINK_COLUMNS), dtype=np.int64),
+        np.zeros((room, 2)),
+        np.zeros(1, dtype=np.int64),
+    )
+
+
+def with_links(swarm: Swarm, parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> Swarm:
+    """The swarm with the contacts (links, slips) of all islands, in the order of their bodies."""
+    links = np.concatenate([links for links, _ in parts] or [swarm.links[:0]])
+    slips = np.concatenate([slips for _, slips in parts] or [swarm.slips[:0]])
+    order = np.lexsort(links.T[::-1])
+    links, slips = np.ascontiguousarray(links[order]), np.ascontiguousarray(slips[order])
+    first = np.searchsorted(links[:, LATER_BODY], np.arange(len(swarm.bodies) + 1))
+    return swarm._replace(links=links, slips=slips, first_link=first.astype(np.int64))

@@ -1,0 +1,289 @@
+"""An island of a swarm advanced over a window, by the loop that all runs go through.
+
+The bodies of an island are copied into arrays of their own, in their order, run from the window's
+beginning to its end, and copied back: nothing of the swarm changes before, so that a window can be
+tried again. Islands know nothing of each other; in which order they run, and in how many threads,
+changes no number.
+"""
+
+import math
+
+from flocsim.arrays import (
+    CANDIDATES_FULL,
+    CARRIED,
+    CLOCK_SIZE,
+    COUNTS_SIZE,
+    ERROR,
+    ERROR_PLACE,
+    EVALUATIONS,
+    FREE,
+    FULL,
+    HORIZON,
+    KEPT,
+    KEPT_EARLIER,
+    KEPT_EDGE,
+    KEPT_LATER,
+    KEPT_OFFSET,
+    KEPT_SLIP,
+    KEPT_VERTEX,
+    MOTION_COLUMNS,
+    MOTION_ROWS,
+    NOW,
+    PAIRS,
+    REJECTED,
+    STATES,
+    STEP,
+    STEPS,
+    TALLY_SIZE,
+    TIME,
+    UNTIL,
+    VX,
+    VY,
+    X,
+    Y,
+)
+from flocsim.geometry.contact.body_pairs import watches_all
+from flocsim.geometry.contact.slip_transfer import keep_slips
+from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
+from flocsim.swarms.arrays import (
+    ALLOWED,
+    AT_EDGE,
+    AT_VERTEX,
+    BEGIN,
+    EARLIER_BODY,
+    END,
+    ERROR_COLUMNS,
+    FORCES_SUMMED,
+    FURTHEST,
+    HORIZON_AT,
+    LATER_BODY,
+    OFFSET,
+    PATH_VX,
+    PATH_VY,
+    SINCE,
+    SLIP,
+    START_X,
+    START_Y,
+    STEPS_REJECTED,
+    STEPS_TAKEN,
+)
+
+STRAYED = 1
+"""The observer's code where a body strays from its path by more than it may."""
+
+
+def watch_paths(scene, work, observed, time):
+    """Stop an island whose bodies stray too far from the paths on which others count."""
+    strays = False
+    for body in range(work.bodies.shape[0]):
+        if scene.bodies[body, FREE] == 1.0:
+            since = time - observed[body, SINCE]
+            x = (
+                work.motion[NOW, body, X]
+                - observed[body, START_X]
+                - since * observed[body, PATH_VX]
+            )
+            y = (
+                work.motion[NOW, body, Y]
+                - observed[body, START_Y]
+                - since * observed[body, PATH_VY]
+            )
+            away = math.hypot(x, y)
+            observed[body, FURTHEST] = max(observed[body, FURTHEST], away)
+            strays = strays or away > observed[body, ALLOWED]
+    return STRAYED if strays else 0
+
+
+def put_scene(swarm, scene, members, first):
+    """The bodies of an island, from ``members[first]`` on, into its scene."""
+    point = 0
+    for body in range(scene.bodies.shape[0]):
+        member = members[first + body]
+        for column in range(scene.bodies.shape[1]):
+            scene.bodies[body, column] = swarm.bodies[member, column]
+        scene.first[body] = point
+        begin, end = swarm.first[member], swarm.first[member + 1]
+        for each in range(begin, end):
+            for axis in range(2):
+                scene.vertices[point + each - begin, axis] = swarm.vertices[each, axis]
+        for row in range(2 * (end - begin)):
+            for column in range(3):
+                scene.tree[2 * point + row, column] = swarm.tree[2 * begin + row, column]
+        point += end - begin
+    scene.first[scene.bodies.shape[0]] = point
+
+
+def put_state(swarm, work, members, first):
+    """The state of its bodies into its work; nothing else of that is left from before."""
+    for body in range(work.bodies.shape[0]):
+        member = members[first + body]
+        for row in range(MOTION_ROWS):
+            for axis in range(MOTION_COLUMNS):
+                work.motion[row, body, axis] = 0.0
+        for row in range(STATES):
+            for axis in range(MOTION_COLUMNS):
+                work.rates[row, body, axis] = 0.0
+        for column in range(work.bodies.shape[1]):
+            work.bodies[body, column] = 0.0
+        for axis in range(MOTION_COLUMNS):
+            work.motion[NOW, body, axis] = swarm.motion[member, axis]
+            work.motion[CARRIED, body, axis] = swarm.carried[member, axis]
+        for kind in range(ERROR_COLUMNS):
+            work.bodies[body, ERROR_PLACE + kind] = swarm.errors[member, kind]
+        work.order[body] = body
+        work.cluster[body] = body
+    for place in range(TALLY_SIZE):
+        work.tally[place] = 0
+    for place in range(work.elimination.found.shape[0]):
+        work.elimination.found[place] = 0
+
+
+def local_of(members, first, size, body):
+    """The number of a body in its island, −1 where it is not of it; members are sorted."""
+    low, high = 0, size
+    while low < high - 1:
+        middle = (low + high) // 2
+        if members[first + middle] <= body:
+            low = middle
+        else:
+            high = middle
+    return low if members[first + low] == body else -1
+
+
+def put_slips(swarm, scene, work, members, first):
+    """The displacements of its contacts among those that the first list takes up; False without
+    room."""
+    count, size = 0, work.bodies.shape[0]
+    for body in range(size):
+        member = members[first + body]
+        for link in range(swarm.first_link[member], swarm.first_link[member + 1]):
+            other = local_of(members, first, size, swarm.links[link, EARLIER_BODY])
+            if other < 0:
+                continue
+            if count == work.kept.shape[0]:
+                return False
+            work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = body, other
+            work.kept[count, KEPT_VERTEX] = local_point(
+                swarm, scene, members, first, size, swarm.links[link, AT_VERTEX], body, other
+            )
+            work.kept[count, KEPT_EDGE] = local_point(
+                swarm, scene, members, first, size, swarm.links[link, AT_EDGE], body, other
+            )
+            work.slip[KEPT_SLIP, count] = swarm.slips[link, SLIP]
+            work.slip[KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
+            count += 1
+    work.tally[KEPT] = count + 1
+    return True
+
+
+def local_point(swarm, scene, members, first, size, point, body, other):
+    """The number in an island of a core point of one of two bodies."""
+    member = members[first + body]
+    if not swarm.first[member] <= point < swarm.first[member + 1]:
+        body, member = other, members[first + other]
+    return scene.first[body] + point - swarm.first[member]
+
+
+def global_point(swarm, scene, members, first, point, body, other):
+    """The other way round."""
+    if not scene.first[body] <= point < scene.first[body + 1]:
+        body = other
+    return swarm.first[members[first + body]] + point - scene.first[body]
+
+
+def put_times(
+    swarm, work, observed, clock, counts, start_clock, start_counts, members, first, all_in
+):
+    """Clock, counts, and the paths that its bodies are expected to go."""
+    for place in range(CLOCK_SIZE):
+        clock[place] = start_clock[place]
+    for place in range(COUNTS_SIZE):
+        counts[place] = start_counts[place]
+    clock[TIME], clock[UNTIL] = swarm.times[BEGIN], swarm.times[END]
+    clock[HORIZON] = swarm.times[HORIZON_AT]
+    step = math.inf
+    for body in range(work.bodies.shape[0]):
+        member = members[first + body]
+        if swarm.bodies[member, FREE] == 1.0:
+            step = min(step, swarm.steps[member])
+        observed[body, START_X], observed[body, START_Y] = (
+            swarm.motion[member, X],
+            swarm.motion[member, Y],
+        )
+        observed[body, PATH_VX] = swarm.motion[member, VX]
+        observed[body, PATH_VY] = swarm.motion[member, VY]
+        observed[body, SINCE], observed[body, FURTHEST] = swarm.times[BEGIN], 0.0
+        observed[body, ALLOWED] = math.inf if all_in else swarm.wander[member]
+    clock[STEP] = step if step < math.inf else start_clock[STEP]
+
+
+def take_slips(swarm, scene, work, found, members, first):
+    """Write down the displacements of its contacts; False without room."""
+    count, begin = keep_slips(work), found.filled[0]
+    work.tally[KEPT] = 0
+    if begin + count > found.links.shape[0]:
+        return False
+    for kept in range(count):
+        later, earlier = work.kept[kept, KEPT_LATER], work.kept[kept, KEPT_EARLIER]
+        row = begin + kept
+        found.links[row, LATER_BODY] = members[first + later]
+        found.links[row, EARLIER_BODY] = members[first + earlier]
+        found.links[row, AT_VERTEX] = global_point(
+            swarm, scene, members, first, work.kept[kept, KEPT_VERTEX], later, earlier
+        )
+        found.links[row, AT_EDGE] = global_point(
+            swarm, scene, members, first, work.kept[kept, KEPT_EDGE], later, earlier
+        )
+        found.slips[row, SLIP] = work.slip[KEPT_SLIP, kept]
+        found.slips[row, OFFSET] = work.slip[KEPT_OFFSET, kept]
+    found.filled[0] = begin + count
+    return True
+
+
+def take_state(swarm, work, observed, clock, members, first):
+    """Write the state of its bodies at the window's end."""
+    for body in range(work.bodies.shape[0]):
+        member = members[first + body]
+        swarm.strayed[member] = observed[body, FURTHEST]
+        if swarm.bodies[member, FREE] == 0.0:
+            continue
+        for axis in range(MOTION_COLUMNS):
+            swarm.new_motion[member, axis] = work.motion[NOW, body, axis]
+            swarm.new_carried[member, axis] = work.motion[CARRIED, body, axis]
+        for kind in range(ERROR_COLUMNS):
+            swarm.new_errors[member, kind] = work.bodies[body, ERROR_PLACE + kind]
+        swarm.new_steps[member] = clock[STEP]
+        swarm.stated[member] = clock[ERROR]
+
+
+def run_islands(
+    swarm, scene, work, observed, clock, counts, record, start_clock, start_counts,
+    members, starts, codes, costs, found, first, last, all_in,
+):  # fmt: skip
+    """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
+    their Status into ``codes``. How far that went: to one that found no room, or to the last."""
+    for island in range(first, last):
+        begin = starts[island]
+        put_scene(swarm, scene, members, begin)
+        put_state(swarm, work, members, begin)
+        for pair in range(work.budget.shape[0]):
+            work.budget[pair] = -1.0
+        if watches_all(work):
+            work.tally[PAIRS] = work.pairs.shape[0]
+        if not put_slips(swarm, scene, work, members, begin):
+            work.tally[FULL] = CANDIDATES_FULL
+            return island
+        put_times(
+            swarm, work, observed, clock, counts, start_clock, start_counts, members, begin, all_in
+        )
+        code = advance(scene, work, observed, clock, counts, record)
+        if code == NO_ROOM:
+            return island
+        if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
+            return island
+        codes[island] = code
+        costs[island, STEPS_TAKEN] = counts[STEPS]
+        costs[island, STEPS_REJECTED] = counts[REJECTED]
+        costs[island, FORCES_SUMMED] = work.tally[EVALUATIONS]
+        take_state(swarm, work, observed, clock, members, begin)
+    return last

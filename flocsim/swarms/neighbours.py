@@ -1,0 +1,99 @@
+"""Which bodies can reach each other before a window ends: the islands of the window.
+
+Each body is expected to go straight on, and allowed to stray from that path by so much
+(``wander``): discs of its bounding radius, that way, and half of what acts reaches, which move
+along their paths (sweep.py). Where two of them meet, the bodies are of one island. Fixed bodies do
+not pass on what acts on them: each is a part of all islands that can reach it.
+"""
+
+import math
+
+from flocsim.arrays import ANGLE, BOUNDING_RADIUS, FREE, RADIUS, SPIN, VX, VY, X, Y
+from flocsim.geometry.contact.sweep import (
+    MOVES,
+    PLACE_X,
+    PLACE_Y,
+    REACH,
+    WAY_X,
+    WAY_Y,
+    near_pairs,
+    nearest_way,
+)
+from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+
+
+def set_discs(swarm, span, reach):
+    """The discs of a window of so many seconds."""
+    for body in range(swarm.bodies.shape[0]):
+        disc = swarm.discs[body]
+        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, X], swarm.motion[body, Y]
+        disc[WAY_X], disc[WAY_Y] = span * swarm.motion[body, VX], span * swarm.motion[body, VY]
+        disc[REACH] = swarm.bodies[body, BOUNDING_RADIUS] + swarm.wander[body]
+        disc[REACH] += 0.5 * reach
+        disc[MOVES] = swarm.bodies[body, FREE]
+        if disc[MOVES] == 0.0:
+            # Found below, by its outline: its circle may be as wide as the box.
+            disc[WAY_X] = disc[WAY_Y] = disc[REACH] = 0.0
+            disc[PLACE_X] = disc[PLACE_Y] = 0.0
+
+
+def core_distance2(swarm, wall, x, y):
+    """Squared distance of a point from the core of a fixed body [m²]; the point as seen from it."""
+    cosine, sine = math.cos(swarm.motion[wall, ANGLE]), math.sin(swarm.motion[wall, ANGLE])
+    x, y = cosine * x + sine * y, cosine * y - sine * x
+    first, v, least = swarm.first[wall], swarm.vertices, math.inf
+    points = swarm.first[wall + 1] - first
+    for start in range(first, first + max(edge_count(points), 1)):
+        end = edge_end(first, points, start) if points > 1 else start
+        distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
+        least = min(least, distance2)
+    return least
+
+
+def reaches_wall(swarm, body, wall, span, reach, width, height):
+    """Whether a body can come to act on a fixed one in a window."""
+    m = swarm.motion
+    x = nearest_way(m[body, X] - m[wall, X], width)
+    y = nearest_way(m[body, Y] - m[wall, Y], height)
+    way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
+    way += span * abs(m[wall, SPIN]) * swarm.bodies[wall, BOUNDING_RADIUS]
+    near = swarm.bodies[body, BOUNDING_RADIUS] + swarm.bodies[wall, RADIUS] + reach
+    near += way + swarm.wander[body]
+    return core_distance2(swarm, wall, x, y) < near * near
+
+
+def first_of(labels, body):
+    while labels[body] != body:
+        labels[body] = labels[labels[body]]
+        body = labels[body]
+    return body
+
+
+def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
+    """Name every free body by the first one of its island, fixed ones by −1, and note in
+    ``touches`` (n, k) which of the fixed bodies ``walls`` (k,) it can reach.
+
+    Returns the number of near pairs: more than ``pairs`` has room for where that was too few.
+    """
+    n = swarm.bodies.shape[0]
+    set_discs(swarm, span, reach)
+    total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+    if total > pairs.shape[0]:
+        return total
+    for body in range(n):
+        labels[body] = body
+    for pair in range(total):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        if swarm.bodies[a, FREE] * swarm.bodies[b, FREE] == 1.0:
+            one, other = first_of(labels, a), first_of(labels, b)
+            labels[max(one, other)] = min(one, other)
+    for body in range(n):
+        labels[body] = labels[labels[body]]
+        free = swarm.bodies[body, FREE] == 1.0
+        for each in range(walls.shape[0]):
+            touches[body, each] = free and reaches_wall(
+                swarm, body, walls[each], span, reach, width, height
+            )
+    for wall in walls:
+        labels[wall] = -1
+    return total

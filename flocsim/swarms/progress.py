@@ -1,0 +1,215 @@
+"""A swarm in progress: from one common time to the next.
+
+A window is tried until no body of it strays further from its straight path than others have counted
+on: those that did may stray further in the next try, islands that merge by that are run anew, and
+after some tries the window is made shorter. What islands have come to is taken over all at once, so
+that a window leaves nothing behind that is half done.
+"""
+
+import math
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import BOUNDING_RADIUS, FREE, VX, VY
+from flocsim.integrators.base import Status
+from flocsim.swarms.arrays import (
+    BEGIN,
+    END,
+    FORCES_SUMMED,
+    HORIZON_AT,
+    STEPS_REJECTED,
+    STEPS_TAKEN,
+    Swarm,
+    with_links,
+)
+from flocsim.swarms.runner import Islands, Runner
+
+LEAST_WANDER = 0.02
+"""A body may stray by so many bounding radii at least."""
+
+MORE_WANDER, LESS_WANDER = 2.0, 0.7
+"""It may stray by so many times as far as it has, and by no less than this share of as far as it
+might before."""
+
+MOST_TRIES = 4
+"""Tries of a window before it is made shorter."""
+
+CROWDED, SPARSE = 3.0, 1.5
+"""Windows get shorter where their islands take more than so many times the work of the least ones,
+those of no time at all, longer where they take less."""
+
+SHORTER, LONGER = 0.6, 1.4
+
+FIRST_WAY = 0.1
+"""Bodies go so many radii against each other in the first window."""
+
+LONGEST_WAY = 0.2
+"""Bodies go by no more than this share of a periodic box against each other in a window."""
+
+ALL_BUT = 0.999
+"""A window that ends behind this share of what is left ends with it."""
+
+
+OF_CONTACTS = ("links", "slips")
+STATE = ("motion", "carried", "errors", "steps", "wander", *OF_CONTACTS)
+"""Arrays of a swarm that the rest of a run follows from."""
+
+
+@attrs.define
+class Effort:
+    """What a swarm has taken so far: windows and their tries; steps of islands, taken and rejected,
+    those times their bodies; forces summed."""
+
+    windows: int = 0
+    tries: int = 0
+    steps: int = 0
+    rejected: int = 0
+    body_steps: int = 0
+    evaluations: int = 0
+
+    def add(self, islands: Islands) -> None:
+        """Add what islands have taken."""
+        self.tries += 1
+        steps = islands.costs[:, STEPS_TAKEN]
+        self.steps += int(steps.sum())
+        self.rejected += int(islands.costs[:, STEPS_REJECTED].sum())
+        self.body_steps += int(np.sum(steps * islands.sizes))
+        self.evaluations += int(islands.costs[:, FORCES_SUMMED].sum())
+
+
+class Progress:
+    """A swarm on its way.
+
+    Parameters: ``runner``; ``swarm``, its arrays; ``box`` [m]; ``reach`` [m] of all forces;
+    ``until`` [s].
+    """
+
+    def __init__(
+        self, runner: Runner, swarm: Swarm, box: tuple[float, float], reach: float, until: float
+    ) -> None:
+        self.runner, self.swarm, self.box, self.reach = runner, swarm, box, reach
+        self.free = swarm.bodies[:, FREE] == 1.0
+        self.least_wander = LEAST_WANDER * swarm.bodies[:, BOUNDING_RADIUS]
+        swarm.wander[:] = self.least_wander
+        swarm.times[HORIZON_AT] = until
+        self.time, self.error, self.effort = 0.0, 0.0, Effort()
+        self.span = min(self.time_to_go(FIRST_WAY * self.mean_radius), 1e-3 * until)
+        self.failed: np.ndarray | None = None
+
+    @property
+    def mean_radius(self) -> float:
+        """The mean bounding radius of the bodies that move [m]."""
+        return float(np.mean(self.swarm.bodies[self.free, BOUNDING_RADIUS]))
+
+    def time_to_go(self, way: float) -> float:
+        """The time in which no body goes further than that against the mean of all [s]."""
+        velocity = self.swarm.motion[self.free][:, [VX, VY]]
+        fastest = float(np.hypot(*(velocity - velocity.mean(axis=0)).T).max())
+        return way / fastest if fastest > 0.0 else math.inf
+
+    def longest_span(self) -> float:
+        """The longest window in which the images of bodies can be told apart [s]."""
+        side = min(self.box)
+        return self.time_to_go(LONGEST_WAY * side) if side < math.inf else math.inf
+
+    def seen(self) -> tuple[float, np.ndarray, float]:
+        """(time [s], motion (n, 6), the largest stated error [m]) now."""
+        return self.time, self.swarm.motion.copy(), self.error
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All that the rest of the run follows from, as arrays by name."""
+        swarm = self.swarm
+        numbers = {"time": self.time, "span": self.span, "error": self.error}
+        return {
+            **{name: getattr(swarm, name).copy() for name in STATE},
+            **{name: np.array(value) for name, value in numbers.items()},
+            "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
+        }
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from a `state` of a run of the same swarm: to the same bytes as that run itself."""
+        for name in STATE:
+            if name not in OF_CONTACTS:
+                getattr(self.swarm, name)[...] = state[name]
+        self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
+        self.time, self.span, self.error = (
+            float(state[name]) for name in ("time", "span", "error")
+        )
+        self.effort = Effort(*state["effort"].tolist())
+
+    def advance(self, stop: float) -> Status:
+        """Go on to the next common time, ``stop`` at the latest: PAUSED, FINISHED where that is
+        ``stop``, or the Status with which an island ended for good, ``failed`` being its bodies.
+        """
+        swarm, span = self.swarm, min(self.span, self.longest_span())
+        least = swarm._replace(wander=self.least_wander)
+        clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
+        kept: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+        for tried in range(1, 1000):
+            whole = span >= ALL_BUT * (stop - self.time)
+            swarm.times[BEGIN], swarm.times[END] = self.time, stop if whole else self.time + span
+            length = swarm.times[END] - self.time
+            islands = self.runner.islands_of(swarm, length, self.reach, self.box)
+            status = self.run_fresh(islands, kept)
+            if status == Status.FINISHED:
+                break
+            if status != Status.STOPPED:
+                return status
+            if tried % MOST_TRIES == 0:
+                self.span = span = 0.5 * length
+                kept = {}
+        self.take_over(list(kept.values()), islands)
+        if not whole:
+            self.choose_span(span, islands.work / clusters.work)
+        return Status.FINISHED if whole else Status.PAUSED
+
+    def run_fresh(self, islands: Islands, kept: dict) -> Status:
+        """Run the islands that are not among the finished ones; FINISHED where all are now, STOPPED
+        where bodies have strayed, which may stray further from now on."""
+        keys = [islands.key(each) for each in range(len(islands.sizes))]
+        for key in kept.keys() - set(keys):
+            del kept[key]
+        fresh = islands.chosen([each for each, key in enumerate(keys) if key not in kept])
+        links, slips = self.runner.run(self.swarm, fresh, all_in=len(keys) == 1)
+        self.effort.add(fresh)
+        owners = np.full(len(self.free), -1)
+        found = Status.FINISHED
+        for each, code in enumerate(fresh.codes):
+            members = fresh.members_of(each)
+            owners[members[self.free[members]]] = each
+            if code == Status.STOPPED:
+                found = Status.STOPPED
+                wander, strayed = self.swarm.wander[members], self.swarm.strayed[members]
+                self.swarm.wander[members] = np.maximum(2.0 * wander, MORE_WANDER * strayed)
+            elif code != Status.FINISHED:
+                self.failed = members
+                return Status(code)
+        own = np.maximum(owners[links[:, 0]], owners[links[:, 1]])
+        for each in np.flatnonzero(fresh.codes == Status.FINISHED).tolist():
+            kept[fresh.key(each)] = links[own == each], slips[own == each]
+        return found
+
+    def take_over(self, contacts: list[tuple[np.ndarray, np.ndarray]], islands: Islands) -> None:
+        """Make what the islands have come to the state of the swarm."""
+        swarm, free = self.swarm, self.free
+        for old, new in (
+            (swarm.motion, swarm.new_motion), (swarm.carried, swarm.new_carried),
+            (swarm.errors, swarm.new_errors), (swarm.steps, swarm.new_steps),
+        ):  # fmt: skip
+            old[free] = new[free]
+        length = swarm.times[END] - swarm.times[BEGIN]
+        swarm.motion[~free, :VX] += length * swarm.motion[~free, VX:]
+        strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
+        np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
+        self.swarm = with_links(swarm, contacts)
+        self.time, self.error = float(swarm.times[END]), float(swarm.stated.max())
+        self.effort.windows += 1
+
+    def choose_span(self, span: float, crowd: float) -> None:
+        """The length of the next window from that of the last one, and the work that its islands
+        took over that of the least ones."""
+        if crowd > CROWDED:
+            self.span = SHORTER * span
+        elif crowd < SPARSE:
+            self.span = LONGER * span

@@ -1,0 +1,209 @@
+"""Islands of a window as arrays, and how threads run them."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import FREE, FULL, NOTHING_FULL, Scene, Work, with_room, work_of
+from flocsim.integrators.base import Integrator
+from flocsim.swarms.arrays import COST_COLUMNS, TRACK_COLUMNS, Found, Swarm, found_of
+
+FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
+"""Room at first for pairs of features, for every body of so few, and of more."""
+
+CHUNK = 64
+"""Bodies of islands that a thread takes at once."""
+
+
+@attrs.define
+class IslandArrays:
+    """Arrays for islands of a number of bodies."""
+
+    scene: Scene
+    work: Work
+    observed: np.ndarray
+    clock: np.ndarray
+    counts: np.ndarray
+
+
+class ThreadArrays:
+    """The arrays of one thread: for islands of every size that there is, and what they found."""
+
+    def __init__(self, template: Scene) -> None:
+        self.template, self.most_points = template, int(np.diff(template.first).max())
+        self.by_size: dict[int, IslandArrays] = {}
+        self.found: Found = found_of(256)
+
+    def of_size(self, size: int, integrator: Integrator) -> IslandArrays:
+        """Arrays for islands of so many bodies."""
+        if size not in self.by_size:
+            points = size * self.most_points
+            scene = self.template._replace(
+                bodies=np.ones((size, self.template.bodies.shape[1])),
+                first=np.zeros(size + 1, dtype=np.int64),
+                vertices=np.zeros((points, 2)),
+                tree=np.zeros((2 * points, 3)),
+            )
+            zeros = np.zeros((size, 3))
+            room = size * (ROOM_OF_FEW if 1 < size <= FEW else ROOM_OF_MANY)
+            work = work_of(scene, zeros, zeros, room, pairs=4 * size, blocks=8 * size)
+            self.by_size[size] = IslandArrays(
+                scene, work, np.zeros((size, TRACK_COLUMNS)),
+                integrator.fresh_clock(), integrator.fresh_counts(0),
+            )  # fmt: skip
+        return self.by_size[size]
+
+    def forget_above(self, size: int) -> None:
+        """Give back the arrays for more bodies than that: no island is so large any more."""
+        for each in [each for each in self.by_size if each > size]:
+            del self.by_size[each]
+
+
+@attrs.define
+class Islands:
+    """The islands of a window: members of each, sorted, fixed bodies among them."""
+
+    members: np.ndarray
+    starts: np.ndarray
+    codes: np.ndarray
+    costs: np.ndarray
+
+    @classmethod
+    def of(cls, labels: np.ndarray, walls: np.ndarray, touches: np.ndarray) -> "Islands":
+        """From the name of every body's island, and which fixed bodies it can reach."""
+        bodies, names = np.arange(len(labels)), labels
+        free = labels >= 0
+        rows, columns = np.nonzero(touches[free]) if len(walls) else ((), ())
+        bodies = np.concatenate([bodies[free], walls[np.array(columns, dtype=int)]])
+        names = np.concatenate([names[free], names[free][np.array(rows, dtype=int)]])
+        pairs = np.unique(np.column_stack([names, bodies]), axis=0)
+        starts = np.flatnonzero(np.diff(pairs[:, 0], prepend=-1))
+        starts = np.append(starts, len(pairs)).astype(np.int64)
+        count = len(starts) - 1
+        return cls(
+            np.ascontiguousarray(pairs[:, 1]), starts, np.zeros(count, dtype=np.int64),
+            np.zeros((count, COST_COLUMNS), dtype=np.int64),
+        )  # fmt: skip
+
+    @property
+    def sizes(self) -> np.ndarray:
+        return np.diff(self.starts)
+
+    def key(self, island: int) -> bytes:
+        """What tells an island from others."""
+        return self.members_of(island).tobytes()
+
+    def members_of(self, island: int) -> np.ndarray:
+        """The bodies of an island, in their order."""
+        return self.members[self.starts[island] : self.starts[island + 1]]
+
+    def chosen(self, which: Sequence[int]) -> "Islands":
+        """Some of them, the largest first, those of a size one after another."""
+        order = np.array(which, dtype=int)
+        order = order[np.argsort(-self.sizes[order], kind="stable")]
+        members = [self.members_of(each) for each in order]
+        starts = np.concatenate([[0], np.cumsum(self.sizes[order])]).astype(np.int64)
+        return Islands(
+            np.concatenate([self.members[:0], *members]),
+            starts, self.codes[order], self.costs[order],
+        )  # fmt: skip
+
+    @property
+    def work(self) -> float:
+        """What they cost as long as all steps are alike: bodies of each, times bodies."""
+        return float(np.sum(self.sizes.astype(float) ** 2))
+
+
+@attrs.define
+class Runner:
+    """Finds and runs islands: the compiled functions, and each thread's arrays."""
+
+    finder: Callable[..., int]
+    driver: Callable[..., int]
+    integrator: Integrator
+    threads: list[ThreadArrays]
+    max_steps: int
+    pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
+
+    def islands_of(
+        self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
+    ) -> Islands:
+        """The islands of a window of so many seconds."""
+        walls = np.flatnonzero(swarm.bodies[:, FREE] == 0.0)
+        labels = np.zeros(len(swarm.bodies), dtype=np.int64)
+        touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
+        while True:
+            found = self.finder(swarm, span, reach, *box, self.pairs, labels, walls, touches)
+            if found <= len(self.pairs):
+                return Islands.of(labels, walls, touches)
+            self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
+
+    def run_chunk(
+        self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int, all_in: bool
+    ) -> None:
+        """Run islands of one size."""
+        place = own.of_size(int(islands.sizes[first]), self.integrator)
+        start_clock = self.integrator.fresh_clock()
+        start_counts = self.integrator.fresh_counts(self.max_steps)
+        record = np.zeros((0, 1))
+        while True:
+            first = self.driver(
+                swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
+                start_clock, start_counts, islands.members, islands.starts, islands.codes,
+                islands.costs, own.found, first, last, all_in,
+            )  # fmt: skip
+            if first == last:
+                return
+            if place.work.tally[FULL] == NOTHING_FULL:
+                own.found = larger(own.found)
+            else:
+                place.work = with_room(place.work)
+
+    def run(self, swarm: Swarm, islands: Islands, all_in: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Run islands, those of a size one after another, in all threads: the contacts that they
+        leave behind (links and slips), in any order."""
+        chunks = chunks_of(islands.sizes)
+
+        def work_off(own: ThreadArrays) -> None:
+            own.found.filled[0] = 0
+            own.forget_above(int(islands.sizes.max(initial=0)))
+            while chunks:
+                try:
+                    first, last = chunks.pop()
+                except IndexError:
+                    return
+                self.run_chunk(own, swarm, islands, first, last, all_in)
+
+        if len(self.threads) == 1:
+            work_off(self.threads[0])
+        else:
+            with ThreadPoolExecutor(len(self.threads)) as pool:
+                list(pool.map(work_off, self.threads))
+        counts = [int(own.found.filled[0]) for own in self.threads]
+        both = list(zip(self.threads, counts, strict=True))
+        links = np.concatenate([own.found.links[:count] for own, count in both])
+        return links, np.concatenate([own.found.slips[:count] for own, count in both])
+
+
+def larger(found: Found) -> Found:
+    """The same with twice the room."""
+    other = found_of(2 * len(found.links))
+    count = found.filled[0]
+    other.links[:count], other.slips[:count] = found.links[:count], found.slips[:count]
+    other.filled[0] = count
+    return other
+
+
+def chunks_of(sizes: np.ndarray) -> list[tuple[int, int]]:
+    """(first, last) of islands of one size that a thread takes at once, the smallest first: they
+    are taken from behind."""
+    found, first = [], 0
+    while first < len(sizes):
+        last, most = first + 1, max(1, CHUNK // int(sizes[first]))
+        while last < len(sizes) and sizes[last] == sizes[first] and last - first < most:
+            last += 1
+        found.append((first, last))
+        first = last
+    return found[::-1]

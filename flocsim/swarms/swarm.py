@@ -1,0 +1,216 @@
+"""Swarm: many bodies in a fluid, and the run of them."""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.body import NO_BOX, Body, Fluid
+from flocsim.compiler.composer import compose
+from flocsim.errors import UsageError
+from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.forces.base import Force
+from flocsim.geometry.contact.overlap import overlap_fault
+from flocsim.geometry.contact.separation import PERIODIC
+from flocsim.hooks import observe
+from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.implicit import Implicit
+from flocsim.laws import compiled_calls
+from flocsim.swarms.arrays import swarm_of
+from flocsim.swarms.contacts import Gauge
+from flocsim.swarms.islands import run_islands, watch_paths
+from flocsim.swarms.neighbours import find_islands
+from flocsim.swarms.progress import Progress
+from flocsim.swarms.runner import Runner, ThreadArrays
+from flocsim.swarms.trajectory import SwarmTrajectory
+from flocsim.system import System, check_bodies, check_forces
+
+LEAST_BOX = 3.0
+"""A box that repeats itself is so many times as wide as the largest body at least: two bodies must
+not meet in two places at once."""
+
+MANY = 200
+"""Of more bodies than that, forces without a reach are refused: all of them would act on all."""
+
+
+def read_box(box: Any) -> tuple[float, float]:
+    """Periods along x and y [m], inf where nothing repeats; UsageError for anything else."""
+    if box is None:
+        return NO_BOX
+    try:
+        width, height = box
+    except (TypeError, ValueError):
+        raise UsageError(
+            f"box must be (width, height), either one None where nothing repeats, found {box!r}"
+        ) from None
+    sides = []
+    for side, name in ((width, "width"), (height, "height")):
+        length = math.inf if side is None else in_unit(side, "m", f"the box's {name}")
+        if (not is_number(length) and length != math.inf) or not length > 0.0:
+            raise UsageError(f"the box's {name} must be a length above 0 m, found {side!r}")
+        sides.append(float(length))
+    return sides[0], sides[1]
+
+
+@attrs.frozen(eq=False, repr=False)
+class Swarm:
+    """Many bodies in a fluid, moved as islands of those that act on each other.
+
+    Parameters: as for a System; ``box``, (width, height) [m] of a space that repeats itself along x
+    and y, None for an axis along which it does not.
+
+    Each island has its own steps, its own lists and its own switches, from one common time to the
+    next, and pair forces end at their reach. UsageError for forces without a reach among more than
+    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that has a
+    gradient.
+    """
+
+    bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
+    forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
+    integrator: Integrator = attrs.field(factory=Implicit)
+    fluid: Fluid = attrs.field(factory=Fluid)
+    box: tuple[float, float] = attrs.field(default=None, converter=read_box, kw_only=True)
+    all_pairs: bool = attrs.field(default=False, kw_only=True)
+    system: System = attrs.field(init=False, repr=False)
+
+    def __attrs_post_init__(self) -> None:
+        system = System(self.bodies, self.forces, self.integrator, self.fluid)
+        object.__setattr__(self, "system", system)
+        if all(body.fixed for body in self.bodies):
+            raise UsageError("a Swarm needs at least one body that moves")
+        self.check_reach()
+        self.check_box()
+
+    def __repr__(self) -> str:
+        return repr(self.system).replace("System", "Swarm")
+
+    @property
+    def reach(self) -> float:
+        """The gap at which the last of the pair forces ends [m]."""
+        return max(0.0, self.system.pieces.surface_reach, self.system.pieces.centre_reach)
+
+    def gauge(self) -> Gauge:
+        """What measures the gaps of its bodies, wherever they are."""
+        return Gauge(self.system.scene()._replace(box=self.box), self.fillings())
+
+    def check_reach(self) -> None:
+        """UsageError for forces that reach all bodies of many."""
+        if len(self.bodies) > MANY and not self.all_pairs:
+            for name, force in self.system.pieces.used.items():
+                if getattr(force, "reach", 0.0) == math.inf:
+                    size = np.mean([body.shape.equivalent_radius for body in self.bodies])
+                    raise UsageError(
+                        f"{name} has no reach, so that each of {len(self.bodies)} bodies would act "
+                        f"on all others: give it one (its property `reach`, of some {size:.1g} m), "
+                        "or ask for all_pairs=True"
+                    )
+
+    def check_box(self) -> None:
+        """UsageError for a box in which bodies would meet themselves, or a flow that does not
+        repeat itself."""
+        side = min(self.box)
+        if side == math.inf:
+            return
+        largest = max(body.shape.bounding_radius for body in self.bodies if not body.fixed)
+        least = LEAST_BOX * (2.0 * largest + self.reach)
+        if side < least:
+            raise UsageError(
+                f"the box is {side:.3g} m wide, and forces reach {self.reach:.3g} m between bodies "
+                f"of up to {2.0 * largest:.3g} m: it must be {least:.3g} m at least, or the forces "
+                "cut nearer"
+            )
+        if any(self.fluid.gradient):
+            raise UsageError("a flow with a gradient does not repeat itself: leave the box out")
+
+    def check_overlaps(self, gauge: Gauge) -> None:
+        """UsageError where two bodies start with crossing cores or too deep an overlap."""
+        position, _ = self.system.motion()
+        near = gauge.neighbours(position)
+        for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
+            a, b = self.bodies[i], self.bodies[j]
+            fault = overlap_fault(
+                a.shape.placed_vertices(*vector, a.angle), a.shape.radius,
+                b.shape.placed_vertices(0.0, 0.0, b.angle), b.shape.radius,
+            )  # fmt: skip
+            if fault:
+                raise UsageError(f"bodies {j} and {i} start {fault}; move them apart")
+
+    def begin(self, until: float, *, threads: int = 1, max_steps: int = 10_000_000) -> Progress:
+        """A Progress to a time [s] that has yet to begin."""
+        scene = self.system.scene()._replace(box=self.box)
+        fillings = self.fillings()
+        runner = Runner(
+            compose(find_islands, {}), compose(run_islands, {**compiled_calls(), **fillings}),
+            self.integrator, [ThreadArrays(scene) for _ in range(threads)], max_steps,
+        )  # fmt: skip
+        swarm = swarm_of(scene, *self.system.motion(), self.integrator.first_step)
+        return Progress(runner, swarm, self.box, self.reach, until)
+
+    def fillings(self) -> dict[Callable, Callable]:
+        """{hook: function} of integrator, shapes and the watch over paths; the same with a box and
+        without, so that one engine serves both."""
+        return {**self.system.fillings({observe: watch_paths}), **PERIODIC}
+
+    def run(
+        self, until: float | str, *, every: float | str | None = None,
+        times: Sequence[float] | None = None, threads: int = 1, max_steps: int = 10_000_000,
+        watch: Callable[[float], bool] | None = None,
+    ) -> SwarmTrajectory:  # fmt: skip
+        """Move the bodies until a time, in s or as "10 s", and return the SwarmTrajectory.
+
+        Its times: ``times`` [s], or one ``every`` so long; without either, start and end.
+        ``threads`` may run at once, which changes no number. ``max_steps`` of an island in a
+        window. ``watch(time)`` is called at every common time, and ends the run where it returns
+        what counts as true. A run that ends early says why in ``status``.
+        """
+        end: float = in_unit(until, "s", "until")
+        stops = stops_of(end, every, times)
+        if not is_whole(threads) or threads < 1:
+            raise UsageError(f"threads must be a whole number from 1, found {threads!r}")
+        began = time.perf_counter()
+        gauge = self.gauge()
+        self.check_overlaps(gauge)
+        progress = self.begin(end, threads=threads, max_steps=max_steps)
+        seen, status = [progress.seen()], Status.FINISHED
+        for stop in stops:
+            while (status := progress.advance(stop)) == Status.PAUSED:
+                if watch is not None and watch(progress.time):
+                    status = Status.STOPPED
+                    break
+            seen.append(progress.seen())
+            if status != Status.FINISHED:
+                break
+            if watch is not None and watch(progress.time):
+                status = Status.STOPPED if progress.time < end else status
+                if status == Status.STOPPED:
+                    break
+        t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
+        return SwarmTrajectory(
+            t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
+            time.perf_counter() - began, self.bodies, self.box, gauge,
+        )  # fmt: skip
+
+
+def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:
+    """The times that a run is to keep [s], ``end`` the last; UsageError for what are none."""
+    if not is_number(end) or not end > 0.0:
+        raise UsageError(f"until must be a time above 0 s, found {end!r}")
+    if times is not None and every is not None:
+        raise UsageError("give the times to keep by times or by every, not by both")
+    if times is not None:
+        listed = [float(in_unit(each, "s", "times")) for each in times]
+        if sorted(set(listed)) != listed or not all(0.0 < each <= end for each in listed):
+            raise UsageError(f"times must rise from above 0 s to {end:g} s at most, found {times}")
+        return listed if listed and listed[-1] == end else [*listed, end]
+    if every is None:
+        return [end]
+    step = float(in_unit(every, "s", "every"))
+    if not step > 0.0:
+        raise UsageError(f"every must be a time above 0 s, found {every!r}")
+    count = max(1, round(end / step))
+    whole = abs(count * step - end) <= 1e-9 * end
+    kept = [step * number for number in range(1, count if whole else math.ceil(end / step))]
+    return [each for each in kept if each < end] + [end]

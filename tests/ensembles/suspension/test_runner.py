@@ -1,0 +1,216 @@
+"""Swarm studies end to end: the same bytes however they are run, nothing lost, all that reads
+the file."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.ensembles.suspension import dealing
+from flocsim.ensembles.suspension.records import Part, part_of
+from flocsim.ensembles.suspension.replicate import Left, run_replicate
+from flocsim.ensembles.suspension.study import SwarmStudy
+from flocsim.errors import FileError, UsageError
+from flocsim.io.journal.records import Record, scan
+from flocsim.io.results.swarm_file import read_swarm
+from tests.helpers.swarm_study import swarm_config, write_swarm_study
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The folder of a study that has run."""
+    folder = tmp_path_factory.mktemp("swarm")
+    path = write_swarm_study(folder)
+    code = main(["swarm", str(path), "--quiet", "-o", str(folder / "swarm.h5")])
+    assert code == 0 and not (folder / "swarm.h5.journal").exists()
+    return folder
+
+
+def same(one, other):
+    """Whether two files have the same bytes in all groups but `run`."""
+    a, b = read_swarm(one), read_swarm(other)
+    return all(
+        values.tobytes() == b.groups[group][name].tobytes()
+        for group, columns in a.groups.items() for name, values in columns.items()
+    )  # fmt: skip
+
+
+def test_what_is_written_agrees_with_itself(finished):
+    results = flocsim.open(finished / "swarm.h5")
+    counts, moments = results.groups["counts"], results.groups["snapshots"]
+    assert counts["clusters"][:, 0].tolist() == [12.0, 12.0]
+    assert counts["n_class"].sum(axis=2).tolist() == counts["clusters"].tolist()
+    for k in range(2):
+        for t in range(4):
+            labels = moments["cluster"][k, t]
+            assert len(set(labels.tolist())) == counts["clusters"][k, t]
+            assert np.bincount(labels).max() == counts["largest"][k, t]
+    fell = moments["position"][:, -1, :, 1] - moments["position"][:, 0, :, 1]
+    assert fell.max() < 0.0
+    assert results.groups["ends"]["finished"].tolist() == [1, 1]
+    assert json.loads(results.run["identity"])["seed"] == 4
+
+
+def run_parts(config, halts=(), left=None, replicate=0):
+    """(Parts that a replicate keeps, whether it ended); it is asked to halt at some looks."""
+    parts, looks = [], iter(range(10**9))
+    ended = run_replicate(
+        SwarmStudy(config), replicate, parts.append, left, lambda: next(looks) in halts
+    )
+    return parts, ended
+
+
+def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
+    config = swarm_config(tmp_path)
+    whole, ended = run_parts(config)
+    assert ended
+    first, ended = run_parts(config, halts={5})
+    assert not ended and first[-1].of == "state"
+    state = part_of_encoded(first[-1])
+    rest, ended = run_parts(config, left=Left(state.facts["moments"], state.arrays))
+    assert ended
+    motions = [[part.arrays["motion"] for part in parts if part.of == "moment"]
+               for parts in (whole, [*first, *rest])]  # fmt: skip
+    assert np.array(motions[0]).tobytes() == np.array(motions[1]).tobytes()
+    efforts = [parts[-1].facts for parts in (whole, rest)]
+    assert efforts[0] == efforts[1]
+
+
+def part_of_encoded(part):
+    """A Part, written and read."""
+    import io
+
+    encoded = part.encoded()
+    [record] = list(scan(io.BytesIO(encoded)))
+    return part_of(record, encoded[record.offset :])
+
+
+def test_records_come_back_as_they_were():
+    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.zeros((0, 2), dtype=np.int64),
+              "c": np.arange(3, dtype=np.int32)}  # fmt: skip
+    found = part_of_encoded(Part(3, "moment", arrays, {"x": 1.5, "nan": float("nan")}))
+    assert (found.replicate, found.of, found.facts) == (3, "moment", {"x": 1.5, "nan": None})
+    for name, values in arrays.items():
+        assert found.arrays[name].dtype == values.dtype
+        np.testing.assert_array_equal(found.arrays[name], values)
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [
+        [["a", "f8", [4]]], [["a", "f8", [-1]]], [["a", "O", [1]]], [["a", "f8", [1, 1, 1, 1]]],
+        [["a", "f8", [2**31, 2**31]]], [["a"]], [["a", "f8", 1]], [],
+    ],
+)  # fmt: skip
+def test_records_that_no_flocsim_wrote_are_refused(listed):
+    about = {"replicate": 0, "of": "moment", "arrays": listed}
+    with pytest.raises(ValueError):
+        part_of(Record(3, about, 0, 8, b""), bytes(8))
+
+
+def start(folder, *words):
+    """The command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "flocsim", "swarm", "swarm.toml", *words],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, tmp_path, number):
+    write_swarm_study(tmp_path)
+    with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
+        until = time.monotonic() + 120.0
+        journal = tmp_path / "swarm.h5.journal"
+        while time.monotonic() < until and process.poll() is None:
+            if journal.exists() and b'"state"' in journal.read_bytes():
+                process.send_signal(number)
+                break
+            time.sleep(0.002)
+        said, _ = process.communicate(timeout=120)
+    assert journal.exists(), said
+    if number == signal.SIGTERM:
+        assert process.returncode == 75 and "go on with --resume" in said
+    with pytest.raises(FileError, match="snapshots so far; --resume goes on"):
+        main_raises(["info", str(tmp_path / "swarm.h5")])
+    with start(tmp_path, "--resume", "--jobs", "2") as process:
+        said, _ = process.communicate(timeout=240)
+    assert process.returncode == 0, said
+    assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
+    assert not journal.exists()
+
+
+def main_raises(words):
+    """A command's error, not its exit code."""
+    from flocsim.__main__ import make_parser
+
+    arguments = make_parser().parse_args(words)
+    return arguments.run(arguments)
+
+
+def test_ranks_change_no_byte(finished, tmp_path):
+    write_swarm_study(tmp_path)
+    with start(tmp_path, "--jobs", "3", "--quiet") as process:
+        said, _ = process.communicate(timeout=240)
+    assert process.returncode == 0, said
+    assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
+
+
+def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
+    monkeypatch.chdir(finished)
+    before = (finished / "swarm.h5").read_bytes()
+    assert main(["swarm", "swarm.toml"]) == UsageError.exit_code
+    assert main(["swarm", "swarm.toml", "--resume", "--seed", "9"]) == UsageError.exit_code
+    assert main(["swarm", "swarm.toml", "--resume", "--replicates", "5"]) == UsageError.exit_code
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 3 and "exists already" in said[0]
+    assert "seed is 4 in the file, 9 now" in said[1] and "has 2 replicates, and 5" in said[2]
+    assert main(["swarm", "swarm.toml", "--resume"]) == 0
+    assert "nothing was run" in capsys.readouterr().out
+    assert (finished / "swarm.h5").read_bytes() == before
+
+
+def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    file = str(finished / "swarm.h5")
+    assert main(["info", file]) == 0
+    said = capsys.readouterr().out
+    assert "2 of 12 bodies, 2 came to their end" in said and "means over 2 swarms" in said
+    assert main(["info", file, "--config"]) == 0
+    assert 'kind = "swarm"' in capsys.readouterr().out
+    assert main(["plot", file, "--animation", "s.gif"]) == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"swarm-snapshots.png", "swarm-clusters.png", "swarm-sizes.png", "s.gif"}
+    pytest.importorskip("xarray")
+    results = flocsim.open(file)
+    data = results.to_xarray("snapshots")
+    assert data["position"].dims == ("replicate", "time", "body", "component")
+    assert len(results.to_pandas()) == 8
+
+
+def test_a_dry_run_runs_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_swarm_study(tmp_path)
+    assert main(["swarm", "swarm.toml", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "2 swarms of 12 bodies" in said and "bodies cover 0.2000" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["swarm.toml"]
+
+
+def test_a_dealer_hands_out_each_replicate_once(monkeypatch):
+    class Alone:
+        size = 1
+
+        def messages(self):
+            return iter(())
+
+    ran, kept = [], []
+    monkeypatch.setattr(dealing, "run_replicate", lambda s, k, keep, left, halted: ran.append(k))
+    dealing.Dealer(Alone(), {3: None, 1: None}, kept.append, lambda each: None).run(None)
+    assert ran == [1, 3] and not kept

@@ -1,0 +1,85 @@
+"""The sweep for near discs, held against all pairs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flocsim.geometry.contact.sweep import (
+    DISC_COLUMNS,
+    MOVES,
+    PLACE_X,
+    PLACE_Y,
+    REACH,
+    WAY_X,
+    WAY_Y,
+    come_near,
+    near_pairs,
+)
+
+BOXES = [(math.inf, math.inf), (10.0, math.inf), (math.inf, 8.0), (10.0, 8.0)]
+
+
+def random_discs(rng, count, box):
+    """Discs of any size, some of them fixed, that go some way."""
+    discs = np.zeros((count, DISC_COLUMNS))
+    for axis, side in zip((PLACE_X, PLACE_Y), box, strict=True):
+        wide = 12.0 if side == math.inf else 3.0 * side
+        discs[:, axis] = rng.uniform(-wide, wide, count)
+    discs[:, [WAY_X, WAY_Y]] = 0.4 * rng.normal(size=(count, 2))
+    discs[:, REACH] = rng.uniform(0.1, 0.9, count)
+    discs[:, MOVES] = rng.random(count) < 0.8
+    return discs
+
+
+def found(discs, box, order=None):
+    """The near pairs by the sweep."""
+    count = len(discs)
+    order = np.arange(count) if order is None else order
+    pairs = np.zeros((count * count, 2), dtype=int)
+    total = near_pairs(discs, order, *box, np.zeros(count + 1, dtype=int), pairs)
+    return [tuple(pair) for pair in pairs[:total].tolist()]
+
+
+@pytest.mark.parametrize("box", BOXES)
+@pytest.mark.parametrize("seed", range(12))
+def test_the_sweep_finds_what_a_look_at_all_pairs_finds(seed, box):
+    discs = random_discs(np.random.default_rng(seed), 40, box)
+    expected = [(a, b) for a in range(40) for b in range(a) if come_near(discs, a, b, *box)]
+    assert expected
+    assert found(discs, box) == expected
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_ways_are_met_in_between(seed):
+    rng = np.random.default_rng(seed)
+    discs = random_discs(rng, 2, BOXES[0])
+    discs[:, MOVES] = 1.0
+    shares = np.linspace(0.0, 1.0, 2001)[:, None]
+    places = [discs[k, :2] + shares * discs[k, 2:4] for k in range(2)]
+    least = np.hypot(*(places[0] - places[1]).T).min()
+    for reach in (0.9 * least, 1.1 * least):
+        discs[:, REACH] = 0.5 * reach
+        assert come_near(discs, 0, 1, *BOXES[0]) == (reach > least)
+
+
+def test_a_box_shifted_by_any_vector_has_the_same_pairs():
+    rng = np.random.default_rng(3)
+    discs = random_discs(rng, 60, (10.0, 8.0))
+    moved = discs.copy()
+    moved[:, [PLACE_X, PLACE_Y]] += rng.uniform(-30.0, 30.0, 2)
+    assert found(moved, (10.0, 8.0)) == found(discs, (10.0, 8.0))
+
+
+def test_the_order_from_before_changes_nothing():
+    rng = np.random.default_rng(4)
+    discs = random_discs(rng, 50, BOXES[0])
+    expected = found(discs, BOXES[0])
+    assert found(discs, BOXES[0], rng.permutation(50)) == expected
+
+
+def test_without_room_it_says_how_much_is_needed():
+    discs = random_discs(np.random.default_rng(5), 40, BOXES[0])
+    count, few = len(found(discs, BOXES[0])), np.zeros((1, 2), dtype=int)
+    order, starts = np.arange(40), np.zeros(41, dtype=int)
+    assert near_pairs(discs, order, *BOXES[0], starts, few) == count > 1

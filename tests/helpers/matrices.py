@@ -1,0 +1,19 @@
+"""The derivatives of a scene as whole matrices."""
+
+import numpy as np
+
+from flocsim.arrays import EARLIER, LATER, PAIRS
+from flocsim.integrators.rhs.blocks import lower_block, upper_block
+
+
+def whole_matrix(work, which):
+    """DAMPING or STIFFNESS (3 n, 3 n), from its blocks."""
+    n, blocks = len(work.bodies), work.jacobian[which]
+    matrix = np.zeros((n, 3, n, 3))
+    for body in range(n):
+        matrix[body, :, body] = blocks[body]
+    for pair in range(work.tally[PAIRS]):
+        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        matrix[a, :, b] = blocks[lower_block(work, pair)]
+        matrix[b, :, a] = blocks[upper_block(work, pair)]
+    return matrix.reshape(3 * n, 3 * n)
