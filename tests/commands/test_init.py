@@ -11,8 +11,9 @@ def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 0
     told = capsys.readouterr().out
-    assert told.endswith(f"run it with: flocsim ensemble 1-{kind}.toml\n")
-    assert main(["ensemble", f"1-{kind}.toml", "--dry-run", "--no-pilot"]) == 0
+    command = "swarm" if kind == "swarm" else "ensemble"
+    assert told.endswith(f"run it with: flocsim {command} 1-{kind}.toml\n")
+    assert main([command, f"1-{kind}.toml", "--dry-run", "--no-pilot"]) == 0
     assert "nothing was run" in capsys.readouterr().out
     assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 2
 
