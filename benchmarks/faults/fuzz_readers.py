@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.errors import ConfigError, FlocsimError
+from flocsim.errors import ConfigError, FileError, FlocsimError
 from tests.helpers import hostile_files
 
 COUNT, QUICK = 5000, 250
@@ -104,6 +104,87 @@ def read_config_file(path):
         nested([parse_setting("scene.delta=" + text[:5000])])
 
 
+def read_swarm_file(path):
+    """Read it, describe it, and make the shapes."""
+    from flocsim.commands.info import swarm_text
+    from flocsim.io.plots.swarm import shape_of
+    from flocsim.io.results.swarm_file import read_swarm
+
+    found = read_swarm(path)
+    replicates, _, bodies = found.groups["snapshots"]["cluster"].shape
+    for replicate in range(min(replicates, 3)):
+        for body in range(min(bodies, 5)):
+            assert math.isfinite(shape_of(found, replicate, body).area)
+    swarm_text(path)
+
+
+class SwarmJournalReader:
+    """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
+
+    def __init__(self, folder):
+        from flocsim.ensembles.suspension.checks import Form
+        from flocsim.ensembles.suspension.records import Part
+        from flocsim.ensembles.suspension.study import SwarmStudy
+        from flocsim.io.journal.records import SNAPSHOT
+        from flocsim.swarms.progress import Effort
+        from tests.helpers.swarm_study import swarm_config
+
+        n, self.study = 3, SwarmStudy(swarm_config(folder), flocs=[])
+        self.form = Form(n, 1, len(self.study.stops), self.study.scene.duration)
+        ones = np.ones(n)
+        state = {
+            "motion": np.zeros((n, 6)), "carried": np.zeros((n, 6)), "errors": np.zeros((n, 4)),
+            "steps": ones, "wander": ones, "links": np.array([[2, 1, 2, 1]]),
+            "slips": np.zeros((1, 2)), "time": np.array(0.05), "span": np.array(0.01),
+            "error": np.array(0.0), "effort": np.zeros(6, np.int64),
+        }  # fmt: skip
+        moment = {"motion": np.zeros((n, 6)), "cluster": np.zeros(n, np.int32),
+                  "counts": np.array([1])}  # fmt: skip
+        bodies = {
+            "r_eq": ones, "spheroradius": ones, "mass": ones, "floc": np.zeros(n, np.int32),
+            "count": np.ones(n, np.int64), "points": np.zeros((n, 2)), "box": np.ones(2),
+        }  # fmt: skip
+        end = {"status": "FINISHED", "failed": [], "time": 0.3} | dict.fromkeys(vars_of(Effort), 1)
+        parts = []
+        for replicate in range(2):
+            parts += [Part(replicate, "bodies", bodies), Part(replicate, "state", state,
+                                                              {"moments": 1})]  # fmt: skip
+            parts += [Part(replicate, "moment", moment, {"place": k, "error": 0.0, "time": 0.1 * k})
+                      for k in range(4)]  # fmt: skip
+            parts.append(Part(replicate, "end", {}, end))
+        self.parts = [(SNAPSHOT, *part.described()) for part in parts]
+
+    def make(self, rng, folder):
+        """A hostile journal."""
+        return hostile_files.journal_file(rng, folder, self.parts)
+
+    def read(self, path):
+        """Take what it has, and make results of it where all is there."""
+        from flocsim.ensembles.suspension.assembly import found_in, results_of, table_of
+        from flocsim.io.journal.journal import Journal
+
+        journal = Journal(path)
+        try:
+            if not journal.is_journal:
+                raise FileError("it is no journal")  # as a run that begins says
+            found, remarks = found_in(journal, 2, self.form)
+            assert all(remark.isprintable() for remark in remarks), remarks
+            for own in found.values():
+                assert own.left is None or np.isfinite(own.left.state["motion"]).all()
+            if all(own.ended for own in found.values()):
+                results, _ = results_of(self.study, found, journal, {})
+                table_of(results)
+            if remarks:
+                raise FileError(remarks[0])  # a part of it was refused
+        finally:
+            journal.release()
+
+
+def vars_of(some_class):
+    """The names of an attrs class's fields."""
+    return [field.name for field in some_class.__attrs_attrs__]
+
+
 class JournalReader:
     """Makes journals of one study, and takes what they hold as a resumed run does."""
 
@@ -160,7 +241,11 @@ def reader(name, folder):
     if name == "journals":
         journals = JournalReader(folder)
         return journals.make, journals.read
+    if name == "swarm_journals":
+        swarms = SwarmJournalReader(folder)
+        return swarms.make, swarms.read
     return {
+        "swarms": (hostile_files.swarm_file, read_swarm_file),
         "results": (hostile_files.results_file, read_results_file),
         "libraries": (hostile_files.library_file, read_library_file),
         "pictures": (hostile_files.picture_file, read_picture_file),
@@ -169,7 +254,9 @@ def reader(name, folder):
     }[name]
 
 
-KINDS = ("results", "libraries", "journals", "pictures", "masks", "configs")
+KINDS = (
+    "results", "libraries", "journals", "pictures", "masks", "configs", "swarms", "swarm_journals",
+)  # fmt: skip
 
 
 def outcome(read, path):

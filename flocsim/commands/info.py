@@ -106,8 +106,12 @@ def swarm_text(path):
          f"{ends['rejected'].sum()} rejected"),
         *origin(results.run),
     ]  # fmt: skip
+    try:
+        warnings = stored(results.run, "warnings")
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable results of a swarm: {error}") from error
     lines = [f"{name:<19} {value}" for name, value in facts]
-    lines += [f"warning: {visible(line, '')}" for line in stored(results.run, "warnings")]
+    lines += [f"warning: {visible(line, '')}" for line in warnings]
     return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table_of(results)])
 
 

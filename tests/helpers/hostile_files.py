@@ -21,7 +21,9 @@ from flocsim.ensembles.chunks import Condition, chunk_record, layout
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.journal.records import CHUNK, SESSION, encode
 from flocsim.io.results.file import write_results
+from flocsim.io.results.swarm_file import write_swarm
 from tests.helpers.small_study import VALID, write_star_library
+from tests.helpers.swarm_study import make_swarm_results
 from tests.helpers.synthetic_results import make_results
 
 ODD_NUMBERS = (0, 1, 2, 3, 4, 7, 8, 0x10, 0x7F, 0x80, 0xFE, 0xFF)
@@ -216,6 +218,18 @@ def results_file(rng, folder):
 def library_file(rng, folder):
     """A hostile shape library."""
     return written(folder, "l.h5", hostile_hdf5(rng, valid_library(folder)))
+
+
+@cache
+def valid_swarm(folder):
+    """The HDF5 data of a small results file of swarms."""
+    write_swarm(folder / "valid-swarm.h5", make_swarm_results())
+    return read_sealed(folder / "valid-swarm.h5")
+
+
+def swarm_file(rng, folder):
+    """A hostile results file of swarms."""
+    return written(folder, "s.h5", hostile_hdf5(rng, valid_swarm(folder)))
 
 
 # Journals --------------------------------------------------------------------------------------

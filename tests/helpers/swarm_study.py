@@ -1,6 +1,9 @@
 """A small study of swarms of discs, whose engine the tests of swarms share."""
 
+import numpy as np
+
 from flocsim.ensembles.config.loader import load_any_config
+from flocsim.io.results.swarm_file import ENDS, SwarmResults
 
 SWARM = """\
 preset = "si"
@@ -34,3 +37,40 @@ def write_swarm_study(folder, name="swarm.toml", text=SWARM):
 def swarm_config(folder, overrides=None, text=SWARM):
     """The Config of the small swarm study, with nested overrides."""
     return load_any_config(write_swarm_study(folder, text=text), overrides)
+
+
+def make_swarm_results(replicates=2, times=3, bodies=4):
+    """SwarmResults of discs that fall, two of which hold together."""
+    rng = np.random.default_rng(1)
+    shape = replicates, times
+    position = np.zeros((*shape, bodies, 3))
+    position[..., :2] = 1e-5 * rng.random((replicates, 1, bodies, 2))
+    position[..., 1] -= 1e-6 * np.arange(times)[:, None]
+    numbers = ("clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension",
+               "settling", "error")  # fmt: skip
+    counts = {name: np.full(shape, 2.0) for name in numbers}
+    each = {name: np.full((replicates, bodies), 1e-6) for name in ("r_eq", "spheroradius", "mass")}
+    places = np.broadcast_to(np.arange(bodies), (replicates, bodies)).copy()
+    groups = {
+        "counts": counts | {"n_class": np.full((*shape, 2), 1.0)},
+        "snapshots": {
+            "position": position, "velocity": np.zeros_like(position),
+            "cluster": np.broadcast_to(np.array([0, 0, *range(1, bodies - 1)], "i4"),
+                                       (*shape, bodies)).copy(),
+        },
+        "bodies": each | {
+            "floc": np.full((replicates, bodies), -1, "i4"), "first_point": places,
+            "point_count": np.ones_like(places), "points": np.zeros((replicates, bodies, 2)),
+            "box": np.full((replicates, 2), 2e-5),
+        },
+        "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
+    }  # fmt: skip
+    scales = {
+        "replicate": np.arange(replicates), "time": 0.1 * np.arange(times),
+        "class": np.array([0.0, 1e-5]), "body": np.arange(bodies),
+        "component": np.array(["x", "y", "angle"]), "axis": np.array(["x", "y"]),
+        "point": np.arange(bodies),
+    }  # fmt: skip
+    run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,
+           "periodic": "xy", "overrides": "{}"}  # fmt: skip
+    return SwarmResults(scales, groups, run)

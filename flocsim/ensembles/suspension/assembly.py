@@ -5,9 +5,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.ensembles.suspension.checks import Form, check_part
 from flocsim.ensembles.suspension.records import (
     BODIES,
-    END,
     MOMENT,
     STATE,
     SUMMARY,
@@ -16,12 +16,10 @@ from flocsim.ensembles.suspension.records import (
 )
 from flocsim.ensembles.suspension.replicate import Left
 from flocsim.ensembles.suspension.study import SwarmStudy
+from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
 from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, SwarmResults
-from flocsim.swarms.progress import Effort
-
-EFFORT = tuple(field.name for field in attrs.fields(Effort))
 
 
 @attrs.define(eq=False)
@@ -45,38 +43,38 @@ class Found:
         return Left(count, self.state.arrays)
 
 
-def found_in(journal: Journal, replicates: int, moments: int) -> tuple[dict[int, Found], list[str]]:
-    """({replicate: Found}, remarks) of a journal's whole records."""
+def found_in(journal: Journal, replicates: int, form: Form) -> tuple[dict[int, Found], list[str]]:
+    """({replicate: Found}, remarks) of a journal's records: those that can be of this study."""
     found = {each: Found() for each in range(replicates)}
     remarks = [
         f"{journal.path}: damaged from byte {each.start} to {each.stop}: what is missing is "
         "computed again" for each in journal.damage
     ]  # fmt: skip
     for record in journal.records:
-        about = record.description
-        if record.kind != SNAPSHOT or about.get("replicate") not in found:
+        if record.kind != SNAPSHOT:
             continue
-        facts = about.get("facts", {})
-        own, of = found[about["replicate"]], about.get("of")
-        if of == BODIES:
+        try:
+            part = part_of(record, journal.read(record.offset, record.length))
+            check_part(part, form)
+        except ValueError as error:
+            remarks.append(f"{journal.path}: {error}: it is left out")
+            continue
+        if part.replicate not in found:
+            continue
+        own = found[part.replicate]
+        if part.of == BODIES:
             own.bodies = record
-        elif of == MOMENT and facts.get("place") in range(moments):
-            own.moments[facts["place"]] = record
-        elif of == STATE and facts.get("moments") in range(1, moments + 1):
-            try:
-                own.state = part_of(record, journal.read(record.offset, record.length))
-            except ValueError as error:
-                remarks.append(f"{journal.path}: {error}: it is left out")
-        elif of == END and all(isinstance(facts.get(name), int) for name in EFFORT):
-            own.ended = facts
+        elif part.of == MOMENT:
+            own.moments[part.facts["place"]] = record
+        elif part.of == STATE:
+            own.state = part
+        else:
+            own.ended = part.facts
     for own in found.values():
-        whole = own.bodies is not None and (
-            own.ended is None
-            or own.ended.get("status") != "FINISHED"
-            or all(place in own.moments for place in range(moments))
-        )
-        if not whole:
-            own.ended = None
+        ended = own.ended is not None and own.bodies is not None
+        if ended and own.ended["status"] == Status.FINISHED.name:  # type: ignore[index]
+            ended = all(place in own.moments for place in range(form.moments))
+        own.ended = own.ended if ended else None
     return found, remarks
 
 

@@ -37,14 +37,18 @@ class Part:
     arrays: dict[str, np.ndarray]
     facts: dict[str, Any] = attrs.Factory(dict)
 
-    def encoded(self) -> bytes:
-        """The record as the journal has it."""
+    def described(self) -> tuple[dict[str, Any], bytes]:
+        """(description, data) of the record."""
         listed = [
             [name, array.dtype.str[1:], list(array.shape)] for name, array in self.arrays.items()
         ]
         description = {"replicate": self.replicate, "of": self.of, "arrays": listed}
         data = b"".join(np.ascontiguousarray(each).tobytes() for each in self.arrays.values())
-        return encode(SNAPSHOT, description | {"facts": told(self.facts)}, data)
+        return description | {"facts": told(self.facts)}, data
+
+    def encoded(self) -> bytes:
+        """The record as the journal has it."""
+        return encode(SNAPSHOT, *self.described())
 
 
 def told(facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -80,9 +84,10 @@ def part_of(record: Record, data: bytes) -> Part:
 
 def checked_listing(listed: Sequence[Any]) -> tuple[str, str, tuple[int, ...]]:
     """(name, kind, shape) of a listed array; ValueError where it lists none."""
-    if len(listed) == 3 and isinstance(listed[0], str) and listed[1] in KINDS:
+    words = len(listed) == 3 and all(isinstance(each, str) for each in listed[:2])
+    if words and listed[1] in KINDS:
         shape = listed[2]
         known = isinstance(shape, list) and len(shape) <= 3
-        if known and all(isinstance(each, int) and 0 <= each < 2**32 for each in shape):
+        if known and all(type(each) is int and 0 <= each < 2**32 for each in shape):
             return listed[0], listed[1], tuple(shape)
     raise ValueError("a record lists no array")

@@ -9,6 +9,7 @@ import numpy as np
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
 from flocsim.integrators.base import Status
+from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.progress import Progress
@@ -40,7 +41,7 @@ def run_replicate(
     swarm.check_overlaps(gauge)
     progress = swarm.begin(study.scene.duration, max_steps=study.config.integrator.max_steps)
     stops = study.stops
-    if left is None:
+    if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
         keep(moment_part(replicate, 0, study, swarm, gauge, progress))
         moments = 1
@@ -65,6 +66,19 @@ def run_replicate(
             return False
     keep(end_part(replicate, status, progress))
     return True
+
+
+def fits(left: Left, swarm: Swarm) -> bool:
+    """Whether the contacts of a state are between core points that the bodies of a swarm have: the
+    kernels trust them."""
+    first = np.cumsum([0, *(len(body.shape.vertices) for body in swarm.bodies)])
+    owner = np.repeat(np.arange(len(swarm.bodies)), np.diff(first))
+    links = left.state["links"]
+    points = links[:, [AT_VERTEX, AT_EDGE]]
+    if np.any(points >= first[-1]):
+        return False
+    bodies = np.sort(links[:, [LATER_BODY, EARLIER_BODY]], axis=1)
+    return bool(np.all(np.sort(owner[points], axis=1) == bodies))
 
 
 def bodies_part(

@@ -22,8 +22,9 @@ from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.resume import REMEDY, RESUME, claim
-from flocsim.ensembles.storage.stored_json import is_session
+from flocsim.ensembles.storage.stored_json import is_session, stored
 from flocsim.ensembles.suspension.assembly import Found, found_in, results_of, table_of
+from flocsim.ensembles.suspension.checks import Form
 from flocsim.ensembles.suspension.dealing import Dealer, Kept, follow_dealer
 from flocsim.ensembles.suspension.identity import identity_of
 from flocsim.ensembles.suspension.study import SwarmStudy, flocs_of
@@ -181,8 +182,11 @@ class Lead:
         if not ordinary_target(output).exists():
             return False
         results = read_swarm(output)
-        stored = json.loads(str(results.run.get("identity", "{}")))
-        if lines := differences(stored, self.identity):
+        try:
+            identity = stored(results.run, "identity")
+        except ValueError as error:
+            raise FileError(f"{output} holds no readable results of a swarm: {error}") from error
+        if lines := differences(identity, self.identity):
             raise UsageError(f"{output} is of another study: {'; '.join(lines[:5])}; {REMEDY}")
         count, asked = len(results.scales["replicate"]), self.study.config.replicates
         if count == asked:
@@ -206,7 +210,7 @@ class Lead:
                 raise UsageError(f"{path} is of another study: {'; '.join(lines[:5])}; {REMEDY}")
             if about["layout"] != LAYOUT:
                 raise UsageError(f"{path} was written by another version of flocsim: {REMEDY}")
-        return found_in(self.journal, self.study.config.replicates, len(self.study.stops))
+        return found_in(self.journal, self.study.config.replicates, form_of(self.study, self.swarm))
 
     def announcement(self, existing: int) -> str:
         scene, ranks = self.study.scene, self.comm.size
@@ -244,6 +248,12 @@ class Lead:
         """What the journal has now."""
         self.journal.read_all()
         return self.found()
+
+
+def form_of(study: SwarmStudy, swarm: Swarm) -> Form:
+    """What the study's records look like; ``swarm``: any of its swarms."""
+    classes = len(study.scene.bounds) + 1
+    return Form(len(swarm.bodies), classes, len(study.stops), study.scene.duration)
 
 
 def largest_pair(swarm: Swarm) -> System:

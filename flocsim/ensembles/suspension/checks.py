@@ -1,0 +1,122 @@
+"""Whether what a journal says of a swarm can be: it may have been written by anyone."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, SUMMARY, Part
+from flocsim.integrators.base import Status
+from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
+from flocsim.swarms.progress import Effort
+
+EFFORT = tuple(field.name for field in attrs.fields(Effort))
+LARGEST = 2**53
+
+
+@attrs.frozen
+class Form:
+    """What a study's records look like: how many bodies, size classes and snapshots, and for how
+    long it goes [s]."""
+
+    bodies: int
+    classes: int
+    moments: int
+    duration: float
+
+
+def check_part(part: Part, form: Form) -> None:
+    """ValueError where a Part is none of a study of this Form."""
+    {BODIES: check_bodies, MOMENT: check_moment, STATE: check_state, END: check_end}.get(
+        part.of, refuse
+    )(part, form)
+
+
+def refuse(part: Part, form: Form) -> None:
+    raise ValueError("a record is of no known kind")
+
+
+def shaped(part: Part, shapes: Mapping[str, tuple[str, tuple[int, ...]]]) -> None:
+    """ValueError unless a Part has these arrays, {name: (kind, shape)}, all numbers finite."""
+    if part.arrays.keys() != shapes.keys():
+        raise ValueError("a record has other arrays")
+    for name, (kind, shape) in shapes.items():
+        array = part.arrays[name]
+        if array.dtype.str[1:] != kind or array.shape != shape:
+            raise ValueError(f"the array {name} of a record is of another form")
+        if kind == "f8" and not np.isfinite(array).all():
+            raise ValueError(f"the array {name} of a record holds what is no number")
+
+
+def demand(condition: Any, name: str) -> None:
+    if not condition:
+        raise ValueError(f"{name} of a record is impossible")
+
+
+def is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def is_count(value: Any, most: int = LARGEST) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most
+
+
+def check_bodies(part: Part, form: Form) -> None:
+    n, points = form.bodies, len(np.atleast_1d(part.arrays.get("points", 0)))
+    shaped(part, {
+        "r_eq": ("f8", (n,)), "spheroradius": ("f8", (n,)), "mass": ("f8", (n,)),
+        "floc": ("i4", (n,)), "count": ("i8", (n,)), "points": ("f8", (points, 2)),
+        "box": ("f8", (2,)),
+    })  # fmt: skip
+    for name in ("r_eq", "spheroradius", "mass", "box"):
+        demand(np.all(part.arrays[name] > 0.0), name)
+    counts = part.arrays["count"]
+    demand(np.all((counts >= 1) & (counts <= points)) and counts.sum() == points, "count")
+
+
+def check_moment(part: Part, form: Form) -> None:
+    n = form.bodies
+    shaped(part, {
+        "motion": ("f8", (n, 6)), "cluster": ("i4", (n,)), "counts": ("i8", (form.classes,)),
+    })  # fmt: skip
+    labels = part.arrays["cluster"]
+    demand(np.all((labels >= -1) & (labels < n)), "cluster")
+    demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
+    demand(is_count(part.facts.get("place"), form.moments - 1), "place")
+    for name in (*SUMMARY, "error"):
+        value = part.facts.get(name)
+        demand(value is None or is_number(value), name)
+
+
+def check_state(part: Part, form: Form) -> None:
+    n, links = form.bodies, part.arrays.get("links", np.zeros((0, 4)))
+    count = len(links) if links.ndim else 0
+    one: tuple[int, ...] = ()
+    shaped(part, {
+        "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
+        "steps": ("f8", (n,)), "wander": ("f8", (n,)), "links": ("i8", (count, 4)),
+        "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
+        "error": ("f8", one), "effort": ("i8", (len(EFFORT),)),
+    })  # fmt: skip
+    for name in ("steps", "wander"):
+        demand(np.all(part.arrays[name] > 0.0), name)
+    demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
+    bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
+    demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
+    demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")
+    demand(is_count(part.facts.get("moments"), form.moments), "moments")
+    demand(part.facts["moments"] >= 1, "moments")
+
+
+def check_end(part: Part, form: Form) -> None:
+    shaped(part, {})
+    facts = part.facts
+    status = facts.get("status")
+    demand(isinstance(status, str) and status in Status.__members__, "status")
+    demand(all(is_count(facts.get(name)) for name in EFFORT), "effort")
+    demand(is_number(facts.get("time")), "time")
+    failed = facts.get("failed")
+    demand(isinstance(failed, list), "failed")
+    demand(all(is_count(each, form.bodies - 1) for each in failed or []), "failed")
