@@ -28,15 +28,13 @@ from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import is_library, read_library, read_settings
+from flocsim.io.terminal import aligned
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
          "warnings", "settling", "size_classes")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
-
-WALL = -2
-"""In `bodies/floc` of a swarm: a wall."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -94,7 +92,7 @@ def swarm_text(path):
 
     results = swarm_file.read_swarm(path)
     bodies, ends = results.groups["bodies"], results.groups["ends"]
-    free = bodies["floc"][0] != WALL
+    free = bodies["floc"][0] != swarm_file.WALL
     radii = 1e6 * bodies["r_eq"][:, free]
     width, height = 1e6 * bodies["box"].mean(axis=0)
     facts = [
@@ -224,9 +222,7 @@ def sweep_text(path):
         words = [visible(f"{each:g}" if isinstance(each, float) else str(each), "")
                  for each in names]  # fmt: skip
         rows.append((*words, str(n), *told))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    aligned = ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
-    return "\n".join([*lines, "", *aligned])
+    return "\n".join([*lines, "", *aligned(rows)])
 
 
 def unfinished_text(found):

@@ -12,7 +12,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, TextIO
 
 from flocsim.errors import visible
@@ -31,6 +31,12 @@ def duration(seconds: float) -> str:
     if seconds < 6000:
         return f"{int(seconds) // 60} min {int(seconds) % 60:02d} s"
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table, each column as wide as its widest word and set to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
 
 
 def plain_warnings(silent: bool = False) -> None:

@@ -10,7 +10,6 @@ from flocsim.ensembles.suspension.records import (
     BODIES,
     MOMENT,
     STATE,
-    SUMMARY,
     Part,
     part_of,
 )
@@ -19,7 +18,8 @@ from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
-from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, SwarmResults
+from flocsim.io.results.swarm_file import AXES, COMPONENTS, COUNTS, ENDS, SwarmResults, mean
+from flocsim.io.terminal import aligned
 
 
 @attrs.define(eq=False)
@@ -102,7 +102,7 @@ def results_of(
     }  # fmt: skip
     shape = replicates, len(stops)
     classes = np.array([0.0, *study.scene.bounds])
-    numbers = {name: np.full(shape, np.nan) for name in (*SUMMARY, "error")}
+    numbers = {name: np.full(shape, np.nan) for name in COUNTS}
     by_class = np.full((*shape, len(classes)), np.nan)
     motion = np.full((*shape, n, 6), np.nan)
     labels = np.full((*shape, n), -1, dtype=np.int32)
@@ -162,15 +162,5 @@ def table_of(results: SwarmResults) -> str:
     rows = [list(columns)]
     for place in range(len(results.scales["time"])):
         rows.append([form.format(values[place]) for values, form in columns.values()])
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
     many = len(results.scales["replicate"])
-    return "\n".join(lines + ([f"means over {many} swarms"] if many > 1 else []))
-
-
-def mean(values: np.ndarray) -> np.ndarray:
-    """The mean over replicates that got so far; NaN where none did."""
-    known = np.isfinite(values)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return total / known.sum(axis=0)
+    return "\n".join(aligned(rows) + ([f"means over {many} swarms"] if many > 1 else []))

@@ -1,14 +1,15 @@
 """Whether what a journal says of a swarm can be: it may have been written by anyone."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, SUMMARY, Part
+from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
+from flocsim.fields import is_number, is_whole
 from flocsim.integrators.base import Status
+from flocsim.io.results.swarm_file import COUNTS
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
 from flocsim.swarms.progress import Effort
 
@@ -55,12 +56,8 @@ def demand(condition: Any, name: str) -> None:
         raise ValueError(f"{name} of a record is impossible")
 
 
-def is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def is_count(value: Any, most: int = LARGEST) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most
+    return is_whole(value) and 0 <= value <= most
 
 
 def check_bodies(part: Part, form: Form) -> None:
@@ -85,7 +82,7 @@ def check_moment(part: Part, form: Form) -> None:
     demand(np.all((labels >= -1) & (labels < n)), "cluster")
     demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
     demand(is_count(part.facts.get("place"), form.moments - 1), "place")
-    for name in (*SUMMARY, "error"):
+    for name in COUNTS:
         value = part.facts.get(name)
         demand(value is None or is_number(value), name)
 

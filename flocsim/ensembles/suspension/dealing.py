@@ -10,7 +10,7 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
-from flocsim.ensembles.suspension.records import END, MOMENT, Part
+from flocsim.ensembles.suspension.records import MOMENT, Part
 from flocsim.ensembles.suspension.replicate import Left, run_replicate
 from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.interruption import stop_requested
@@ -23,11 +23,10 @@ class Ask:
 
 @attrs.frozen
 class Kept:
-    """A record of a replicate, for the journal; whether it is a snapshot, and the last one."""
+    """A record of a replicate, for the journal; whether it is a snapshot."""
 
     record: bytes
     is_moment: bool
-    is_end: bool
 
 
 @attrs.frozen
@@ -44,7 +43,7 @@ class Halt:
 
 
 def kept_of(part: Part) -> Kept:
-    return Kept(part.encoded(), part.of == MOMENT, part.of == END)
+    return Kept(part.encoded(), part.of == MOMENT)
 
 
 class Dealer:

@@ -9,14 +9,12 @@ import numpy as np
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
 from flocsim.integrators.base import Status
+from flocsim.io.results.swarm_file import WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.swarm import Swarm
-
-FIXED = -2
-"""Place among the flocs of a wall."""
 
 
 @attrs.frozen(eq=False)
@@ -92,7 +90,7 @@ def bodies_part(
         "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
         "spheroradius": np.array([shape.radius for shape in shapes]),
         "mass": np.array([body.mass for body in swarm.bodies]),
-        "floc": np.append(drawn.flocs, np.full(walls, FIXED)).astype(np.int32),
+        "floc": np.append(drawn.flocs, np.full(walls, WALL)).astype(np.int32),
         "count": np.array([len(each) for each in points], dtype=np.int64),
         "points": np.concatenate(points),
         "box": np.array(box),

@@ -1,6 +1,5 @@
 """One collision: a strip of frames (the paper's Fig. 7), distance, forces, and an animation."""
 
-import io
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,16 +8,17 @@ from typing import Any
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.files import Rule, write_file
+from flocsim.io.files import Rule
 from flocsim.io.outputs import redrawn
-from flocsim.io.own_mark import marked
 from flocsim.io.plots.style import (
     BODY_COLOURS,
     CONTACT_COLOUR,
     Figure,
+    frame_of,
     house_style,
     keep_titles_whole,
     new_figure,
+    save_gif,
 )
 
 MICRO = 1e6
@@ -44,8 +44,7 @@ ENERGY_DECADES = 4
 FORCE_COLOURS = (*BODY_COLOURS, "0.5", CONTACT_COLOUR)
 
 MILLISECONDS = 80
-"""Of every frame of an animation; the last stays for LAST."""
-LAST = 1500
+"""Of every frame of an animation."""
 
 
 def draw_strip(
@@ -267,17 +266,11 @@ def write_animation(
     check_lengths(len(frames.times), frames.outlines, frames.contacts, frames.centre_distance)
     pictures = [picture_of(frames, place, motion, zone_distance, title)
                 for place in range(len(frames.times))]  # fmt: skip
-    lasting = [MILLISECONDS] * (len(pictures) - 1) + [LAST]
-    buffer = io.BytesIO()
-    pictures[0].save(buffer, "GIF", save_all=True, append_images=pictures[1:], duration=lasting,
-                     loop=0, optimize=False)  # fmt: skip
-    write_file(path, marked(buffer.getvalue(), ".gif"), rule)
+    save_gif(path, pictures, MILLISECONDS, rule)
 
 
 def picture_of(frames, place, motion, zone_distance, title):
     """One frame, beside the centre distance, as a Pillow image of 64 colours."""
-    from PIL import Image
-
     unit, factor = time_unit(motion[0])
     centres, half = windows(frames.outlines)
     with house_style():
@@ -297,8 +290,7 @@ def picture_of(frames, place, motion, zone_distance, title):
         draw_zone(graph, zone_distance)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
         keep_titles_whole(figure)  # which draws it
-        pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
-    return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
+        return frame_of(figure)
 
 
 def draw_zone(axes, zone_distance):

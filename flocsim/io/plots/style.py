@@ -4,7 +4,7 @@ import contextlib
 import io
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,9 @@ from flocsim.io.own_mark import marked
 
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""
+
+LAST = 1500
+"""Milliseconds for which an animation shows its last frame."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -207,3 +210,21 @@ def save(figure: Figure, path: str | Path, rule: Rule = redrawn) -> None:
         keep_titles_whole(figure)
         figure.savefig(picture, format=suffix, metadata=METADATA[suffix])
     write_file(path, marked(picture.getvalue(), f".{suffix}"), rule)
+
+
+def frame_of(figure: Figure) -> Any:
+    """What a figure that was drawn shows, as a Pillow image of 64 colours."""
+    from PIL import Image
+
+    pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
+    return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
+
+
+def save_gif(path: str | Path, frames: Sequence[Any], each: int, rule: Rule = redrawn) -> None:
+    """Write frames as a GIF that loops, ``each`` shown for so many milliseconds and the last for
+    LAST; FileError if it cannot be written."""
+    lasting = [each] * (len(frames) - 1) + [LAST]
+    buffer = io.BytesIO()
+    frames[0].save(buffer, "GIF", save_all=True, append_images=frames[1:], duration=lasting,
+                   loop=0, optimize=False)  # fmt: skip
+    write_file(path, marked(buffer.getvalue(), ".gif"), rule)

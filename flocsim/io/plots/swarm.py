@@ -4,7 +4,6 @@ A figure is a function of SwarmResults, and stands in SWARM_FIGURES under the na
 `flocsim plot` gives it.
 """
 
-import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,24 +12,30 @@ import numpy as np
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-from flocsim.io.files import Rule, write_file
+from flocsim.io.files import Rule
 from flocsim.io.outputs import redrawn
-from flocsim.io.own_mark import marked
-from flocsim.io.plots.style import Figure, graded_colours, house_style, new_figure
-from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.io.plots.style import (
+    Figure,
+    frame_of,
+    graded_colours,
+    house_style,
+    new_figure,
+    save_gif,
+)
+from flocsim.io.results.swarm_file import SwarmResults, mean
 
 MICRO = 1e6
 MOST_POINTS = 160
 """Points of an outline that is drawn: arcs finer than a picture of many bodies shows are left."""
 
-ALONE, WALL = "0.78", "0.35"
+ALONE, FIXED = "0.78", "0.35"
 """Colours of bodies that belong to no cluster of two or more, and of walls."""
 
 SNAPSHOTS = 4
 """Times that the figure of snapshots shows."""
 
-MILLISECONDS, LAST = 120, 1500
-"""Of every frame of an animation, and of the last."""
+MILLISECONDS = 120
+"""Of every frame of an animation."""
 
 
 def snapshots(results: SwarmResults) -> Figure:
@@ -130,13 +135,6 @@ def sizes_of(labels: np.ndarray) -> np.ndarray:
     return np.bincount(own)[own] if len(own) else np.zeros(0, dtype=int)
 
 
-def mean(values: np.ndarray) -> np.ndarray:
-    """The mean over swarms that got so far; NaN where none did."""
-    known = np.isfinite(values)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
-
-
 def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
     """The shape of a body, made of what the file has of it."""
     bodies = results.groups["bodies"]
@@ -169,7 +167,7 @@ def cluster_colours(labels: np.ndarray) -> list:
     for body, label in enumerate(labels.tolist()):
         firsts.setdefault(label, body)
     return [
-        WALL if label < 0 else (palette(firsts[label] % 20) if own[body] > 1 else ALONE)
+        FIXED if label < 0 else (palette(firsts[label] % 20) if own[body] > 1 else ALONE)
         for body, label in enumerate(labels.tolist())
     ]
 
@@ -187,11 +185,11 @@ def draw_bodies(axes, results, replicate, place, outlines=None):
     for outline, (x, y, angle), colour in zip(outlines, position, colours, strict=True):
         c, s = np.cos(angle), np.sin(angle)
         turned = outline @ np.array([[c, s], [-s, c]])
-        if colour != WALL:
+        if colour != FIXED:
             x, y = (x % width if "x" in repeats else x), (y % height if "y" in repeats else y)
         reach = np.hypot(*outline.T).max()
-        for i in shifts(x, reach, width, "x" in repeats and colour != WALL):
-            for j in shifts(y, reach, height, "y" in repeats and colour != WALL):
+        for i in shifts(x, reach, width, "x" in repeats and colour != FIXED):
+            for j in shifts(y, reach, height, "y" in repeats and colour != FIXED):
                 polygons.append(MICRO * (turned + [x + i, y + j]))
                 shades.append(colour)
     axes.add_collection(PolyCollection(polygons, facecolors=shades, edgecolors="0.25", lw=0.2))
@@ -216,8 +214,6 @@ def write_swarm_animation(
     path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = redrawn
 ) -> None:
     """Write a swarm at all its times as a GIF that loops; FileError if it cannot be written."""
-    from PIL import Image
-
     outlines, pictures = outlines_of(results, replicate), []
     width, height = results.groups["bodies"]["box"][replicate]
     for place in range(last_known(results) + 1):
@@ -227,13 +223,8 @@ def write_swarm_animation(
             draw_bodies(axes, results, replicate, place, outlines)
             axes.set_title(f"{results.scales['time'][place]:.4g} s")
             figure.canvas.draw()
-            pixels = np.asarray(figure.canvas.buffer_rgba())[:, :, :3]
-        pictures.append(Image.fromarray(np.ascontiguousarray(pixels)).quantize(64))
-    lasting = [MILLISECONDS] * (len(pictures) - 1) + [LAST]
-    buffer = io.BytesIO()
-    pictures[0].save(buffer, "GIF", save_all=True, append_images=pictures[1:], duration=lasting,
-                     loop=0, optimize=False)  # fmt: skip
-    write_file(path, marked(buffer.getvalue(), ".gif"), rule)
+            pictures.append(frame_of(figure))
+    save_gif(path, pictures, MILLISECONDS, rule)
 
 
 SWARM_FIGURES: dict[str, Callable[[SwarmResults], Figure]] = {

@@ -27,6 +27,9 @@ FORMAT = "flocsim swarm"
 SCHEMA_VERSION = 1
 ROOT = {"format": "text", "schema_version": "i8"}
 
+WALL = -2
+"""In `bodies/floc`: a wall."""
+
 MOMENTS = ("replicate", "time")
 COUNTS = {
     "clusters": ("f8", "1", "clusters, single bodies among them"),
@@ -129,6 +132,13 @@ class SwarmResults:
     def to_pandas(self) -> Any:
         """The counts as a pandas DataFrame, a row for every replicate and time."""
         return self.labelled().to_pandas(MOMENTS)
+
+
+def mean(values: np.ndarray) -> np.ndarray:
+    """The mean over replicates that got so far; NaN where none did."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
 
 
 def about_of(schema):
