@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands.fitting.overlays import draw, expected_overlays, pictures_beneath
 from flocsim.commands.fitting.pictures import (
     LOST,
     Options,
@@ -13,14 +14,13 @@ from flocsim.commands.fitting.pictures import (
     report,
     titles_of,
 )
-from flocsim.errors import FileError, ImageError, UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.fields.quantities import read_quantity
 from flocsim.io.files import write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
-from flocsim.io.plots.overlay import draw_overlay
-from flocsim.io.plots.style import checked_format, save
+from flocsim.io.plots.style import checked_format
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
 from flocsim.plausibility.ranges import PIXEL_SIZE
@@ -67,6 +67,9 @@ def add_parser(subparsers: Any) -> None:
         help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
         "what is left out, with the reason; with several pictures, one file each: "
         "FILE-picture.png")  # fmt: skip
+    add("--pictures", metavar="FOLDER",
+        help="with --masks: where the pictures of the same names are, for the overlay to be drawn "
+        "over them and not over the masks")  # fmt: skip
     add("--masks-out", metavar="FOLDER",
         help="write a label image of every picture, 0 outside and in each floc its number (PNG of "
         "16 bits), to be edited and read back by --masks")  # fmt: skip
@@ -111,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
     if args.overlay is not None:
         checked_format(args.overlay, "--overlay ")
     paths = list_pictures(args.images, options.masks)
+    beneath = pictures_beneath(args.pictures, paths, args.masks and args.overlay is not None)
     rule, drawn = data_rule(args.overwrite), figure_rule(args.overwrite)
     outputs = [Output(args.output, rule), Output(summary, rule)]
     if args.overlay is not None:
@@ -119,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         made_folder(args.masks_out)
         made = label_paths(args.masks_out, titles_of(paths)).values()
         outputs += [Output(path, rule) for path in made]
-    check_outputs(outputs, paths)
+    check_outputs(outputs, [*paths, *beneath.values()])
     doubt = PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
     if doubt:
         report(f"warning: {doubt}")
@@ -148,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:
-        lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1)
+        lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1, beneath)
     print(format_errors(entries))
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
@@ -279,48 +283,3 @@ def write_labels(folder, pictures, titles, rule):
     for picture in pictures:
         image = label_image(picture.found.foreground.shape, picture.regions, picture.name)
         write_file(paths[picture.name], image, rule)
-
-
-def overlay_paths(overlay, names, several):
-    """A path for the overlay of each of the pictures that have these (name, path of the file)."""
-    if not several:
-        return [overlay] * len(names)
-    paths: list[Path] = []
-    for name, file in names:
-        plain = Path(name.replace(":", "-").replace("/", "-"))
-        stem = plain.stem if plain.suffix.lower() == file.suffix.lower() else plain.name
-        path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
-        while path in paths:  # pictures a/b.png and a-b.png
-            path = path.with_name(f"{path.stem}'{path.suffix}")
-        paths.append(path)
-    return paths
-
-
-def expected_overlays(overlay, paths):
-    """The overlays that will be drawn, as far as it can be known before files are read."""
-    names = list(zip(titles_of(paths), paths, strict=True))
-    return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
-
-
-def draw(overlay, pictures, fits, options, rule, several):
-    """Write each picture with the outlines at the largest N and the smallest spheroradius.
-
-    Returns what could not be drawn because its picture cannot be read any more.
-    """
-    from flocsim.io.images.pictures import read_grey
-
-    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
-    names = [(each.name, each.path) for each in pictures]
-    paths, lost = overlay_paths(overlay, names, several or len(pictures) > 1), []
-    for picture, path in zip(pictures, paths, strict=True):
-        flocs = [(region, next(results)[radius][most]) for region in picture.regions]
-        title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
-        try:
-            grey = picture.found.foreground if options.masks else read_grey(picture.path)
-        except (ImageError, MemoryError) as error:
-            report(str(error) or f"{picture.name}: there was not enough memory for its overlay")
-            lost.append(str(path))
-            continue
-        figure = draw_overlay(grey, flocs, title, picture.found.rejected)
-        save(figure, path, rule)
-    return lost

@@ -13,7 +13,7 @@ from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.exchange.vtkhdf import write_vtkhdf
 from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.opening import kind_of, opened_file
+from flocsim.io.opening import opened_file
 
 KIND = "flocsim trajectory"
 SCHEMA_VERSION = 2
@@ -110,11 +110,6 @@ class StoredTrajectory:
         if "status" in self.facts:
             return str(self.facts["status"])
         return f"replicate {self.facts['replicate']}" if "replicate" in self.facts else "motion"
-
-
-def is_trajectory(path: str | Path) -> bool:
-    """Whether a file is a trajectory's, by its kind; FileError where it cannot be opened."""
-    return kind_of(path) == KIND
 
 
 def read_trajectory(path: str | Path) -> StoredTrajectory:

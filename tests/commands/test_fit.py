@@ -407,3 +407,58 @@ def test_a_real_frame(tmp_path, capsys):
     for entry in read_library(tmp_path / "s.h5"):
         errors = [entry.fits[n].relative_error for n in (1, 4, 16)]
         assert errors == sorted(errors, reverse=True)
+
+
+def overlay_of_masks(tmp_path, *options):
+    """The exit code of a fit of label images, and the pixels of its overlay."""
+    name = tmp_path / "look.png"
+    code = run(tmp_path / "labels", *QUICK, "--masks", "-o", tmp_path / "m.h5", "--overwrite",
+               "--overlay", name, *options)  # fmt: skip
+    with Image.open(name) as picture:
+        return code, np.asarray(picture.convert("L")).astype(float)
+
+
+def test_the_overlay_of_masks_is_drawn_over_their_pictures(tmp_path, frame, capsys):
+    """A picture brighter at one side says which of both is beneath."""
+    with Image.open(frame / "a.png") as picture:
+        grey = np.array(picture)
+    Image.fromarray((grey * np.linspace(0.4, 1.0, 200)).astype(np.uint8)).save(frame / "a.png")
+    labels = ("--masks-out", tmp_path / "labels")
+    assert run(frame, *QUICK, *labels, "-o", tmp_path / "s.h5") == 0
+    code, alone = overlay_of_masks(tmp_path)
+    code_beneath, over = overlay_of_masks(tmp_path, "--pictures", frame)
+    assert code == code_beneath == 0
+    assert "warning" not in capsys.readouterr().err
+    middle = slice(over.shape[0] // 3, over.shape[0] // 2)
+    sides = [
+        (np.median(each[middle, :30]), np.median(each[middle, -30:])) for each in (alone, over)
+    ]
+    assert sides[0][0] == sides[0][1] and sides[1][0] < sides[1][1] - 50.0
+
+
+def test_masks_without_a_picture_are_told_and_drawn_by_themselves(tmp_path, frame, capsys):
+    assert run(frame, *QUICK, "--masks-out", tmp_path / "labels", "-o", tmp_path / "s.h5") == 0
+    (tmp_path / "labels/a.png").rename(tmp_path / "labels/b.png")
+    assert overlay_of_masks(tmp_path, "--pictures", frame)[0] == 0
+    assert f"{frame} has no picture of b.png; drawn over the mask" in capsys.readouterr().err
+    Image.fromarray(np.zeros((20, 20), np.uint8)).save(frame / "b.png")
+    assert overlay_of_masks(tmp_path, "--pictures", frame)[0] == 0
+    assert "b.png has 20 × 20 pixels and its mask 200 × 150" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--masks", "--pictures", "frames"), "give --masks and --overlay"),
+        (("--overlay", "o.png", "--pictures", "frames"), "give --masks and --overlay"),
+        (("--masks", "--overlay", "o.png", "--pictures", "none"), "takes a folder, found 'none'"),
+        (("--masks", "--overlay", "o.png", "--pictures", "frames"), "a.bmp and a.png, so that"),
+    ],
+)
+def test_pictures_beneath_that_cannot_be_used_are_refused(
+    tmp_path, frame, monkeypatch, options, message
+):
+    monkeypatch.chdir(tmp_path)
+    (frame / "a.bmp").write_bytes(b"another of that name")
+    with pytest.raises(UsageError, match=message):
+        run(frame / "a.png", *QUICK, *options, "-o", tmp_path / "m.h5")

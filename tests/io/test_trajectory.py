@@ -8,7 +8,8 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.files import read_sealed
-from flocsim.io.trajectory import DATASETS, is_trajectory, read_trajectory, write_trajectory
+from flocsim.io.opening import kind_of
+from flocsim.io.trajectory import DATASETS, KIND, read_trajectory, write_trajectory
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 
@@ -69,7 +70,7 @@ def test_a_file_that_cannot_be_written(tmp_path):
 def test_what_was_written_is_read_back(tmp_path):
     times, position, velocity = written(tmp_path / "m.h5", replicate=17, status="FINISHED")
     found = read_trajectory(tmp_path / "m.h5")
-    assert is_trajectory(tmp_path / "m.h5")
+    assert kind_of(tmp_path / "m.h5") == KIND
     for array, again in zip((times, position, velocity), (found.t, found.position, found.velocity),
                             strict=True):  # fmt: skip
         np.testing.assert_array_equal(array, again)

@@ -1,2 +1,2 @@
-"""The work behind `flocsim fit`: pictures to fits (`pictures`), and the processes that share it
-(`processes`)."""
+"""The work behind `flocsim fit`: pictures to fits (`pictures`), the processes that share it
+(`processes`), and what is drawn of it over the pictures (`overlays`)."""

@@ -1,0 +1,106 @@
+"""The overlays of `flocsim fit`: where they go, and what they are drawn over."""
+
+from pathlib import Path
+
+from flocsim.commands.fitting.pictures import MOST_NAMES, report, titles_of
+from flocsim.errors import ImageError, UsageError
+from flocsim.io.images.reading import SUFFIXES, read_grey
+from flocsim.io.plots.overlay import draw_overlay
+from flocsim.io.plots.style import save
+from flocsim.io.shapes.fit_report import plural
+
+
+def pictures_beneath(name, paths, drawn):
+    """{path of a mask: its picture in the folder of that name, None for none}.
+
+    ``drawn``: whether overlays of masks are drawn at all. UsageError where it cannot be used.
+    """
+    if name is None:
+        return {}
+    if not drawn:
+        raise UsageError(
+            "--pictures says what the overlay of masks is drawn over; give --masks and --overlay"
+        )
+    folder = Path(name)
+    if not folder.is_dir():
+        raise UsageError(f"--pictures takes a folder, found {name!r}")
+    named: dict[str, list[Path]] = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() in SUFFIXES:
+            named.setdefault(path.stem, []).append(path)
+    found = {path: named[path.stem] for path in paths if path.stem in named}
+    for mask, several in found.items():
+        if len(several) > 1:
+            raise UsageError(
+                f"--pictures {name} has {several[0].name} and {several[1].name}, so that "
+                f"it is not known which is the picture of {mask.name}; move one away"
+            )
+    missing = [path.name for path in paths if path not in found]
+    if missing:
+        shown, more = ", ".join(missing[:MOST_NAMES]), len(missing) - MOST_NAMES
+        report(
+            f"warning: --pictures {name} has no picture of {shown}"
+            f"{f' and {more} more' if more > 0 else ''}; drawn over the mask"
+        )
+    return {mask: several[0] for mask, several in found.items()}
+
+
+def grey_beneath(picture, beneath, options):
+    """What the overlay of a picture is drawn over."""
+    if not options.masks:
+        return read_grey(picture.path)
+    mask = picture.found.foreground
+    if picture.path not in beneath:
+        return mask
+    grey = read_grey(beneath[picture.path])
+    if grey.shape == mask.shape:
+        return grey
+    sizes = [f"{width} × {height}" for height, width in (grey.shape, mask.shape)]
+    report(
+        f"warning: {beneath[picture.path]} has {sizes[0]} pixels and its mask {sizes[1]}; drawn "
+        "over the mask"
+    )
+    return mask
+
+
+def overlay_paths(overlay, names, several):
+    """A path for the overlay of each of the pictures that have these (name, path of the file)."""
+    if not several:
+        return [overlay] * len(names)
+    paths: list[Path] = []
+    for name, file in names:
+        plain = Path(name.replace(":", "-").replace("/", "-"))
+        stem = plain.stem if plain.suffix.lower() == file.suffix.lower() else plain.name
+        path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
+        while path in paths:  # pictures a/b.png and a-b.png
+            path = path.with_name(f"{path.stem}'{path.suffix}")
+        paths.append(path)
+    return paths
+
+
+def expected_overlays(overlay, paths):
+    """The overlays that will be drawn, as far as it can be known before files are read."""
+    names = list(zip(titles_of(paths), paths, strict=True))
+    return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
+
+
+def draw(overlay, pictures, fits, options, rule, several, beneath):
+    """Write each picture with the outlines at the largest N and the smallest spheroradius.
+
+    Returns what could not be drawn because its picture cannot be read any more.
+    """
+    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
+    names = [(each.name, each.path) for each in pictures]
+    paths, lost = overlay_paths(overlay, names, several or len(pictures) > 1), []
+    for picture, path in zip(pictures, paths, strict=True):
+        flocs = [(region, next(results)[radius][most]) for region in picture.regions]
+        title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
+        try:
+            grey = grey_beneath(picture, beneath, options)
+        except (ImageError, MemoryError) as error:
+            report(str(error) or f"{picture.name}: there was not enough memory for its overlay")
+            lost.append(str(path))
+            continue
+        figure = draw_overlay(grey, flocs, title, picture.found.rejected)
+        save(figure, path, rule)
+    return lost
