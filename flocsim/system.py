@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import (
+    DENSE,
     ERROR,
     EVALUATIONS,
     NOW,
@@ -33,6 +34,7 @@ from flocsim.forces.smoothing import smoothing_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
+from flocsim.integrators import few_bodies
 from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
@@ -164,10 +166,12 @@ class System:
         velocity = [(*body.velocity, body.spin) for body in self.bodies]
         return np.array(position, dtype=float), np.array(velocity, dtype=float)
 
-    def fillings(self, observer: Fillings | None = None) -> Fillings:
-        """{hook: function} of integrator, shapes and an observer."""
+    def fillings(self, observer: Fillings | None = None, *, grows: bool = False) -> Fillings:
+        """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
+        to serve any number of bodies, not these alone."""
         shapes: Fillings = spheres_only.FILLINGS if self.spheres_only else {}
-        filled = {**self.integrator.fillings, **shapes, **(observer or {})}
+        few = few_bodies.FILLINGS if len(self.bodies) <= DENSE and not grows else {}
+        filled = {**few, **self.integrator.fillings, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "

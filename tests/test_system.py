@@ -209,6 +209,18 @@ def test_spheres_alone_reach_no_polygon_code():
     assert spheres_only.FILLINGS.items() <= fillings.items()
 
 
+def test_few_bodies_leave_out_what_only_many_need():
+    row = [Body(BALL.shape, (3e-5 * k, 0.0), surface_density=2.0) for k in range(7)]
+    few, many = (
+        {name.rpartition("_")[0] for name in names_reached(system.compose(jit=False))}
+        for system in (System(row[:6], [ELASTIC]), System(row, [ELASTIC]))
+    )
+    for name in ("near_pairs", "wandered", "find_pattern", "factorise_sparse", "solve_sparse"):
+        assert name in many
+        assert name not in few
+    assert System(row, [ELASTIC]).fillings() == System(row[:6], [ELASTIC]).fillings(grows=True)
+
+
 CLOSE_FORCES = [
     Gravity(), StokesDrag(), VanDerWaals(1e-18, gap="surface"), VanDerWaals(1e-18),
     DoubleLayer(15e-3, 1e-8, gap="surface"), Contact(k_n=20.0, k_t=2.0, friction=0.3),

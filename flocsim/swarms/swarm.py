@@ -152,7 +152,7 @@ class Swarm:
     def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of integrator, shapes and the watch over paths; the same with a box and
         without, so that one engine serves both."""
-        return {**self.system.fillings({observe: watch_paths}), **PERIODIC}
+        return {**self.system.fillings({observe: watch_paths}, grows=True), **PERIODIC}
 
     def run(
         self, until: float | str, *, every: float | str | None = None,

@@ -28,6 +28,7 @@ from flocsim.geometry.contact.sweep import (
     WAY_Y,
     near_pairs,
 )
+from flocsim.hooks import hook
 
 WANDER = 0.25
 """How far a body may go against the mean of all, in mean bounding radii, until pairs are listed
@@ -62,6 +63,7 @@ def drift_of(scene, work, state, axis):
     return total / scene.bodies.shape[0]
 
 
+@hook
 def wandered(scene, work, state):
     """The largest share of its way that a body has gone since the listing, against the mean."""
     most, furthest = wander_of(scene), 0.0
@@ -73,6 +75,7 @@ def wandered(scene, work, state):
     return furthest / most
 
 
+@hook
 def time_to_wander(scene, work, share):
     """The time [s] in which no body goes further than a share of its way, at constant speed."""
     most, fastest = wander_of(scene), 0.0
@@ -85,6 +88,7 @@ def time_to_wander(scene, work, share):
     return share * most / fastest if fastest > 0.0 else math.inf
 
 
+@hook
 def list_near(scene, work, cut):
     """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
     discs, (width, height) = work.discs, scene.box

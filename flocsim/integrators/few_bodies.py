@@ -1,0 +1,45 @@
+"""What is left out of a scene of few bodies: the search among many, and sparse systems.
+
+All pairs of few bodies are watched and their systems are dense (flocsim.arrays: ALL_PAIRS, DENSE),
+so that none of this is ever reached; leaving it out saves what compiling it takes.
+"""
+
+import math
+from collections.abc import Callable
+
+from flocsim.geometry.contact import body_pairs
+from flocsim.integrators.radau import elimination
+
+
+def list_none(scene, work, cut):
+    """All pairs are listed from the start."""
+    return True
+
+
+def none_wandered(scene, work, state):
+    """No list can become too old."""
+    return 0.0
+
+
+def never_wanders(scene, work, share):
+    """The time [s] for which the list of all pairs is good."""
+    return math.inf
+
+
+def factorise_none(scene, work, step):
+    """There are no sparse systems."""
+    return False
+
+
+def solve_none(work, both):
+    """There are no sparse systems."""
+
+
+FILLINGS: dict[Callable, Callable] = {
+    body_pairs.list_near: list_none,
+    body_pairs.wandered: none_wandered,
+    body_pairs.time_to_wander: never_wanders,
+    elimination.factorise_sparse: factorise_none,
+    elimination.solve_sparse: solve_none,
+}
+"""The replacements, for flocsim.compiler.composer.compose."""
