@@ -26,7 +26,7 @@ from flocsim.swarms.arrays import (
 )
 from flocsim.swarms.runner import Islands, Runner
 
-LEAST_WANDER = 0.02
+LEAST_WANDER = 0.05
 """A body may stray by so many bounding radii at least."""
 
 MORE_WANDER, LESS_WANDER = 2.0, 0.7
@@ -36,7 +36,7 @@ might before."""
 MOST_TRIES = 4
 """Tries of a window before it is made shorter."""
 
-CROWDED, SPARSE = 3.0, 1.5
+CROWDED, SPARSE = 1.5, 1.2
 """Windows get shorter where their islands take more than so many times the work of the least ones,
 those of no time at all, longer where they take less."""
 
