@@ -128,7 +128,7 @@ def hull_areas(
         rings = []
         for each in np.flatnonzero(label == cluster):
             x, y = places[each].tolist()
-            rings.append(bodies[each].shape.outline(x, y, float(angles[each]))[0])
+            rings += bodies[each].shape.outline(x, y, float(angles[each]))
         # In micrometres: the hull's own rounding is far below them.
         areas[cluster] = 1e-12 * ConvexHull(1e6 * np.concatenate(rings)).volume
     return areas

@@ -43,7 +43,7 @@ class ThreadArrays:
             scene = self.template._replace(
                 bodies=np.ones((size, self.template.bodies.shape[1])),
                 first=np.zeros(size + 1, dtype=np.int64),
-                vertices=np.zeros((points, 2)),
+                vertices=np.zeros((points, self.template.vertices.shape[1])),
                 tree=np.zeros((2 * points, 3)),
             )
             zeros = np.zeros((size, 3))

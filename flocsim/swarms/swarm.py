@@ -132,9 +132,8 @@ class Swarm:
         for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
             a, b = self.bodies[i], self.bodies[j]
             fault = overlap_fault(
-                a.shape.placed_vertices(*vector, a.angle), a.shape.radius,
-                b.shape.placed_vertices(0.0, 0.0, b.angle), b.shape.radius,
-            )  # fmt: skip
+                a.shape.placed_parts(*vector, a.angle), b.shape.placed_parts(0.0, 0.0, b.angle)
+            )
             if fault:
                 raise UsageError(f"bodies {j} and {i} start {fault}; move them apart")
 

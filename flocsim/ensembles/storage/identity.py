@@ -21,7 +21,7 @@ from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
-from flocsim.geometry.contact.circle_tree import outlines_of
+from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
