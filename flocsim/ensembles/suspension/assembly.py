@@ -19,7 +19,7 @@ from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
-from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, SwarmResults
+from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, POINTS, RINGS, SwarmResults
 
 
 @attrs.define(eq=False)
@@ -95,11 +95,9 @@ def results_of(
         for name in ("r_eq", "spheroradius", "mass", "floc", "box")
     } | {
         "first_point": ends - counts, "point_count": counts,
-        "points": np.array([
-            np.pad(each["points"], ((0, points - len(each["points"])), (0, 0)))
-            for each in per_body
-        ]),
     }  # fmt: skip
+    for name in (*POINTS, *RINGS):
+        arrays["bodies"][name] = np.array([filled_up(each[name], points) for each in per_body])
     shape = replicates, len(stops)
     classes = np.array([0.0, *study.scene.bounds])
     numbers = {name: np.full(shape, np.nan) for name in (*SUMMARY, "error")}
@@ -138,6 +136,11 @@ def results_of(
         "point": np.arange(points),
     }  # fmt: skip
     return SwarmResults(scales, arrays, run), failed
+
+
+def filled_up(column: np.ndarray, rows: int) -> np.ndarray:
+    """A column of core points with zeros behind them, so many rows in all."""
+    return np.pad(column, ((0, rows - len(column)), *[(0, 0)] * (column.ndim - 1)))
 
 
 def read(journal: Journal, record: Record | None) -> Part:

@@ -68,9 +68,10 @@ def check_bodies(part: Part, form: Form) -> None:
     shaped(part, {
         "r_eq": ("f8", (n,)), "spheroradius": ("f8", (n,)), "mass": ("f8", (n,)),
         "floc": ("i4", (n,)), "count": ("i8", (n,)), "points": ("f8", (points, 2)),
-        "box": ("f8", (2,)),
+        "point_part": ("i4", (points,)), "point_ring": ("i4", (points,)),
+        "point_radius": ("f8", (points,)), "box": ("f8", (2,)),
     })  # fmt: skip
-    for name in ("r_eq", "spheroradius", "mass", "box"):
+    for name in ("r_eq", "spheroradius", "mass", "point_radius", "box"):
         demand(np.all(part.arrays[name] > 0.0), name)
     counts = part.arrays["count"]
     demand(np.all((counts >= 1) & (counts <= points)) and counts.sum() == points, "count")

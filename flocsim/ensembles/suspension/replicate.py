@@ -8,6 +8,7 @@ import numpy as np
 
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
+from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.clusters import Clusters
@@ -86,15 +87,18 @@ def bodies_part(
 ) -> Part:  # fmt: skip
     """What is the same at all times: the bodies, a wall the last of them, and the box."""
     shapes = [body.shape for body in swarm.bodies]
-    points = [shape.vertices for shape in shapes]
+    tables = [table_of(shape.parts) for shape in shapes]
     walls = len(shapes) - len(drawn.flocs)
     return Part(replicate, BODIES, {
         "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
         "spheroradius": np.array([shape.radius for shape in shapes]),
         "mass": np.array([body.mass for body in swarm.bodies]),
         "floc": np.append(drawn.flocs, np.full(walls, FIXED)).astype(np.int32),
-        "count": np.array([len(each) for each in points], dtype=np.int64),
-        "points": np.concatenate(points),
+        "count": np.array([len(each.place) for each in tables], dtype=np.int64),
+        "points": np.concatenate([each.place for each in tables]),
+        "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
+        "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
+        "point_radius": np.concatenate([each.radius for each in tables]),
         "box": np.array(box),
     })  # fmt: skip
 

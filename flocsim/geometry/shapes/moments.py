@@ -63,7 +63,8 @@ def ring_pieces(ring, radius, number):
     starts, units, lengths = unit_edges(ring)
     if len(ring) == 1:
         first, turn = np.zeros(1), np.full(1, 2.0 * np.pi)
-        side_starts, side_units, side_lengths, at_start, at_end = starts, units, *3 * (lengths,)
+        side_starts, side_units, side_lengths = starts, units, lengths
+        at_start = at_end = lengths
     else:
         side_starts, side_units, side_lengths = sides_of(ring)
         before = np.roll(side_units, 1, axis=0)
@@ -150,6 +151,25 @@ def arc_offset_cuts(found):
     return joined(*cuts)
 
 
+def touching_cuts(origins, directions, found):
+    """Where lines (rows), offsets of sides, touch the circles around points of other parts: there
+    begins or ends what two parts share."""
+    to_centre = found.points[None] - origins[:, None]
+    apart = np.abs(cross(directions[:, None], to_centre)) - found.point_radius
+    other = found.point_part != found.side_part[:, None]
+    rows, columns = np.nonzero(other & (np.abs(apart) < SHARED * found.point_radius))
+    return rows, np.einsum("ij,ij->i", to_centre[rows, columns], directions[rows])
+
+
+def shared_arc_cuts(found):
+    """Where arcs around the same point (rows), of other parts, begin and end: rows and angles."""
+    apart = np.hypot(*np.moveaxis(found.points[None] - found.points[:, None], -1, 0))
+    other = found.point_part != found.point_part[:, None]
+    rows, columns = np.nonzero(other & (apart < SHARED * found.point_radius))
+    first, turn = found.first[columns], found.turn[columns]
+    return np.tile(rows, 2), np.concatenate([first, first + turn])
+
+
 def joined(*parts):
     """Tuples of arrays, put together part by part."""
     return tuple(np.concatenate(same) for same in zip(*parts, strict=True))
@@ -179,6 +199,10 @@ FAINT = 1e-3
 
 COVERED = 1.0 - 1e-9
 """A point nearer to the core than this share of the radius is inside the swept shape."""
+
+
+SHARED = 1e-9
+"""Outlines of two parts that are nearer than this share of the radius run along each other."""
 
 
 def exposed(points, normals, owners, parts):
@@ -261,6 +285,8 @@ def chord_nodes(parts, found):
     origins = found.side_starts + found.side_radius[:, None] * outward
     origins = origins + found.at_start[:, None] * units
     cuts = joined(circle_cuts(origins, units, found), offset_cuts(origins, units, found))
+    if len(parts) > 1:
+        cuts = joined(cuts, touching_cuts(origins, units, found))
     whole = np.maximum(lengths - found.at_start - found.at_end, 0.0)
     rows, low, high = pieces(*cuts, whole)
     middle = origins[rows] + (0.5 * (low + high))[:, None] * units[rows]
@@ -280,6 +306,8 @@ def arc_nodes(parts, found):
     """
     points, first, radius = found.points, found.first, found.point_radius
     rows, angles = joined(arc_circle_cuts(found), arc_offset_cuts(found))
+    if len(parts) > 1:
+        rows, angles = joined((rows, angles), shared_arc_cuts(found))
     turns = np.mod(angles - first[rows], 2.0 * np.pi)
     rows, low, high = pieces(rows, turns, found.turn)
     middle = first[rows] + 0.5 * (low + high)

@@ -1,7 +1,7 @@
 """SpheroPolygon: a simple polygon, with or without holes, swept by a disk (paper section 2.2,
 eq. 1)."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import attrs
 import numpy as np
@@ -83,3 +83,13 @@ def scaled_outline(shape: Shape, factor: float) -> Shape:
     copy = object.__new__(SpheroPolygon)
     copy.__dict__.update(core=vertices, radius=shape.radius * factor, holes=(), swept=swept)
     return copy
+
+
+def shape_of_parts(parts: Sequence[Part]) -> Shape:
+    """The plainest shape of these parts; ShapeError where they make no body."""
+    if len(parts) > 1:
+        return Composite(parts)
+    (outer, *holes), radius = parts[0]
+    if len(outer) == 1:
+        return Sphere(radius)
+    return SpheroPolygon(outer, radius, holes=holes)

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule, write_file
 from flocsim.io.outputs import redrawn
 from flocsim.io.own_mark import marked
+from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import Figure, graded_colours, house_style, new_figure
 from flocsim.io.results.swarm_file import SwarmResults
 
@@ -141,19 +142,21 @@ def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
     """The shape of a body, made of what the file has of it."""
     bodies = results.groups["bodies"]
     first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
-    radius = float(bodies["spheroradius"][replicate, body])
-    if count == 1:
-        return Sphere(radius)
-    return SpheroPolygon(bodies["points"][replicate, first : first + count], radius)
+    rows = slice(first, first + count)
+    columns = (
+        bodies[name][replicate, rows]
+        for name in ("points", "point_part", "point_ring", "point_radius")
+    )
+    return shape_of_parts(parts_in(PointTable(*columns)))
 
 
-def outlines_of(results: SwarmResults, replicate: int) -> list[np.ndarray]:
-    """The outer outline of every body about its centroid, (k, 2) [m]."""
+def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]:
+    """The rings of the outline of every body about its centroid, (k, 2) [m]."""
     bodies = results.groups["bodies"]["r_eq"].shape[1]
     found = []
     for body in range(bodies):
-        ring = shape_of(results, replicate, body).outline(0.0, 0.0, 0.0)[0]
-        found.append(ring[:: max(1, len(ring) // MOST_POINTS)])
+        rings = shape_of(results, replicate, body).outline(0.0, 0.0, 0.0)
+        found.append([ring[:: max(1, len(ring) // MOST_POINTS)] for ring in rings])
     return found
 
 
@@ -176,27 +179,29 @@ def cluster_colours(labels: np.ndarray) -> list:
 
 def draw_bodies(axes, results, replicate, place, outlines=None):
     """All bodies at a time, inside the box, which repeats itself where it does."""
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import PathCollection
 
     outlines = outlines_of(results, replicate) if outlines is None else outlines
     width, height = results.groups["bodies"]["box"][replicate]
     repeats = str(results.run.get("periodic", "xy"))
     position = results.groups["snapshots"]["position"][replicate, place]
     colours = cluster_colours(results.groups["snapshots"]["cluster"][replicate, place])
-    polygons, shades = [], []
+    paths, shades, lowest = [], [], []
     for outline, (x, y, angle), colour in zip(outlines, position, colours, strict=True):
         c, s = np.cos(angle), np.sin(angle)
-        turned = outline @ np.array([[c, s], [-s, c]])
+        turned = [ring @ np.array([[c, s], [-s, c]]) for ring in outline]
         if colour != WALL:
             x, y = (x % width if "x" in repeats else x), (y % height if "y" in repeats else y)
-        reach = np.hypot(*outline.T).max()
+        reach = max(np.hypot(*ring.T).max() for ring in outline)
         for i in shifts(x, reach, width, "x" in repeats and colour != WALL):
             for j in shifts(y, reach, height, "y" in repeats and colour != WALL):
-                polygons.append(MICRO * (turned + [x + i, y + j]))
+                rings = [MICRO * (ring + [x + i, y + j]) for ring in turned]
+                paths.append(rings_path(rings))
+                lowest.append(min(ring[:, 1].min() for ring in rings))
                 shades.append(colour)
-    axes.add_collection(PolyCollection(polygons, facecolors=shades, edgecolors="0.25", lw=0.2))
+    axes.add_collection(PathCollection(paths, facecolors=shades, edgecolors="0.25", lw=0.2))
     axes.set_xlim(0.0, MICRO * width)
-    low = 0.0 if "y" in repeats else float(np.nanmin([each[:, 1].min() for each in polygons]))
+    low = 0.0 if "y" in repeats else float(np.nanmin(lowest))
     high = MICRO * height
     axes.set_ylim(max(min(low, 0.0), -0.1 * high) if "y" not in repeats else 0.0, high)
     axes.set_aspect("equal")

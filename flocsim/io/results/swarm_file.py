@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
@@ -24,7 +25,7 @@ from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 ROOT = {"format": "text", "schema_version": "i8"}
 
 MOMENTS = ("replicate", "time")
@@ -50,7 +51,7 @@ SNAPSHOTS = {
 CLUSTER = {"cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known")}
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
-    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core"),
+    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
     "mass": ("f8", "kg", "mass"),
     "floc": ("i4", "1", "floc of the library or the pool; -1 a sphere, -2 a wall"),
     "first_point": ("i8", "1", "place in points of the first core point"),
@@ -59,6 +60,13 @@ BODIES = {
 """Columns (replicate, body)."""
 
 POINTS = {"points": ("f8", "m", "core points of all bodies, about their centroids")}
+RINGS = {
+    "point_part": ("i4", "1", "part of its body that a core point belongs to"),
+    "point_ring": ("i4", "1", "ring of the part: 0 its outline, from 1 its holes"),
+    "point_radius": ("f8", "m", "radius of the disk that sweeps the part"),
+}
+"""Columns (replicate, point)."""
+
 BOX = {"box": ("f8", "m", "width and height of the box")}
 ENDS = {
     "finished": ("i4", "1", "1: came to its end; 0: stopped before it"),
@@ -86,6 +94,7 @@ GROUPS: dict[str, list[tuple[dict, tuple[str, ...]]]] = {
     "snapshots": [(SNAPSHOTS, (*MOMENTS, "body", "component")), (CLUSTER, (*MOMENTS, "body"))],
     "bodies": [
         (BODIES, ("replicate", "body")), (POINTS, ("replicate", "point", "axis")),
+        (RINGS, ("replicate", "point")),
         (BOX, ("replicate", "axis")),
     ],
     "ends": [(ENDS, ("replicate",))],
@@ -224,6 +233,15 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
     for name in ("r_eq", "spheroradius"):
         if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
             raise ValueError(f"bodies/{name} holds what is no radius")
+    for replicate, body in np.ndindex(*first.shape):
+        begin, many = int(first[replicate, body]), int(count[replicate, body])
+        columns = (
+            bodies[name][replicate, begin : begin + many] for name in (*POINTS, *RINGS)
+        )  # fmt: skip
+        table = PointTable(*columns)
+        if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
+            raise ValueError("bodies/point_radius holds what is no radius")
+        parts_in(table)
     if not np.all((bodies["box"] > 0.0) & np.isfinite(bodies["box"])):
         raise ValueError("its box has no size")
     if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
