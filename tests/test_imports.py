@@ -48,7 +48,7 @@ INNER_ROWS = {
     "swarms": [
         ["swarm"],
         ["trajectory"],
-        ["progress"],
+        ["progress", "bonds"],
         ["runner", "clusters"],
         ["contacts", "islands", "neighbours", "placement", "walls"],
         ["arrays"],

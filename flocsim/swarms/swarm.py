@@ -20,6 +20,7 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
+from flocsim.swarms.bonds import BondGauge
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.islands import run_islands, watch_paths
 from flocsim.swarms.neighbours import find_islands
@@ -95,6 +96,10 @@ class Swarm:
     def gauge(self) -> Gauge:
         """What measures the gaps of its bodies, wherever they are."""
         return Gauge(self.system.scene()._replace(box=self.box), self.fillings())
+
+    def bond_gauge(self) -> BondGauge:
+        """What tells the kinds of bonds of its bodies, wherever they are."""
+        return BondGauge(self)
 
     def check_reach(self) -> None:
         """UsageError for forces that reach all bodies of many."""
@@ -189,7 +194,7 @@ class Swarm:
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
-            time.perf_counter() - began, self.bodies, self.box, gauge,
+            time.perf_counter() - began, self.bodies, self.box, gauge, self.bond_gauge,
         )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
-from flocsim.io.results.swarm_file import AXES, COMPONENTS, ENDS, POINTS, RINGS, SwarmResults
+from flocsim.io.results.swarm_file import AXES, BONDS, COMPONENTS, ENDS, POINTS, RINGS, SwarmResults
 
 
 @attrs.define(eq=False)
@@ -104,6 +104,7 @@ def results_of(
     by_class = np.full((*shape, len(classes)), np.nan)
     motion = np.full((*shape, n, 6), np.nan)
     labels = np.full((*shape, n), -1, dtype=np.int32)
+    bonds = [np.zeros((0, len(BONDS)), dtype=np.int32)]
     tallies = {name: np.zeros(replicates, ENDS[name][0]) for name in ENDS}
     for replicate, own in found.items():
         ended = own.ended or {}
@@ -125,15 +126,21 @@ def results_of(
             motion[replicate, place] = part.arrays["motion"]
             labels[replicate, place] = part.arrays["cluster"]
             by_class[replicate, place] = part.arrays["counts"]
+            pairs = part.arrays["bonds"]
+            at = np.broadcast_to(np.array([replicate, place], np.int32), (len(pairs), 2))
+            bonds.append(np.concatenate([at, pairs], axis=1))
     arrays["counts"] = numbers | {"n_class": by_class}
     arrays["snapshots"] = {
         "position": motion[..., :3], "velocity": motion[..., 3:], "cluster": labels,
     }  # fmt: skip
+    together = np.concatenate(bonds)
+    together = together[np.lexsort(together.T[::-1])]
+    arrays["bonds"] = dict(zip(BONDS, together.T.copy(), strict=True))
     arrays["ends"] = tallies
     scales = {
         "replicate": np.arange(replicates), "time": np.array(stops), "class": classes,
         "body": np.arange(n), "component": np.array(COMPONENTS), "axis": np.array(AXES),
-        "point": np.arange(points),
+        "point": np.arange(points), "bond": np.arange(len(together)),
     }  # fmt: skip
     return SwarmResults(scales, arrays, run), failed
 
@@ -159,6 +166,8 @@ def table_of(results: SwarmResults) -> str:
         "mean size": (mean(counts["mean_size"]), "{:.2f}"),
         "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
         "porosity": (mean(counts["porosity"]), "{:.3f}"),
+        "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
+        "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
         "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
         "error [m]": (mean(counts["error"]), "{:.1e}"),
     }

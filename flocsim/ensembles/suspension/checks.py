@@ -9,6 +9,7 @@ import numpy as np
 
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, SUMMARY, Part
 from flocsim.integrators.base import Status
+from flocsim.io.results.swarm_file import KIND_COUNT
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
 from flocsim.swarms.progress import Effort
 
@@ -79,9 +80,13 @@ def check_bodies(part: Part, form: Form) -> None:
 
 def check_moment(part: Part, form: Form) -> None:
     n = form.bodies
+    bonds = part.arrays.get("bonds", np.zeros((0, 3)))
+    many = len(bonds) if bonds.ndim else 0
     shaped(part, {
         "motion": ("f8", (n, 6)), "cluster": ("i4", (n,)), "counts": ("i8", (form.classes,)),
+        "bonds": ("i4", (many, 3)),
     })  # fmt: skip
+    demand(np.all((bonds >= 0) & (bonds < [n, n, KIND_COUNT])), "bonds")
     labels = part.arrays["cluster"]
     demand(np.all((labels >= -1) & (labels < n)), "cluster")
     demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
@@ -96,6 +101,7 @@ def check_state(part: Part, form: Form) -> None:
     count = len(links) if links.ndim else 0
     one: tuple[int, ...] = ()
     shaped(part, {
+        "seen": ("f8", (n, 6)),
         "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
         "steps": ("f8", (n,)), "wander": ("f8", (n,)), "links": ("i8", (count, 4)),
         "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),

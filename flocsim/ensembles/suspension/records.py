@@ -21,8 +21,10 @@ LISTED = {"replicate": int, "of": str, "arrays": [[object]]}
 NUMBERS = ("time", "error")
 """Numbers that a MOMENT says, beside SUMMARY."""
 
-SUMMARY = ("clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension",
-           "settling")  # fmt: skip
+SUMMARY = (
+    "clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension", "settling",
+    "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching",
+)  # fmt: skip
 """What is told of the clusters at a moment, as flocsim.io.results.swarm_file.COUNTS says."""
 
 KINDS = {"f8": np.float64, "i8": np.int64, "i4": np.int32}

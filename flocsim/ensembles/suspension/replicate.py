@@ -11,6 +11,7 @@ from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
+from flocsim.swarms.bonds import Bonds
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.progress import Progress
@@ -38,32 +39,38 @@ def run_replicate(
     off, its state kept.
     """
     swarm, drawn, box = study.swarm(replicate)
-    gauge = swarm.gauge()
+    gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
     swarm.check_overlaps(gauge)
     progress = swarm.begin(study.scene.duration, max_steps=study.config.integrator.max_steps)
     stops = study.stops
     if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
-        keep(moment_part(replicate, 0, study, swarm, gauge, progress))
+        seen = progress.swarm.motion.copy()
+        bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
+        keep(moment_part(replicate, 0, study, swarm, gauge, progress, bonds))
         moments = 1
     else:
         progress.restore(left.state)
-        moments = left.moments
+        moments, seen = left.moments, left.state["seen"]
     kept_at, status = time.monotonic(), Status.FINISHED
     for place in range(moments, len(stops)):
         while (status := progress.advance(stops[place])) == Status.PAUSED:
             late = time.monotonic() - kept_at > study.scene.checkpoint
             stopped = halted is not None and halted()
             if late or stopped:
-                keep(state_part(replicate, place, progress))
+                keep(state_part(replicate, place, progress, seen))
                 kept_at = time.monotonic()
             if stopped:
                 return False
         if status != Status.FINISHED:
             break
-        keep(moment_part(replicate, place, study, swarm, gauge, progress))
+        now, motion, _ = progress.seen()
+        near = gauge.neighbours(motion[:, :3])
+        bonds = bond_gauge.bonds(now, motion, near, (stops[place - 1], seen))
+        keep(moment_part(replicate, place, study, swarm, gauge, progress, bonds))
+        seen = motion
         if place + 1 < len(stops) and halted is not None and halted():
-            keep(state_part(replicate, place + 1, progress))
+            keep(state_part(replicate, place + 1, progress, seen))
             return False
     keep(end_part(replicate, status, progress))
     return True
@@ -104,15 +111,18 @@ def bodies_part(
 
 
 def moment_part(
-    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress
-) -> Part:
-    """A snapshot, its clusters with it."""
+    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress,
+    bonds: Bonds,
+) -> Part:  # fmt: skip
+    """A snapshot, its clusters and bonds with it."""
     now, motion, error = progress.seen()
     position, velocity = motion[:, :3], motion[:, 3:]
     near = gauge.neighbours(position, study.scene.link)
     found = Clusters.of(swarm.bodies, position, velocity, near)
     facts = {"place": place, "time": now, "error": error} | summary_of(found)
+    facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
     arrays = {"motion": motion, "cluster": found.label.astype(np.int32)}
+    arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
     return Part(replicate, MOMENT, arrays, facts)
@@ -132,9 +142,9 @@ def summary_of(clusters: Clusters) -> dict[str, float]:
     }
 
 
-def state_part(replicate: int, moments: int, progress: Progress) -> Part:
-    """What the rest of the replicate follows from."""
-    return Part(replicate, STATE, progress.state(), {"moments": moments})
+def state_part(replicate: int, moments: int, progress: Progress, seen: np.ndarray) -> Part:
+    """What the rest of the replicate follows from; ``seen``: the motion at the last snapshot."""
+    return Part(replicate, STATE, progress.state() | {"seen": seen}, {"moments": moments})
 
 
 def end_part(replicate: int, status: Status, progress: Progress) -> Part:

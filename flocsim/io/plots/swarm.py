@@ -27,6 +27,12 @@ MOST_POINTS = 160
 ALONE, WALL = "0.78", "0.35"
 """Colours of bodies that belong to no cluster of two or more, and of walls."""
 
+BOND_COLOURS = (
+    ("certificate", "certificate", "#0072B2"), ("rest", "rest", "#56B4E9"),
+    ("hook", "hook", "#E69F00"), ("touching", "touching", "0.82"),
+)  # fmt: skip
+"""Kinds of bonds, from below, with their words and colours."""
+
 SNAPSHOTS = 4
 """Times that the figure of snapshots shows."""
 
@@ -59,8 +65,8 @@ def clusters(results: SwarmResults) -> Figure:
         ("settling", 1e3, "settling [mm/s]"),
     ]
     with house_style():
-        figure = new_figure(7.4, 2.3)
-        panels = figure.subplots(1, len(shown))
+        figure = new_figure(9.2, 2.3)
+        *panels, last = figure.subplots(1, len(shown) + 1)
         for axes, (name, factor, label) in zip(panels, shown, strict=True):
             values = factor * counts[name]
             for each in values if len(values) > 1 else ():
@@ -73,7 +79,21 @@ def clusters(results: SwarmResults) -> Figure:
             panels[0].plot([], [], color="0.8", linewidth=0.7, label="a swarm")
             panels[0].plot([], [], color="#0072B2", label="mean")
             panels[0].legend()
+        draw_bonds(last, results)
         return figure
+
+
+def draw_bonds(axes, results):
+    """The pairs that touch over time, by what holds them, in the mean over swarms."""
+    counts, times, below = results.groups["counts"], results.scales["time"], 0.0
+    for kind, word, colour in BOND_COLOURS:
+        level = below + mean(counts[f"bonds_{kind}"])
+        axes.fill_between(times, below, level, color=colour, label=word, linewidth=0.0)
+        below = level
+    axes.set_xlabel("time [s]")
+    axes.set_title("bonds", fontsize=8.0)
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="upper left", fontsize=6)
 
 
 def sizes(results: SwarmResults) -> Figure:

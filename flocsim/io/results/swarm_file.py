@@ -3,6 +3,7 @@
 - ``counts``     numbers on the clusters of every replicate over time, and clusters by size class
 - ``snapshots``  places, velocities and clusters of all bodies at every time
 - ``bodies``     the bodies of every replicate: sizes, masses, core points, and its box
+- ``bonds``      the pairs that touch, and what holds them, at every time
 - ``ends``       how every replicate ended, and what it took
 - ``run``        scalars: config text, versions, machine
 """
@@ -37,6 +38,10 @@ COUNTS = {
     "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass"),
     "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
     "settling": ("f8", "m s-1", "downward velocity of clusters, in the mean over mass"),
+    "bonds_certificate": ("f8", "1", "touching pairs that no later load can part"),
+    "bonds_hook": ("f8", "1", "touching pairs at rest that their shapes hold, not attraction"),
+    "bonds_rest": ("f8", "1", "touching pairs at rest, by attraction that outweighs the load"),
+    "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
@@ -49,6 +54,18 @@ SNAPSHOTS = {
 """Columns (replicate, time, body, component)."""
 
 CLUSTER = {"cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known")}
+BONDS = {
+    "bond_replicate": ("i4", "1", "replicate of the pair"),
+    "bond_time": ("i4", "1", "place of the snapshot among the times"),
+    "bond_later": ("i4", "1", "the later one of two bodies that touch"),
+    "bond_earlier": ("i4", "1", "the earlier one"),
+    "bond_kind": ("i4", "1", "0 touching, 1 certificate, 2 hook, 3 rest"),
+}
+"""Columns (bond,): the pairs that touch at all times of all replicates."""
+
+KIND_COUNT = 4
+"""Kinds of bonds."""
+
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
     "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
@@ -86,6 +103,7 @@ SCALES = {
     "component": ("text", "1", "of a place, and of its rate"),
     "axis": ("text", "1", "of a point"),
     "point": ("i8", "1", "number of the core point"),
+    "bond": ("i8", "1", "number of the pair"),
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
@@ -97,6 +115,7 @@ GROUPS: dict[str, list[tuple[dict, tuple[str, ...]]]] = {
         (RINGS, ("replicate", "point")),
         (BOX, ("replicate", "axis")),
     ],
+    "bonds": [(BONDS, ("bond",))],
     "ends": [(ENDS, ("replicate",))],
 }  # fmt: skip
 """Groups → columns and their axes."""
@@ -246,6 +265,15 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         raise ValueError("its box has no size")
     if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
         raise ValueError("its times do not rise")
+    check_bonds(groups["bonds"], groups["snapshots"]["cluster"].shape)
     labels = groups["snapshots"]["cluster"]
     if np.any(labels < -1) or np.any(labels >= max(labels.shape[-1], 1)):
         raise ValueError("snapshots/cluster holds what is no cluster")
+
+
+def check_bonds(bonds: Mapping[str, np.ndarray], shape: tuple[int, ...]) -> None:
+    """ValueError for pairs that are none of (replicates, times, bodies), or of no kind."""
+    limits = (*shape, shape[2], KIND_COUNT)
+    for name, limit in zip(BONDS, limits, strict=True):
+        if np.any(bonds[name] < 0) or np.any(bonds[name] >= limit):
+            raise ValueError(f"bonds/{name} holds what cannot be")
