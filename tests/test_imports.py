@@ -49,6 +49,7 @@ INNER_ROWS = {
         ["swarm"],
         ["trajectory"],
         ["progress", "bonds"],
+        ["leaving"],
         ["runner", "clusters"],
         ["contacts", "islands", "neighbours", "placement", "walls"],
         ["arrays"],

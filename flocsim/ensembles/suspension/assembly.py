@@ -19,7 +19,16 @@ from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
-from flocsim.io.results.swarm_file import AXES, BONDS, COMPONENTS, ENDS, POINTS, RINGS, SwarmResults
+from flocsim.io.results.swarm_file import (
+    AXES,
+    BONDS,
+    COMPONENTS,
+    ENDS,
+    GONE,
+    POINTS,
+    RINGS,
+    SwarmResults,
+)
 
 
 @attrs.define(eq=False)
@@ -123,8 +132,9 @@ def results_of(
             for name, values in numbers.items():
                 value = part.facts.get(name)
                 values[replicate, place] = np.nan if value is None else value
-            motion[replicate, place] = part.arrays["motion"]
             labels[replicate, place] = part.arrays["cluster"]
+            left = labels[replicate, place] == GONE
+            motion[replicate, place] = np.where(left[:, None], np.nan, part.arrays["motion"])
             by_class[replicate, place] = part.arrays["counts"]
             pairs = part.arrays["bonds"]
             at = np.broadcast_to(np.array([replicate, place], np.int32), (len(pairs), 2))

@@ -9,7 +9,7 @@ import numpy as np
 
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, SUMMARY, Part
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import KIND_COUNT
+from flocsim.io.results.swarm_file import GONE, KIND_COUNT
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
 from flocsim.swarms.progress import Effort
 
@@ -88,7 +88,7 @@ def check_moment(part: Part, form: Form) -> None:
     })  # fmt: skip
     demand(np.all((bonds >= 0) & (bonds < [n, n, KIND_COUNT])), "bonds")
     labels = part.arrays["cluster"]
-    demand(np.all((labels >= -1) & (labels < n)), "cluster")
+    demand(np.all((labels >= GONE) & (labels < n)), "cluster")
     demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
     demand(is_count(part.facts.get("place"), form.moments - 1), "place")
     for name in (*SUMMARY, "error"):
@@ -106,10 +106,13 @@ def check_state(part: Part, form: Form) -> None:
         "steps": ("f8", (n,)), "wander": ("f8", (n,)), "links": ("i8", (count, 4)),
         "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
         "error": ("f8", one), "effort": ("i8", (len(EFFORT),)),
+        "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
     for name in ("steps", "wander"):
         demand(np.all(part.arrays[name] > 0.0), name)
     demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
+    gone, returns = part.arrays["gone"], part.arrays["returns"]
+    demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")
     bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
     demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
     demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")

@@ -23,7 +23,8 @@ NUMBERS = ("time", "error")
 
 SUMMARY = (
     "clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension", "settling",
-    "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching",
+    "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching", "removed",
+    "reentered",
 )  # fmt: skip
 """What is told of the clusters at a moment, as flocsim.io.results.swarm_file.COUNTS says."""
 

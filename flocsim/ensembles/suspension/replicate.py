@@ -10,6 +10,7 @@ from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Par
 from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
+from flocsim.io.results.swarm_file import GONE
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.bonds import Bonds
 from flocsim.swarms.clusters import Clusters
@@ -41,7 +42,10 @@ def run_replicate(
     swarm, drawn, box = study.swarm(replicate)
     gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
     swarm.check_overlaps(gauge)
-    progress = swarm.begin(study.scene.duration, max_steps=study.config.integrator.max_steps)
+    progress = swarm.begin(
+        study.scene.duration, max_steps=study.config.integrator.max_steps,
+        leaving=study.leaving(replicate, swarm, box),
+    )  # fmt: skip
     stops = study.stops
     if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
@@ -64,9 +68,9 @@ def run_replicate(
                 return False
         if status != Status.FINISHED:
             break
-        now, motion, _ = progress.seen()
+        motion = progress.swarm.motion.copy()
         near = gauge.neighbours(motion[:, :3])
-        bonds = bond_gauge.bonds(now, motion, near, (stops[place - 1], seen))
+        bonds = bond_gauge.bonds(stops[place], motion, near, (stops[place - 1], seen))
         keep(moment_part(replicate, place, study, swarm, gauge, progress, bonds))
         seen = motion
         if place + 1 < len(stops) and halted is not None and halted():
@@ -116,12 +120,16 @@ def moment_part(
 ) -> Part:  # fmt: skip
     """A snapshot, its clusters and bonds with it."""
     now, motion, error = progress.seen()
-    position, velocity = motion[:, :3], motion[:, 3:]
+    # Where what is gone lies, so far outside that it is nobody's neighbour.
+    position, velocity = progress.swarm.motion[:, :3], progress.swarm.motion[:, 3:]
     near = gauge.neighbours(position, study.scene.link)
-    found = Clusters.of(swarm.bodies, position, velocity, near)
+    found = Clusters.of(swarm.bodies, position, velocity, near, ~progress.gone)
     facts = {"place": place, "time": now, "error": error} | summary_of(found)
+    facts |= {"removed": int(progress.gone.sum()), "reentered": int(progress.returns.sum())}
     facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
-    arrays = {"motion": motion, "cluster": found.label.astype(np.int32)}
+    label = np.where(progress.gone, GONE, found.label).astype(np.int32)
+    # A record has numbers only.
+    arrays = {"motion": np.where(progress.gone[:, None], 0.0, motion), "cluster": label}
     arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
@@ -130,6 +138,8 @@ def moment_part(
 
 def summary_of(clusters: Clusters) -> dict[str, float]:
     """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first two."""
+    if not len(clusters):
+        return {"clusters": 0, "largest": 0}
     share = clusters.mass / clusters.mass.sum()
     return {
         "clusters": len(clusters),

@@ -18,7 +18,7 @@ from flocsim.io.outputs import redrawn
 from flocsim.io.own_mark import marked
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import Figure, graded_colours, house_style, new_figure
-from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.io.results.swarm_file import GONE, SwarmResults
 
 MICRO = 1e6
 MOST_POINTS = 160
@@ -141,8 +141,9 @@ def classes(results: SwarmResults) -> Figure:
 
 def last_known(results: SwarmResults) -> int:
     """The place of the last time that the first swarm has reached."""
-    known = np.isfinite(results.groups["snapshots"]["position"][0, :, :, 0]).all(axis=1)
-    return int(np.flatnonzero(known)[-1])
+    snapshots = results.groups["snapshots"]
+    known = np.isfinite(snapshots["position"][0, :, :, 0]) | (snapshots["cluster"][0] == GONE)
+    return int(np.flatnonzero(known.all(axis=1))[-1])
 
 
 def sizes_of(labels: np.ndarray) -> np.ndarray:
@@ -208,6 +209,8 @@ def draw_bodies(axes, results, replicate, place, outlines=None):
     colours = cluster_colours(results.groups["snapshots"]["cluster"][replicate, place])
     paths, shades, lowest = [], [], []
     for outline, (x, y, angle), colour in zip(outlines, position, colours, strict=True):
+        if not np.isfinite(x):
+            continue  # It has left the box.
         c, s = np.cos(angle), np.sin(angle)
         turned = [ring @ np.array([[c, s], [-s, c]]) for ring in outline]
         if colour != WALL:
@@ -221,7 +224,7 @@ def draw_bodies(axes, results, replicate, place, outlines=None):
                 shades.append(colour)
     axes.add_collection(PathCollection(paths, facecolors=shades, edgecolors="0.25", lw=0.2))
     axes.set_xlim(0.0, MICRO * width)
-    low = 0.0 if "y" in repeats else float(np.nanmin(lowest))
+    low = 0.0 if "y" in repeats else float(min(lowest, default=0.0))
     high = MICRO * height
     axes.set_ylim(max(min(low, 0.0), -0.1 * high) if "y" not in repeats else 0.0, high)
     axes.set_aspect("equal")

@@ -42,6 +42,8 @@ COUNTS = {
     "bonds_hook": ("f8", "1", "touching pairs at rest that their shapes hold, not attraction"),
     "bonds_rest": ("f8", "1", "touching pairs at rest, by attraction that outweighs the load"),
     "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
+    "removed": ("f8", "1", "bodies that have left the box for good"),
+    "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
@@ -53,7 +55,12 @@ SNAPSHOTS = {
 }
 """Columns (replicate, time, body, component)."""
 
-CLUSTER = {"cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known")}
+CLUSTER = {
+    "cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known; -2: it left")
+}
+GONE = -2
+"""The cluster of a body that has left the box for good."""
+
 BONDS = {
     "bond_replicate": ("i4", "1", "replicate of the pair"),
     "bond_time": ("i4", "1", "place of the snapshot among the times"),
@@ -267,7 +274,7 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         raise ValueError("its times do not rise")
     check_bonds(groups["bonds"], groups["snapshots"]["cluster"].shape)
     labels = groups["snapshots"]["cluster"]
-    if np.any(labels < -1) or np.any(labels >= max(labels.shape[-1], 1)):
+    if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
         raise ValueError("snapshots/cluster holds what is no cluster")
 
 
