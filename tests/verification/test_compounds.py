@@ -129,7 +129,7 @@ def test_swarms_of_compounds_end_as_one_run_does():
         for k in range(9)
     ]
     forces = [Gravity(), StokesDrag(), VanDerWaals(1e-19, gap="surface", cut=1e-6), CONTACT]
-    swarm = finished(Swarm(bodies, forces, fluid=WATER), 0.05)
-    one = finished(System(bodies, forces, fluid=WATER), 0.05)
+    swarm = finished(Swarm(bodies, forces, fluid=WATER), 0.2)
+    one = finished(System(bodies, forces, fluid=WATER), 0.2)
     assert len(swarm.neighbours().pairs) > 0
     assert furthest(swarm.position[-1], one.position[-1]) < 1e-9 + swarm.error[-1] + one.error
