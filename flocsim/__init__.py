@@ -30,6 +30,7 @@ __version__ = "0.1.0"
 
 HOMES = {
     "Body": "body",
+    "Composite": "geometry.shapes.composite",
     "Fluid": "body",
     "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
@@ -60,6 +61,7 @@ ROOMS = ("ensembles", "errors", "forces", "geometry", "integrators")
 __all__ = [
     "Body",
     "Comparison",
+    "Composite",
     "Fluid",
     "Shape",
     "Sphere",

@@ -11,7 +11,7 @@ from flocsim.arrays import Scene
 from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import flag, in_unit, quantity, word_or_quantity
-from flocsim.geometry.contact.circle_tree import outlines_of
+from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.laws import LAWS
 

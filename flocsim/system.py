@@ -31,7 +31,7 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.smoothing import smoothing_of
-from flocsim.geometry.contact import spheres_only
+from flocsim.geometry.contact import compounds, spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
 from flocsim.integrators import few_bodies
@@ -170,6 +170,8 @@ class System:
         """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
         to serve any number of bodies, not these alone."""
         shapes: Fillings = spheres_only.FILLINGS if self.spheres_only else {}
+        if any(body.shape.is_compound for body in self.bodies):
+            shapes = compounds.FILLINGS
         few = few_bodies.FILLINGS if len(self.bodies) <= DENSE and not grows else {}
         filled = {**few, **self.integrator.fillings, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
@@ -190,9 +192,9 @@ class System:
         """UsageError where two bodies start with crossing cores or too deep an overlap."""
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
             fault = overlap_fault(
-                a.shape.placed_vertices(*a.position, a.angle), a.shape.radius,
-                b.shape.placed_vertices(*b.position, b.angle), b.shape.radius,
-            )  # fmt: skip
+                a.shape.placed_parts(*a.position, a.angle),
+                b.shape.placed_parts(*b.position, b.angle),
+            )
             if fault:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
 

@@ -48,7 +48,8 @@ INNER_ROWS = {
     "swarms": [
         ["swarm"],
         ["trajectory"],
-        ["progress"],
+        ["progress", "bonds"],
+        ["leaving"],
         ["runner", "clusters"],
         ["contacts", "islands", "neighbours", "placement", "walls"],
         ["arrays"],

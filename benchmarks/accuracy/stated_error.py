@@ -20,7 +20,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim import Body, System
+from flocsim import Body, Swarm, System
 from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
@@ -29,6 +29,7 @@ from flocsim.errors import PlausibilityWarning
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance
+from flocsim.swarms.placement import place_at_random
 
 # Scenes made for what they show: flocs thrown at each other in water are faster than Stokes's drag.
 warnings.simplefilter("ignore", PlausibilityWarning)
@@ -120,6 +121,24 @@ def several_bodies(rng, number):
     return system, float(rng.uniform(4e-4, 1e-3))
 
 
+def fifty_bodies(rng, number):
+    """Fifty flocs in a crowd that are thrown about: run as a swarm, in islands and windows."""
+    shapes = [random_shape(rng) for _ in range(50)]
+    side = math.sqrt(sum(shape.area for shape in shapes) / CROWDED)
+    places = place_at_random(shapes, (side, side), rng, (False, False), gap=1e-7)
+    bodies = [
+        Body(shape, (x, y), angle, tuple(0.02 * rng.normal(size=2)), float(rng.normal() * 3e2),
+             surface_density=2.0)
+        for shape, (x, y, angle) in zip(shapes, places.tolist(), strict=True)
+    ]  # fmt: skip
+    system = System(bodies, [Gravity(), StokesDrag(), Contact()], Implicit())
+    return system, float(rng.uniform(1e-4, 3e-4))
+
+
+CROWDED = 0.12
+"""Area fraction of the crowd."""
+
+
 def free_flight(rng, number):
     """Two flocs that bounce once or more in nothing, and fly on for a few of their sizes."""
     height, speed = 4e-5, float(rng.uniform(0.01, 0.1))
@@ -136,8 +155,17 @@ def free_flight(rng, number):
 
 
 FAMILIES = {each.__name__: each for each in (
-    departing, rolling, friction, surface_forces, several_bodies, free_flight,
+    departing, rolling, friction, surface_forces, several_bodies, free_flight, fifty_bodies,
 )}  # fmt: skip
+
+
+def ended_swarm(system, until):
+    """(places at the end (n, 3), stated error [m]) of the bodies of a system run as a swarm; None
+    where it does not come to its end."""
+    found = Swarm(system.bodies, system.forces, system.integrator, system.fluid).run(until)
+    if found.status != Status.FINISHED:
+        return None
+    return found.position[-1], float(found.error[-1])
 
 
 def ended(system, until):
@@ -153,15 +181,20 @@ def judge(family, tolerance, number):
         return "another outcome"
     system, until = drawn
     exact = attrs.evolve(system, integrator=Implicit(EXACT))
-    found, best = ended(attrs.evolve(system, integrator=Implicit(tolerance)), until), None
+    own, best = attrs.evolve(system, integrator=Implicit(tolerance)), None
+    if family == "fifty_bodies":
+        found = ended_swarm(own, until)
+    else:
+        one = ended(own, until)
+        found = None if one is None else (one.position[-1], one.error)
     if found is None or (best := ended(exact, until)) is None:
         return "did not end"
-    there = best.position[-1]
-    true = end_distance(system.bodies, found.position[-1], there)
+    (places, stated), there = found, best.position[-1]
+    true = end_distance(system.bodies, places, there)
     if true < UNTOUCHED:
         return "nothing met"
     growth = exact.amplification(until, there, MOST_STEPS, nudge=NUDGE)
-    return true, found.error, growth
+    return true, stated, growth
 
 
 def judged(family, tolerance, runs, processes, seconds, first=0):

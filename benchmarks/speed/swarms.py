@@ -1,11 +1,12 @@
-"""What a swarm costs: a body and step, 1,000 flocs for 10 s, threads, memory, velocity Verlet.
+"""What a swarm costs: a body and step, 1,000 flocs for 10 s, pairs, threads, memory, Verlet.
 
-    python -m benchmarks.speed.swarms [--quick] [--parts cost flocs threads verlet memory]
+    python -m benchmarks.speed.swarms [--quick] [--parts cost flocs pairs threads verlet memory]
 
 Swarms are those of studies (`[scene] kind = "swarm"`, preset `si`, van der Waals cut at 1 um). CPU
 time of this process, compiled code warm.
 """
 
+import math
 import resource
 import time
 from pathlib import Path
@@ -14,10 +15,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim import System
+from flocsim import Body, Fluid, Sphere, Swarm, System
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.suspension.runner import warm
 from flocsim.ensembles.suspension.study import SwarmStudy
+from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import VelocityVerlet
 from flocsim.integrators.base import Status
 
@@ -43,7 +45,8 @@ cut = "1 um"
 debye_length = "9.6 nm"
 """
 
-PARTS = ("cost", "flocs", "threads", "verlet", "memory")
+WATER = Fluid(buoyancy=True)
+PARTS = ("cost", "flocs", "pairs", "threads", "verlet", "memory")
 SAFE = 0.2
 """Verlet's step over 1/ω of the contact: at 2 it is unstable, at .2 its error is some percent."""
 
@@ -89,6 +92,48 @@ def flocs(arguments, table):
     clusters = found.clusters()
     table.add(number, found.t[-1], spent, wall, found.effort.body_steps, len(clusters),
               clusters.mean_size, float(found.error[-1]), found.status.name)  # fmt: skip
+
+
+def pairs(arguments, table):
+    """Pairs far apart in one box: each against its run alone, in places and in time."""
+    number, until = (100 if arguments.quick else 1000), 0.3
+    bodies = [body for each in range(number) for body in lone_pair(each, number)]
+    forces = [Gravity(), StokesDrag(), VanDerWaals(1e-19, gap="surface", cut=1e-6), Contact()]
+    side = APART * math.ceil(math.sqrt(number))
+    swarm = Swarm(bodies, forces, fluid=WATER, box=(side, side))
+    systems = [System(bodies[k : k + 2], forces, fluid=WATER) for k in range(0, 2 * number, 2)]
+    swarm.run(1e-4)
+    systems[0].run(1e-4)
+    _, wall, found = run(swarm, until)
+    began = time.perf_counter()
+    alone = [system.run(until, record=False) for system in systems]
+    each = time.perf_counter() - began
+    furthest, beyond = 0.0, 0
+    for number_of, one in enumerate(alone):
+        place = found.position[-1, 2 * number_of : 2 * number_of + 2]
+        apart = float(np.hypot(*(place - one.position[-1])[:, :2].T).max())
+        furthest = max(furthest, apart)
+        beyond += apart > one.error + float(found.error[-1])
+    met = len(found.neighbours().pairs)
+    table.add(number, met, found.t[-1], furthest, float(found.error[-1]), beyond, wall, each,
+              wall / each)  # fmt: skip
+
+
+APART = 5e-4
+"""Pairs lie so far apart [m]: they fall by less than that, and forces end at 1 um."""
+
+
+def lone_pair(number, count):
+    """Two flocs, the larger one above the other, of which some meet and some do not."""
+    rng = np.random.default_rng([number, 5])
+    column, row = divmod(number, math.ceil(math.sqrt(count)))
+    radii = 5e-6 * rng.uniform([0.6, 1.2], [1.0, 1.8])
+    aside, up = 5e-6 * rng.uniform(-2.5, 2.5), 1.1 * radii.sum()
+    places = [(0.0, 0.0), (aside, up)]
+    return [
+        Body(Sphere(float(radius)), (APART * column + x, APART * row + y), density=2650.0)
+        for radius, (x, y) in zip(radii, places, strict=True)
+    ]
 
 
 def threads(arguments, table):
@@ -138,6 +183,9 @@ TABLES = {
     "flocs": (flocs, "Flocs of N = 16, area fraction .1", (
         "bodies", "time [s]", "CPU [s]", "wall [s]", "body steps", "clusters", "mean size",
         "stated error [m]", "ended")),
+    "pairs": (pairs, "Pairs of discs far apart in one box, and each by itself", (
+        "pairs", "touching", "time [s]", "largest distance [m]", "stated error [m]",
+        "beyond both errors", "box [s]", "alone [s]", "box/alone")),
     "threads": (threads, "Two threads, dilute discs", (
         "bodies", "one [s]", "two [s]", "ratio", "bytes")),
     "verlet": (verlet, "Velocity Verlet, extrapolated", (

@@ -55,6 +55,9 @@ def add_parser(subparsers: Any) -> None:
         "the outline, the plain baseline (default: %(default)s)")  # fmt: skip
     add("--preserve-area", action="store_true", help="give every shape exactly its floc's area")
     add("--inscribed", action="store_true", help="keep every shape inside its floc")
+    add("--holes", action="store_true",
+        help="keep the holes of flocs, the largest ones: the vertices are shared among the outline "
+        "and them, and area and centroid are those of what is left")  # fmt: skip
     add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
     add("--masks", action="store_true",
         help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
@@ -149,6 +152,8 @@ def run(args: argparse.Namespace) -> int:
         return LOST if lost else 2
     settings = {"method": options.method, "preserve_area": options.preserve_area,
                 "inscribed": options.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
+    if options.holes:
+        settings["holes"] = True
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:
@@ -202,6 +207,7 @@ def read_options(args):
         method=args.method,
         preserve_area=args.preserve_area,
         inscribed=args.inscribed,
+        holes=args.holes,
         max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
         masks=args.masks,
         background=args.background,

@@ -8,9 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.exchange.vtkhdf import write_vtkhdf
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.opening import opened_file
@@ -47,9 +48,10 @@ def write_trajectory(
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
     Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],
-    their spheroradii in the attribute ``radius``, and moving outlines for ParaView in the group
-    ``VTKHDF``; ``rule`` says what becomes of a file that is there. Raises FileError if it cannot be
-    written.
+    their spheroradii in the attribute ``radius``, of bodies with holes or parts also what part,
+    ring and radius belongs to a point (``part_0``, ``ring_0``, ``point_radius_0``), and moving
+    outlines for ParaView in the group ``VTKHDF``; ``rule`` says what becomes of a file that is
+    there. Raises FileError if it cannot be written.
     """
     import h5py
 
@@ -89,6 +91,13 @@ def write_trajectory(
             dataset = write(f"vertices_{body}", np.array(shape.vertices), axes)
             dataset.attrs["units"] = "m"
             dataset.attrs["radius"] = shape.radius
+            if shape.is_compound:
+                table = table_of(shape.parts)
+                for name, column in (("part", table.part), ("ring", table.ring)):
+                    dataset = write(f"{name}_{body}", column, axes[:1])
+                    dataset.attrs["units"] = "1"
+                dataset = write(f"point_radius_{body}", table.radius, axes[:1])
+                dataset.attrs["units"] = "m"
         write_vtkhdf(file, times, position, shapes)
     write_file(path, seal(buffer.getvalue()), rule)
 
@@ -137,7 +146,13 @@ def stored_trajectory(file):
     for body in range(bodies):
         vertices = file[f"vertices_{body}"]
         radius, points = float(vertices.attrs["radius"]), vertices[()]
-        shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))
+        if f"part_{body}" in file:
+            columns = [file[f"{name}_{body}"][()] for name in ("part", "ring", "point_radius")]
+            if any(column.shape != (len(points),) for column in columns):
+                raise ValueError("the columns of its core points are not as long as these")
+            shapes.append(shape_of_parts(parts_in(PointTable(points, *columns))))
+        else:
+            shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))
     return StoredTrajectory(time, *arrays, tuple(shapes), facts)
 
 

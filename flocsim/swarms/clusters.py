@@ -55,10 +55,13 @@ class Clusters:
     @classmethod
     def of(
         cls, bodies: tuple[Body, ...], position: np.ndarray, velocity: np.ndarray,
-        neighbours: Neighbours,
+        neighbours: Neighbours, present: np.ndarray | None = None,
     ) -> "Clusters":  # fmt: skip
-        """The clusters of bodies at their places and velocities (n, 3)."""
+        """The clusters of bodies at their places and velocities (n, 3); of those ``present`` (n,)
+        bool, where not all are."""
         free = np.array([not body.fixed for body in bodies])
+        if present is not None:
+            free = free & present
         both = free[neighbours.pairs].all(axis=1)
         held = Neighbours(neighbours.pairs[both], neighbours.gap[both], neighbours.vector[both])
         labels, places = placed_together(len(bodies), held)
@@ -128,7 +131,7 @@ def hull_areas(
         rings = []
         for each in np.flatnonzero(label == cluster):
             x, y = places[each].tolist()
-            rings.append(bodies[each].shape.outline(x, y, float(angles[each]))[0])
+            rings += bodies[each].shape.outline(x, y, float(angles[each]))
         # In micrometres: the hull's own rounding is far below them.
         areas[cluster] = 1e-12 * ConvexHull(1e6 * np.concatenate(rings)).volume
     return areas

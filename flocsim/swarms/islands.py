@@ -104,7 +104,7 @@ def put_scene(swarm, scene, members, first):
         scene.first[body] = point
         begin, end = swarm.first[member], swarm.first[member + 1]
         for each in range(begin, end):
-            for axis in range(2):
+            for axis in range(swarm.vertices.shape[1]):
                 scene.vertices[point + each - begin, axis] = swarm.vertices[each, axis]
         for row in range(2 * (end - begin)):
             for column in range(3):

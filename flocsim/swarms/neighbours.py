@@ -9,6 +9,7 @@ not pass on what acts on them: each is a part of all islands that can reach it.
 import math
 
 from flocsim.arrays import ANGLE, BOUNDING_RADIUS, FREE, RADIUS, SPIN, VX, VY, X, Y
+from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.sweep import (
     MOVES,
     PLACE_X,
@@ -43,11 +44,23 @@ def core_distance2(swarm, wall, x, y):
     x, y = cosine * x + sine * y, cosine * y - sine * x
     first, v, least = swarm.first[wall], swarm.vertices, math.inf
     points = swarm.first[wall + 1] - first
-    for start in range(first, first + max(edge_count(points), 1)):
+    rings = v.shape[1] > ONWARD
+    for start in range(first, first + (points if rings else max(edge_count(points), 1))):
         end = edge_end(first, points, start) if points > 1 else start
+        if rings:
+            end = start + int(v[start, ONWARD])
         distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
         least = min(least, distance2)
     return least
+
+
+def widest_swell(swarm, wall):
+    """By how much the widest disk of a fixed body is wider than its narrowest [m]."""
+    widest = 0.0
+    if swarm.vertices.shape[1] > SWELL:
+        for point in range(swarm.first[wall], swarm.first[wall + 1]):
+            widest = max(widest, swarm.vertices[point, SWELL])
+    return widest
 
 
 def reaches_wall(swarm, body, wall, span, reach, width, height):
@@ -58,7 +71,7 @@ def reaches_wall(swarm, body, wall, span, reach, width, height):
     way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
     way += span * abs(m[wall, SPIN]) * swarm.bodies[wall, BOUNDING_RADIUS]
     near = swarm.bodies[body, BOUNDING_RADIUS] + swarm.bodies[wall, RADIUS] + reach
-    near += way + swarm.wander[body]
+    near += way + swarm.wander[body] + widest_swell(swarm, wall)
     return core_distance2(swarm, wall, x, y) < near * near
 
 

@@ -7,13 +7,13 @@ after endless trials; far less is reached in practice, and less by shapes that r
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.contact.overlap import distance_between
-from flocsim.geometry.shapes.cores import cores_cross, inside_polygon
+from flocsim.geometry.shapes.parts import core_gap, cores_overlap
 from flocsim.geometry.shapes.shape import Shape
 
 MOST_TRIALS = 5_000
@@ -94,11 +94,12 @@ class Placement:
             return True
         if len(shape.vertices) == 1 and len(there.vertices) == 1:
             return False
-        a = shape.placed_vertices(float(way[0]), float(way[1]), float(place[2]))
-        b = there.placed_vertices(0.0, 0.0, self.places[other, 2])
-        if inside_polygon(a, b).any() or inside_polygon(b, a).any() or cores_cross(a, b):
+        a = shape.placed_parts(float(way[0]), float(way[1]), float(place[2]))
+        b = there.placed_parts(0.0, 0.0, self.places[other, 2])
+        pairs = list(product(a, b))
+        if any(cores_overlap(one, two) for one, two in pairs):
             return False
-        return distance_between(a, b) - shape.radius - there.radius >= self.gap
+        return all(core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in pairs)
 
 
 def place_at_random(

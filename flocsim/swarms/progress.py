@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.arrays import BOUNDING_RADIUS, FREE, VX, VY
+from flocsim.arrays import BOUNDING_RADIUS, FREE, MASS, VX, VY
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import (
     BEGIN,
@@ -24,6 +24,7 @@ from flocsim.swarms.arrays import (
     Swarm,
     with_links,
 )
+from flocsim.swarms.leaving import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Runner
 
 LEAST_WANDER = 0.05
@@ -86,13 +87,17 @@ class Progress:
     """A swarm on its way.
 
     Parameters: ``runner``; ``swarm``, its arrays; ``box`` [m]; ``reach`` [m] of all forces;
-    ``until`` [s].
+    ``until`` [s]; ``leaving``, what becomes of bodies that leave the box (None: they go on).
     """
 
     def __init__(
-        self, runner: Runner, swarm: Swarm, box: tuple[float, float], reach: float, until: float
-    ) -> None:
+        self, runner: Runner, swarm: Swarm, box: tuple[float, float], reach: float, until: float,
+        leaving: Leaving | None = None,
+    ) -> None:  # fmt: skip
         self.runner, self.swarm, self.box, self.reach = runner, swarm, box, reach
+        self.leaving = leaving
+        self.gone = np.zeros(len(swarm.bodies), bool)
+        self.returns = np.zeros(len(swarm.bodies), dtype=np.int64)
         self.free = swarm.bodies[:, FREE] == 1.0
         self.least_wander = LEAST_WANDER * swarm.bodies[:, BOUNDING_RADIUS]
         swarm.wander[:] = self.least_wander
@@ -118,8 +123,11 @@ class Progress:
         return self.time_to_go(LONGEST_WAY * side) if side < math.inf else math.inf
 
     def seen(self) -> tuple[float, np.ndarray, float]:
-        """(time [s], motion (n, 6), the largest stated error [m]) now."""
-        return self.time, self.swarm.motion.copy(), self.error
+        """(time [s], motion (n, 6), the largest stated error [m]) now; NaN for bodies that are
+        gone."""
+        motion = self.swarm.motion.copy()
+        motion[self.gone] = math.nan
+        return self.time, motion, self.error
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
@@ -129,6 +137,8 @@ class Progress:
             **{name: getattr(swarm, name).copy() for name in STATE},
             **{name: np.array(value) for name, value in numbers.items()},
             "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
+            "gone": self.gone.astype(np.int64),
+            "returns": self.returns.copy(),
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -141,11 +151,16 @@ class Progress:
             float(state[name]) for name in ("time", "span", "error")
         )
         self.effort = Effort(*state["effort"].tolist())
+        self.returns[...] = state["returns"]
+        self.forget(state["gone"] == 1)
 
     def advance(self, stop: float) -> Status:
         """Go on to the next common time, ``stop`` at the latest: PAUSED, FINISHED where that is
         ``stop``, or the Status with which an island ended for good, ``failed`` being its bodies.
         """
+        if not self.free.any():
+            self.time = stop
+            return Status.FINISHED
         swarm, span = self.swarm, min(self.span, self.longest_span())
         least = swarm._replace(wander=self.least_wander)
         clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
@@ -164,6 +179,7 @@ class Progress:
                 self.span = span = 0.5 * length
                 kept = {}
         self.take_over(list(kept.values()), islands)
+        self.let_leave()
         if not whole:
             self.choose_span(span, islands.work / clusters.work)
         return Status.FINISHED if whole else Status.PAUSED
@@ -217,6 +233,28 @@ class Progress:
         self.swarm = with_links(swarm, contacts)
         self.time, self.error = float(swarm.times[END]), float(swarm.stated.max())
         self.effort.windows += 1
+
+    def forget(self, gone: np.ndarray) -> None:
+        """From now on some bodies are gone."""
+        self.gone |= gone
+        self.free &= ~gone
+        swarm = self.swarm
+        swarm.bodies[gone, FREE] = swarm.bodies[gone, MASS] = 0.0
+
+    def let_leave(self) -> None:
+        """Deal with what has left the box, as ``leaving`` says."""
+        if self.leaving is None:
+            return
+        for members in self.leaving.leaving(self.swarm, self.free):
+            if self.leaving.rule == REMOVE:
+                gone = np.zeros(len(self.gone), bool)
+                gone[members] = True
+                self.forget(gone)
+                self.swarm = self.leaving.removed(self.swarm, gone)
+            else:
+                self.returns[members] += 1
+                count = int(self.returns[members[0]])
+                self.leaving.returned(self.swarm, members, self.free, count)
 
     def choose_span(self, span: float, crowd: float) -> None:
         """The length of the next window from that of the last one, and the work that its islands

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import attrs
 import numpy as np
 
-from flocsim.arrays import FREE, FULL, NOTHING_FULL, Scene, Work, with_room, work_of
+from flocsim.arrays import FREE, FULL, MASS, NOTHING_FULL, Scene, Work, with_room, work_of
 from flocsim.integrators.base import Integrator
 from flocsim.swarms.arrays import COST_COLUMNS, TRACK_COLUMNS, Found, Swarm, found_of
 
@@ -43,7 +43,7 @@ class ThreadArrays:
             scene = self.template._replace(
                 bodies=np.ones((size, self.template.bodies.shape[1])),
                 first=np.zeros(size + 1, dtype=np.int64),
-                vertices=np.zeros((points, 2)),
+                vertices=np.zeros((points, self.template.vertices.shape[1])),
                 tree=np.zeros((2 * points, 3)),
             )
             zeros = np.zeros((size, 3))
@@ -130,11 +130,13 @@ class Runner:
         self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
     ) -> Islands:
         """The islands of a window of so many seconds."""
-        walls = np.flatnonzero(swarm.bodies[:, FREE] == 0.0)
+        gone = swarm.bodies[:, MASS] == 0.0
+        walls = np.flatnonzero((swarm.bodies[:, FREE] == 0.0) & ~gone)
         labels = np.zeros(len(swarm.bodies), dtype=np.int64)
         touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
         while True:
             found = self.finder(swarm, span, reach, *box, self.pairs, labels, walls, touches)
+            labels[gone] = -1
             if found <= len(self.pairs):
                 return Islands.of(labels, walls, touches)
             self.pairs = np.zeros((2 * found, 2), dtype=np.int64)

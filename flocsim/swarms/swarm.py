@@ -15,13 +15,16 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.geometry.contact.separation import PERIODIC
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
+from flocsim.swarms.bonds import BondGauge
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.islands import run_islands, watch_paths
+from flocsim.swarms.leaving import Leaving
 from flocsim.swarms.neighbours import find_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
@@ -64,8 +67,8 @@ class Swarm:
 
     Each island has its own steps, its own lists and its own switches, from one common time to the
     next, and pair forces end at their reach. UsageError for forces without a reach among more than
-    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that has a
-    gradient.
+    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that changes along
+    an axis along which it repeats itself.
     """
 
     bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
@@ -96,6 +99,10 @@ class Swarm:
         """What measures the gaps of its bodies, wherever they are."""
         return Gauge(self.system.scene()._replace(box=self.box), self.fillings())
 
+    def bond_gauge(self) -> BondGauge:
+        """What tells the kinds of bonds of its bodies, wherever they are."""
+        return BondGauge(self)
+
     def check_reach(self) -> None:
         """UsageError for forces that reach all bodies of many."""
         if len(self.bodies) > MANY and not self.all_pairs:
@@ -111,19 +118,13 @@ class Swarm:
     def check_box(self) -> None:
         """UsageError for a box in which bodies would meet themselves, or a flow that does not
         repeat itself."""
-        side = min(self.box)
-        if side == math.inf:
+        if min(self.box) == math.inf:
             return
-        largest = max(body.shape.bounding_radius for body in self.bodies if not body.fixed)
-        least = LEAST_BOX * (2.0 * largest + self.reach)
-        if side < least:
-            raise UsageError(
-                f"the box is {side:.3g} m wide, and forces reach {self.reach:.3g} m between bodies "
-                f"of up to {2.0 * largest:.3g} m: it must be {least:.3g} m at least, or the forces "
-                "cut nearer"
-            )
-        if any(self.fluid.gradient):
-            raise UsageError("a flow with a gradient does not repeat itself: leave the box out")
+        check_box([body.shape for body in self.bodies if not body.fixed], self.box, self.reach)
+        xx, xy, yx, yy = self.fluid.gradient
+        for side, changes, axis in ((self.box[0], (xx, yx), "x"), (self.box[1], (xy, yy), "y")):
+            if side < math.inf and any(changes):
+                raise UsageError(FLOW_ADVICE.format(axis=axis))
 
     def check_overlaps(self, gauge: Gauge) -> None:
         """UsageError where two bodies start with crossing cores or too deep an overlap."""
@@ -132,14 +133,17 @@ class Swarm:
         for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
             a, b = self.bodies[i], self.bodies[j]
             fault = overlap_fault(
-                a.shape.placed_vertices(*vector, a.angle), a.shape.radius,
-                b.shape.placed_vertices(0.0, 0.0, b.angle), b.shape.radius,
-            )  # fmt: skip
+                a.shape.placed_parts(*vector, a.angle), b.shape.placed_parts(0.0, 0.0, b.angle)
+            )
             if fault:
                 raise UsageError(f"bodies {j} and {i} start {fault}; move them apart")
 
-    def begin(self, until: float, *, threads: int = 1, max_steps: int = 10_000_000) -> Progress:
-        """A Progress to a time [s] that has yet to begin."""
+    def begin(
+        self, until: float, *, threads: int = 1, max_steps: int = 10_000_000,
+        leaving: Leaving | None = None,
+    ) -> Progress:  # fmt: skip
+        """A Progress to a time [s] that has yet to begin; ``leaving``: what becomes of bodies that
+        leave the box."""
         scene = self.system.scene()._replace(box=self.box)
         fillings = self.fillings()
         runner = Runner(
@@ -147,7 +151,7 @@ class Swarm:
             self.integrator, [ThreadArrays(scene) for _ in range(threads)], max_steps,
         )  # fmt: skip
         swarm = swarm_of(scene, *self.system.motion(), self.integrator.first_step)
-        return Progress(runner, swarm, self.box, self.reach, until)
+        return Progress(runner, swarm, self.box, self.reach, until, leaving)
 
     def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of integrator, shapes and the watch over paths; the same with a box and
@@ -190,8 +194,29 @@ class Swarm:
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
-            time.perf_counter() - began, self.bodies, self.box, gauge,
+            time.perf_counter() - began, self.bodies, self.box, gauge, self.bond_gauge,
         )  # fmt: skip
+
+
+FLOW_ADVICE = (
+    "the flow changes along {axis}, along which the box repeats itself: images of a body would be "
+    "carried at another speed than it. Let the box repeat itself along the other axis alone, as in "
+    'a shear flow u_x = g y with periodic = "x", or not at all, periodic = "none" (leaving = '
+    '"reenter" brings back what the flow carries out)'
+)
+
+
+def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -> None:
+    """UsageError for a box that repeats itself, inf along other axes, in which bodies of some
+    shapes, on which forces act up to a gap [m], would meet themselves."""
+    side = min(box)
+    largest = max(shape.bounding_radius for shape in shapes)
+    least = LEAST_BOX * (2.0 * largest + reach)
+    if side < least:
+        raise UsageError(
+            f"the box is {side:.3g} m wide, and forces reach {reach:.3g} m between bodies of up to "
+            f"{2.0 * largest:.3g} m: it must be {least:.3g} m at least, or the forces cut nearer"
+        )
 
 
 def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:

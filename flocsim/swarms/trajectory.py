@@ -1,10 +1,13 @@
 """SwarmTrajectory: a swarm at the times that were asked for."""
 
+from collections.abc import Callable
+
 import attrs
 import numpy as np
 
 from flocsim.body import Body
 from flocsim.integrators.base import Status
+from flocsim.swarms.bonds import BondGauge, Bonds
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge, Neighbours
 from flocsim.swarms.progress import Effort
@@ -31,6 +34,7 @@ class SwarmTrajectory:
     bodies: tuple[Body, ...]
     box: tuple[float, float]
     gauge: Gauge
+    bond_gauge: Callable[[], BondGauge]
 
     def __repr__(self) -> str:
         return (
@@ -47,6 +51,15 @@ class SwarmTrajectory:
         """The clusters of bodies that touch, or lie nearer than a gap [m], at a time of ``t``."""
         near = self.neighbours(at, within)
         return Clusters.of(self.bodies, self.position[at], self.velocity[at], near)
+
+    def bonds(self, at: int = -1) -> Bonds:
+        """What holds the pairs that touch at a time of ``t``: by a certificate, by a hook, at rest
+        since the time of ``t`` before, or nothing that is proved."""
+        at = range(len(self.t))[at]
+        motion = np.concatenate([self.position, self.velocity], axis=2)
+        before = (float(self.t[at - 1]), motion[at - 1]) if at else None
+        touching = self.gauge.neighbours(self.position[at])
+        return self.bond_gauge().bonds(float(self.t[at]), motion[at], touching, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:
         """Σ m v of all bodies that move (2,) [kg m/s], at a time of ``t``."""

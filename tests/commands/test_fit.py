@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import fit, info, plot
+from flocsim.commands import fit, info, plot, shapes
 from flocsim.commands.fitting import pictures as fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shapes.library import read_library, read_settings
@@ -284,6 +284,34 @@ def test_areas_are_kept_on_request(tmp_path, frame):
     assert run(frame, *options, "-o", tmp_path / "s.h5") == 0
     for entry in read_library(tmp_path / "s.h5"):
         assert entry.fits[4].shape.area == pytest.approx(entry.area * 1e-12, rel=1e-8)
+
+
+def test_holes_are_kept_on_request(tmp_path, capsys):
+    """In pictures and in masks, from there to figures, tables and the list of flocs."""
+    y, x = np.mgrid[:300, :400]
+    floc = (np.hypot(x - 60, y - 60) < 40) & (np.hypot(x - 52, y - 66) > 14)
+    (tmp_path / "frames").mkdir()
+    Image.fromarray(np.where(floc, 30, 200).astype(np.uint8)).save(tmp_path / "frames/a.png")
+    np.save(tmp_path / "mask.npy", floc)
+    pixel = ("--pixel-size", "1e-6", "--vertices", "16", "--radius", "2")
+    for source in ((tmp_path / "frames",), (tmp_path / "mask.npy", "--masks")):
+        plain, kept = tmp_path / "plain.h5", tmp_path / "kept.h5"
+        assert run(*source, *pixel, "-o", plain, "--overwrite") == 0
+        assert run(*source, *pixel, "--holes", "-o", kept, "--overwrite",
+                   "--overlay", tmp_path / "o.png") == 0  # fmt: skip
+        [filled], [open_one] = read_library(plain), read_library(kept)
+        assert open_one.area == pytest.approx(floc.sum(), rel=0.01)
+        assert filled.area == pytest.approx(floc.sum() + np.pi * 14**2, rel=0.01)
+        assert open_one.fits[16].shape.is_compound and not filled.fits[16].shape.is_compound
+        assert open_one.fits[16].shape.area == pytest.approx(1e-12 * floc.sum(), rel=0.03)
+        assert read_settings(kept)["holes"] and "holes" not in read_settings(plain)
+    capsys.readouterr()
+    shapes_parser = argparse.ArgumentParser(prog="flocsim")
+    shapes.add_parser(shapes_parser.add_subparsers(required=True))
+    args = shapes_parser.parse_args(["shapes", "select", str(kept), "-o", str(tmp_path / "s.h5")])
+    assert args.run(args) == 0
+    [again] = read_library(tmp_path / "s.h5")
+    assert again.fits[16].shape.area == open_one.fits[16].shape.area
 
 
 def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.io.results.swarm_file import ENDS, SwarmResults
+from flocsim.io.results.swarm_file import BONDS, ENDS, SwarmResults
 
 SWARM = """\
 preset = "si"
@@ -47,7 +47,8 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
     position[..., :2] = 1e-5 * rng.random((replicates, 1, bodies, 2))
     position[..., 1] -= 1e-6 * np.arange(times)[:, None]
     numbers = ("clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension",
-               "settling", "error")  # fmt: skip
+               "settling", "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching",
+               "removed", "reentered", "error")  # fmt: skip
     counts = {name: np.full(shape, 2.0) for name in numbers}
     each = {name: np.full((replicates, bodies), 1e-6) for name in ("r_eq", "spheroradius", "mass")}
     places = np.broadcast_to(np.arange(bodies), (replicates, bodies)).copy()
@@ -61,15 +62,20 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
         "bodies": each | {
             "floc": np.full((replicates, bodies), -1, "i4"), "first_point": places,
             "point_count": np.ones_like(places), "points": np.zeros((replicates, bodies, 2)),
+            "point_part": np.zeros((replicates, bodies), "i4"),
+            "point_ring": np.zeros((replicates, bodies), "i4"),
+            "point_radius": np.full((replicates, bodies), 1e-6),
             "box": np.full((replicates, 2), 2e-5),
         },
+        "bonds": dict(zip(BONDS, np.array([[0, 1, 1, 0, 1], [1, 2, 1, 0, 2]], "i4").T.copy(),
+                          strict=True)),
         "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
     }  # fmt: skip
     scales = {
         "replicate": np.arange(replicates), "time": 0.1 * np.arange(times),
         "class": np.array([0.0, 1e-5]), "body": np.arange(bodies),
         "component": np.array(["x", "y", "angle"]), "axis": np.array(["x", "y"]),
-        "point": np.arange(bodies),
+        "point": np.arange(bodies), "bond": np.arange(2),
     }  # fmt: skip
     run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,
            "periodic": "xy", "overrides": "{}"}  # fmt: skip

@@ -1,5 +1,7 @@
 """Trajectory files: what is written can be read, by any HDF5 library."""
 
+import io
+
 import h5py
 import numpy as np
 import pytest
@@ -7,9 +9,10 @@ import pytest
 from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
-from flocsim.io.files import read_sealed
+from flocsim.io.files import read_sealed, seal
 from flocsim.io.opening import kind_of
 from flocsim.io.trajectory import DATASETS, KIND, read_trajectory, write_trajectory
+from tests.helpers.compound_shapes import beads, framed
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 
@@ -94,4 +97,36 @@ def test_a_file_with_other_numbers_is_refused(tmp_path):
     position[2, 1, 0] = np.nan
     write_trajectory(tmp_path / "m.h5", times, position, velocity, SHAPES, {})
     with pytest.raises(FileError, match="holds no readable trajectory: its arrays"):
+        read_trajectory(tmp_path / "m.h5")
+
+
+def test_holes_and_parts_come_back(tmp_path):
+    times, position, velocity = motion()
+    shapes = (framed(1e-6), beads(1e-6))
+    write_trajectory(tmp_path / "m.h5", times, position, velocity, shapes, {})
+    again = read_trajectory(tmp_path / "m.h5")
+    for one, other in zip(shapes, again.shapes, strict=True):
+        assert other.area == pytest.approx(one.area, rel=1e-12)
+        assert [len(part.rings) for part in other.parts] == [len(part.rings) for part in one.parts]
+        assert [part.radius for part in other.parts] == [part.radius for part in one.parts]
+
+
+def other_ring(file):
+    file["ring_0"][5] = 3
+
+
+def one_short(file):
+    column = file["part_0"][:-1]
+    del file["part_0"]
+    file["part_0"] = column
+
+
+@pytest.mark.parametrize("change", [other_ring, one_short])
+def test_rings_that_cannot_be_are_refused(tmp_path, change):
+    write_trajectory(tmp_path / "m.h5", *motion(), (framed(1e-6), beads(1e-6)), {})
+    image = io.BytesIO(read_sealed(tmp_path / "m.h5"))
+    with h5py.File(image, "r+") as file:
+        change(file)
+    (tmp_path / "m.h5").write_bytes(seal(image.getvalue()))
+    with pytest.raises(FileError, match="holds no readable trajectory"):
         read_trajectory(tmp_path / "m.h5")

@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import UsageError
-from flocsim.geometry.contact.overlap import distance_between
+from flocsim.geometry.shapes.cores import distance_between
 from flocsim.swarms.placement import place_at_random
 
 STAR = SpheroPolygon(

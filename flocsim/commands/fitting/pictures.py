@@ -44,6 +44,7 @@ class Options:
     method: str
     preserve_area: bool
     inscribed: bool
+    holes: bool
     max_flocs: int | None
     masks: bool
     background: str
@@ -194,7 +195,13 @@ def masked(path, name, options):
 
 def chosen(path, name, found, options):
     """A Picture of a Segmentation, corrected as the user wants it."""
+    from flocsim.io.images.regions import with_holes
+
     found = corrected(name, found, options.correction)
+    if options.holes:
+        opened = tuple(with_holes(each, found.holes) for each in found.regions)
+        found = attrs.evolve(found, regions=opened)
+    found = attrs.evolve(found, holes=None)
     return Picture(path, name, found, largest(found.regions, options.max_flocs))
 
 
@@ -222,7 +229,7 @@ def fit_region(task):
                 fits[radius] = {
                     count: fit_mask(
                         mask, vertices=count, radius=radius, method=options.method,
-                        preserve_area=exact, inscribed=options.inscribed,
+                        preserve_area=exact, inscribed=options.inscribed, holes=options.holes,
                     )
                     for count in options.vertices
                 }  # fmt: skip

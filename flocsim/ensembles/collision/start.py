@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 
 from flocsim.compiler.composer import compose
-from flocsim.geometry.contact.circle_tree import core_distance, outlines_of
+from flocsim.geometry.contact import compounds
+from flocsim.geometry.contact.circle_tree import core_distance
+from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 
 MOST_ADVANCES = 1000
@@ -32,8 +34,11 @@ def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
 
 def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
     """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
-    x = shape.placed_vertices(angle=angle)[:, 0]
-    return shape.radius - x.min(), shape.radius + x.max()
+    parts = shape.placed_parts(angle=angle)
+    return (
+        max(part.radius - part.points[:, 0].min() for part in parts),
+        max(part.radius + part.points[:, 0].max() for part in parts),
+    )
 
 
 def largest_displacement(
@@ -68,8 +73,8 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
 
 
 @cache
-def compiled_height():
-    return compose(start_height, {})
+def compiled_height(compound):
+    return compose(start_height, compounds.FILLINGS if compound else {})
 
 
 def place_pair(
@@ -78,7 +83,7 @@ def place_pair(
     """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
-    height = compiled_height()(
+    height = compiled_height(any(shape.is_compound for shape in shapes))(
         outlines_of(shapes), float(angles[0]), float(angles[1]),
         contact, reach, float(displacement), gap,
     )  # fmt: skip

@@ -56,6 +56,14 @@ class SwarmScene:
     floor: bool = flag(
         default=False, help="a fixed wall below the box, where it does not repeat itself upwards"
     )
+    leaving: str = choice(
+        "keep",
+        "remove",
+        "reenter",
+        default="keep",
+        help="what becomes of clusters that leave through a side at which the box does not repeat "
+        "itself: keep, they go on outside; remove; reenter, over the opposite side",
+    )
     radius: float | None = quantity(
         "m",
         above=0.0,
@@ -132,6 +140,11 @@ class SwarmScene:
             raise ConfigError("aspect goes with area_fraction: the box says its height itself")
         if self.floor and self.periodic == "xy":
             raise ConfigError('a floor needs periodic = "x" or "none": the box repeats itself in y')
+        if self.leaving != "keep" and self.periodic == "xy":
+            raise ConfigError(
+                f'leaving = "{self.leaving}" needs periodic = "x" or "none": nothing leaves a box '
+                "that repeats itself on all sides"
+            )
         low, high = self.min_radius or 0.0, self.max_radius or math.inf
         if low >= high:
             raise ConfigError(f"min_radius = {low:g} m is not below max_radius = {high:g} m")

@@ -21,7 +21,8 @@ from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
-from flocsim.geometry.contact.circle_tree import outlines_of
+from flocsim.geometry.contact.compounds import point_columns
+from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
@@ -126,6 +127,7 @@ def floc_facts(study):
         parts = [np.array([floc.ratio]) for floc in study.flocs]
         shapes = [floc.shapes[n] for floc in study.flocs]
         parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
+        parts += [ring_numbers(each) for each in shapes]
         if study.floc_pool.by_error:
             parts.append(np.array([floc.errors[n] for floc in study.flocs]))
         facts[f"flocs.{n}"] = digest(np.concatenate(parts))
@@ -159,7 +161,14 @@ def shape_numbers(shape):
         shape.bounding_radius,
     )  # fmt: skip
     placed = [shape.placed_vertices(angle=angle) for angle in SAMPLE_ANGLES]
-    return np.concatenate([np.ravel(shape.vertices), *map(np.ravel, placed), numbers])
+    return np.concatenate(
+        [np.ravel(shape.vertices), *map(np.ravel, placed), numbers, ring_numbers(shape)]
+    )
+
+
+def ring_numbers(shape):
+    """What rings and parts a shape has; nothing of one of a single ring."""
+    return np.ravel(point_columns(shape)) if shape.is_compound else np.zeros(0)
 
 
 SAMPLE_ANGLES = (0.0, 1.0, 4.0)
@@ -172,9 +181,14 @@ def kernel_facts(study):
     _, pair = next(sphere_pairs(config, study.flocs))
     facts = {}
     methods = {type(each): each for each in study.methods.values()}.values()
-    for shapes, method in product(kinds(config, pair.shapes), methods):
+    wanted = [*kinds(config, pair.shapes)]
+    several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
+    wanted += [(each, each) for each in several[:1]]
+    for shapes, method in product(wanted, methods):
         system = placed_system(config, attrs.evolve(pair.system, integrator=method), shapes)
         name = "spheres" if system.spheres_only else "polygons"
+        if shapes[0].is_compound:
+            name = "polygons with holes, or of parts"
         if config.integrator.is_chosen:
             name += f" by {type(method).__name__}"
         laws = sorted(system.pieces.laws.items())

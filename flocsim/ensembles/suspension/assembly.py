@@ -18,7 +18,18 @@ from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.integrators.base import Status
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import SNAPSHOT, Record
-from flocsim.io.results.swarm_file import AXES, COMPONENTS, COUNTS, ENDS, SwarmResults, mean
+from flocsim.io.results.swarm_file import (
+    AXES,
+    BONDS,
+    COMPONENTS,
+    COUNTS,
+    ENDS,
+    GONE,
+    POINTS,
+    RINGS,
+    SwarmResults,
+    mean,
+)
 from flocsim.io.terminal import aligned
 
 
@@ -95,17 +106,16 @@ def results_of(
         for name in ("r_eq", "spheroradius", "mass", "floc", "box")
     } | {
         "first_point": ends - counts, "point_count": counts,
-        "points": np.array([
-            np.pad(each["points"], ((0, points - len(each["points"])), (0, 0)))
-            for each in per_body
-        ]),
     }  # fmt: skip
+    for name in (*POINTS, *RINGS):
+        arrays["bodies"][name] = np.array([filled_up(each[name], points) for each in per_body])
     shape = replicates, len(stops)
     classes = np.array([0.0, *study.scene.bounds])
     numbers = {name: np.full(shape, np.nan) for name in COUNTS}
     by_class = np.full((*shape, len(classes)), np.nan)
     motion = np.full((*shape, n, 6), np.nan)
     labels = np.full((*shape, n), -1, dtype=np.int32)
+    bonds = [np.zeros((0, len(BONDS)), dtype=np.int32)]
     tallies = {name: np.zeros(replicates, ENDS[name][0]) for name in ENDS}
     for replicate, own in found.items():
         ended = own.ended or {}
@@ -124,20 +134,32 @@ def results_of(
             for name, values in numbers.items():
                 value = part.facts.get(name)
                 values[replicate, place] = np.nan if value is None else value
-            motion[replicate, place] = part.arrays["motion"]
             labels[replicate, place] = part.arrays["cluster"]
+            left = labels[replicate, place] == GONE
+            motion[replicate, place] = np.where(left[:, None], np.nan, part.arrays["motion"])
             by_class[replicate, place] = part.arrays["counts"]
+            pairs = part.arrays["bonds"]
+            at = np.broadcast_to(np.array([replicate, place], np.int32), (len(pairs), 2))
+            bonds.append(np.concatenate([at, pairs], axis=1))
     arrays["counts"] = numbers | {"n_class": by_class}
     arrays["snapshots"] = {
         "position": motion[..., :3], "velocity": motion[..., 3:], "cluster": labels,
     }  # fmt: skip
+    together = np.concatenate(bonds)
+    together = together[np.lexsort(together.T[::-1])]
+    arrays["bonds"] = dict(zip(BONDS, together.T.copy(), strict=True))
     arrays["ends"] = tallies
     scales = {
         "replicate": np.arange(replicates), "time": np.array(stops), "class": classes,
         "body": np.arange(n), "component": np.array(COMPONENTS), "axis": np.array(AXES),
-        "point": np.arange(points),
+        "point": np.arange(points), "bond": np.arange(len(together)),
     }  # fmt: skip
     return SwarmResults(scales, arrays, run), failed
+
+
+def filled_up(column: np.ndarray, rows: int) -> np.ndarray:
+    """A column of core points with zeros behind them, so many rows in all."""
+    return np.pad(column, ((0, rows - len(column)), *[(0, 0)] * (column.ndim - 1)))
 
 
 def read(journal: Journal, record: Record | None) -> Part:
@@ -156,6 +178,8 @@ def table_of(results: SwarmResults) -> str:
         "mean size": (mean(counts["mean_size"]), "{:.2f}"),
         "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
         "porosity": (mean(counts["porosity"]), "{:.3f}"),
+        "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
+        "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
         "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
         "error [m]": (mean(counts["error"]), "{:.1e}"),
     }

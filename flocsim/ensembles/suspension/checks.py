@@ -9,7 +9,7 @@ import numpy as np
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import COUNTS
+from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
 from flocsim.swarms.progress import Effort
 
@@ -65,9 +65,10 @@ def check_bodies(part: Part, form: Form) -> None:
     shaped(part, {
         "r_eq": ("f8", (n,)), "spheroradius": ("f8", (n,)), "mass": ("f8", (n,)),
         "floc": ("i4", (n,)), "count": ("i8", (n,)), "points": ("f8", (points, 2)),
-        "box": ("f8", (2,)),
+        "point_part": ("i4", (points,)), "point_ring": ("i4", (points,)),
+        "point_radius": ("f8", (points,)), "box": ("f8", (2,)),
     })  # fmt: skip
-    for name in ("r_eq", "spheroradius", "mass", "box"):
+    for name in ("r_eq", "spheroradius", "mass", "point_radius", "box"):
         demand(np.all(part.arrays[name] > 0.0), name)
     counts = part.arrays["count"]
     demand(np.all((counts >= 1) & (counts <= points)) and counts.sum() == points, "count")
@@ -75,11 +76,15 @@ def check_bodies(part: Part, form: Form) -> None:
 
 def check_moment(part: Part, form: Form) -> None:
     n = form.bodies
+    bonds = part.arrays.get("bonds", np.zeros((0, 3)))
+    many = len(bonds) if bonds.ndim else 0
     shaped(part, {
         "motion": ("f8", (n, 6)), "cluster": ("i4", (n,)), "counts": ("i8", (form.classes,)),
+        "bonds": ("i4", (many, 3)),
     })  # fmt: skip
+    demand(np.all((bonds >= 0) & (bonds < [n, n, KIND_COUNT])), "bonds")
     labels = part.arrays["cluster"]
-    demand(np.all((labels >= -1) & (labels < n)), "cluster")
+    demand(np.all((labels >= GONE) & (labels < n)), "cluster")
     demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
     demand(is_count(part.facts.get("place"), form.moments - 1), "place")
     for name in COUNTS:
@@ -92,14 +97,18 @@ def check_state(part: Part, form: Form) -> None:
     count = len(links) if links.ndim else 0
     one: tuple[int, ...] = ()
     shaped(part, {
+        "seen": ("f8", (n, 6)),
         "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
         "steps": ("f8", (n,)), "wander": ("f8", (n,)), "links": ("i8", (count, 4)),
         "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
         "error": ("f8", one), "effort": ("i8", (len(EFFORT),)),
+        "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
     for name in ("steps", "wander"):
         demand(np.all(part.arrays[name] > 0.0), name)
     demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
+    gone, returns = part.arrays["gone"], part.arrays["returns"]
+    demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")
     bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
     demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
     demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")

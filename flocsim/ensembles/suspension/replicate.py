@@ -8,9 +8,11 @@ import numpy as np
 
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
+from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import WALL
+from flocsim.io.results.swarm_file import GONE, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
+from flocsim.swarms.bonds import Bonds
 from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.progress import Progress
@@ -35,32 +37,41 @@ def run_replicate(
     off, its state kept.
     """
     swarm, drawn, box = study.swarm(replicate)
-    gauge = swarm.gauge()
+    gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
     swarm.check_overlaps(gauge)
-    progress = swarm.begin(study.scene.duration, max_steps=study.config.integrator.max_steps)
+    progress = swarm.begin(
+        study.scene.duration, max_steps=study.config.integrator.max_steps,
+        leaving=study.leaving(replicate, swarm, box),
+    )  # fmt: skip
     stops = study.stops
     if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
-        keep(moment_part(replicate, 0, study, swarm, gauge, progress))
+        seen = progress.swarm.motion.copy()
+        bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
+        keep(moment_part(replicate, 0, study, swarm, gauge, progress, bonds))
         moments = 1
     else:
         progress.restore(left.state)
-        moments = left.moments
+        moments, seen = left.moments, left.state["seen"]
     kept_at, status = time.monotonic(), Status.FINISHED
     for place in range(moments, len(stops)):
         while (status := progress.advance(stops[place])) == Status.PAUSED:
             late = time.monotonic() - kept_at > study.scene.checkpoint
             stopped = halted is not None and halted()
             if late or stopped:
-                keep(state_part(replicate, place, progress))
+                keep(state_part(replicate, place, progress, seen))
                 kept_at = time.monotonic()
             if stopped:
                 return False
         if status != Status.FINISHED:
             break
-        keep(moment_part(replicate, place, study, swarm, gauge, progress))
+        motion = progress.swarm.motion.copy()
+        near = gauge.neighbours(motion[:, :3])
+        bonds = bond_gauge.bonds(stops[place], motion, near, (stops[place - 1], seen))
+        keep(moment_part(replicate, place, study, swarm, gauge, progress, bonds))
+        seen = motion
         if place + 1 < len(stops) and halted is not None and halted():
-            keep(state_part(replicate, place + 1, progress))
+            keep(state_part(replicate, place + 1, progress, seen))
             return False
     keep(end_part(replicate, status, progress))
     return True
@@ -84,29 +95,39 @@ def bodies_part(
 ) -> Part:  # fmt: skip
     """What is the same at all times: the bodies, a wall the last of them, and the box."""
     shapes = [body.shape for body in swarm.bodies]
-    points = [shape.vertices for shape in shapes]
+    tables = [table_of(shape.parts) for shape in shapes]
     walls = len(shapes) - len(drawn.flocs)
     return Part(replicate, BODIES, {
         "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
         "spheroradius": np.array([shape.radius for shape in shapes]),
         "mass": np.array([body.mass for body in swarm.bodies]),
         "floc": np.append(drawn.flocs, np.full(walls, WALL)).astype(np.int32),
-        "count": np.array([len(each) for each in points], dtype=np.int64),
-        "points": np.concatenate(points),
+        "count": np.array([len(each.place) for each in tables], dtype=np.int64),
+        "points": np.concatenate([each.place for each in tables]),
+        "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
+        "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
+        "point_radius": np.concatenate([each.radius for each in tables]),
         "box": np.array(box),
     })  # fmt: skip
 
 
 def moment_part(
-    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress
-) -> Part:
-    """A snapshot, its clusters with it."""
+    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress,
+    bonds: Bonds,
+) -> Part:  # fmt: skip
+    """A snapshot, its clusters and bonds with it."""
     now, motion, error = progress.seen()
-    position, velocity = motion[:, :3], motion[:, 3:]
+    # Where what is gone lies, so far outside that it is nobody's neighbour.
+    position, velocity = progress.swarm.motion[:, :3], progress.swarm.motion[:, 3:]
     near = gauge.neighbours(position, study.scene.link)
-    found = Clusters.of(swarm.bodies, position, velocity, near)
+    found = Clusters.of(swarm.bodies, position, velocity, near, ~progress.gone)
     facts = {"place": place, "time": now, "error": error} | summary_of(found)
-    arrays = {"motion": motion, "cluster": found.label.astype(np.int32)}
+    facts |= {"removed": int(progress.gone.sum()), "reentered": int(progress.returns.sum())}
+    facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
+    label = np.where(progress.gone, GONE, found.label).astype(np.int32)
+    # A record has numbers only.
+    arrays = {"motion": np.where(progress.gone[:, None], 0.0, motion), "cluster": label}
+    arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
     return Part(replicate, MOMENT, arrays, facts)
@@ -114,6 +135,8 @@ def moment_part(
 
 def summary_of(clusters: Clusters) -> dict[str, float]:
     """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first two."""
+    if not len(clusters):
+        return {"clusters": 0, "largest": 0}
     share = clusters.mass / clusters.mass.sum()
     return {
         "clusters": len(clusters),
@@ -126,9 +149,9 @@ def summary_of(clusters: Clusters) -> dict[str, float]:
     }
 
 
-def state_part(replicate: int, moments: int, progress: Progress) -> Part:
-    """What the rest of the replicate follows from."""
-    return Part(replicate, STATE, progress.state(), {"moments": moments})
+def state_part(replicate: int, moments: int, progress: Progress, seen: np.ndarray) -> Part:
+    """What the rest of the replicate follows from; ``seen``: the motion at the last snapshot."""
+    return Part(replicate, STATE, progress.state() | {"seen": seen}, {"moments": moments})
 
 
 def end_part(replicate: int, status: Status, progress: Progress) -> Part:

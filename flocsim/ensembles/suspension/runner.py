@@ -6,6 +6,7 @@ All ranks make the same study from what rank 0 has read, and compare what they w
 
 import contextlib
 import json
+import math
 import shlex
 import sys
 import time
@@ -40,10 +41,10 @@ from flocsim.io.results.swarm_file import read_swarm, write_swarm
 from flocsim.io.terminal import Progress, tell
 from flocsim.plausibility.doubts import Names, doubts_of
 from flocsim.swarms.islands import run_islands
-from flocsim.swarms.swarm import Swarm
+from flocsim.swarms.swarm import Swarm, check_box
 from flocsim.system import System
 
-LAYOUT = "swarm 1"
+LAYOUT = "swarm 2"
 """The form of the journal's records."""
 
 INTERNAL = 70
@@ -79,6 +80,7 @@ def run_swarms(
         swarm, _, _ = study.swarm(0)
         identity = identity_of(study, swarm)
         refuse_disagreement(comm, identity)
+        check_room(study, swarm, comm)
         if comm.rank > 0:
             comm.barrier()  # rank 0 compiles
             follow_dealer(study, comm)
@@ -98,6 +100,26 @@ def refuse_disagreement(comm: Communicator, identity: dict) -> None:
     lines = [disagreement(rank, facts[0], each) for rank, each in enumerate(facts) if rank > 0]
     if unlike := [line for line in lines if line]:
         raise UsageError(unlike[0])
+
+
+def check_room(study: SwarmStudy, swarm: Swarm, comm: Communicator) -> None:
+    """UsageError on rank 0 where the bodies of a replicate find no place, or its box is too small
+    for them: before the first runs for hours. Every rank looks at its share; ``swarm``: any one."""
+    first: tuple[int, str] | None = None
+    for replicate in range(comm.rank, study.config.replicates, comm.size):
+        try:
+            drawn, box, _ = study.placed(replicate)
+            width, height = study.periods(box)
+            check_box(drawn.shapes, (width or math.inf, height or math.inf), swarm.reach)
+        except UsageError as error:
+            first = replicate, str(error)
+            break
+    found = comm.gather(first)
+    if found is None:
+        return
+    if faults := sorted(each for each in found if each is not None):
+        replicate, why = faults[0]
+        raise UsageError(f"swarm {replicate} of {study.config.replicates} (from 0): {why}")
 
 
 @attrs.define

@@ -15,6 +15,7 @@ from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.plausibility.settling import terminal_motion
+from flocsim.swarms.leaving import KEEP, Leaving
 from flocsim.swarms.placement import place_at_random
 from flocsim.swarms.swarm import Swarm
 from flocsim.swarms.walls import floor
@@ -148,16 +149,29 @@ class SwarmStudy:
         width = math.sqrt(area / scene.aspect)
         return width, area / width
 
+    def placed(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.ndarray]:
+        """(the bodies of a replicate, its box [m], their places (n, 3)).
+
+        UsageError where bodies find no place.
+        """
+        rng = self.generator(replicate)
+        drawn = self.draw(rng)
+        area = self.box_of(drawn.shapes)
+        repeats = "x" in self.scene.periodic, "y" in self.scene.periodic
+        return drawn, area, place_at_random(drawn.shapes, area, rng, repeats, self.scene.gap)
+
+    def periods(self, area: tuple[float, float]) -> tuple[float | None, float | None]:
+        """Width and height of a box [m], None along axes along which it does not repeat itself."""
+        width, height = area
+        periodic = self.scene.periodic
+        return width if "x" in periodic else None, height if "y" in periodic else None
+
     def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
         """(the Swarm of a replicate at its start, its bodies before, its box [m]).
 
         UsageError where bodies find no place, or the box is too small for them.
         """
-        rng = self.generator(replicate)
-        drawn = self.draw(rng)
-        width, height = self.box_of(drawn.shapes)
-        repeats = "x" in self.scene.periodic, "y" in self.scene.periodic
-        places = place_at_random(drawn.shapes, (width, height), rng, repeats, self.scene.gap)
+        drawn, (width, height), places = self.placed(replicate)
         bodies = [
             Body(shape, (x, y), angle, **self.config.body_options)
             for shape, (x, y, angle) in zip(drawn.shapes, places.tolist(), strict=True)
@@ -168,19 +182,32 @@ class SwarmStudy:
         if self.scene.floor:
             beyond = BEYOND * max(shape.bounding_radius for shape in drawn.shapes)
             bodies.append(floor(width, 0.0, beyond=beyond))
-        box = tuple(side if again else None for side, again in zip((width, height), repeats,
-                                                                   strict=True))  # fmt: skip
         swarm = Swarm(
-            bodies, forces, self.config.integrator.method, fluid, box=box,
-            all_pairs=self.scene.all_pairs,
+            bodies, forces, self.config.integrator.method, fluid,
+            box=self.periods((width, height)), all_pairs=self.scene.all_pairs,
         )  # fmt: skip
         return swarm, drawn, (width, height)
+
+    def leaving(self, replicate: int, swarm: Swarm, box: tuple[float, float]) -> Leaving | None:
+        """What becomes of bodies of a replicate that leave its box [m]; None: they go on."""
+        scene = self.scene
+        if scene.leaving == KEEP:
+            return None
+        repeats = "x" in scene.periodic, "y" in scene.periodic
+        key = self.config.seed, replicate
+        return Leaving(scene.leaving, box, repeats, scene.floor, key, swarm.gauge())
 
 
 def settling(system: System, body: Body) -> Body:
     """The body at the velocity with which it settles alone."""
     velocity, _ = terminal_motion(system, body)
-    return attrs.evolve(body, velocity=tuple(float(each) for each in velocity))
+    xx, xy, yx, yy = system.fluid.gradient
+    x, y = body.position
+    # Alone it is known at the origin; Stokes's drag, being linear, adds the flow of its place.
+    flow = (xx * x + xy * y, yx * x + yy * y)
+    return attrs.evolve(
+        body, velocity=tuple(float(own + more) for own, more in zip(velocity, flow, strict=True))
+    )
 
 
 def lognormal(scene: SwarmScene, numbers: np.ndarray) -> np.ndarray:

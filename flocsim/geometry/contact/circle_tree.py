@@ -12,15 +12,12 @@ single arrays instead of the whole scene, which would cost more to pass than the
 """
 
 import math
-from collections.abc import Sequence
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from flocsim.arrays import X, Y
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
-from flocsim.geometry.shapes.shape import Shape
+from flocsim.hooks import hook
 
 LEAF = 2
 """Core points in a run that is not split any more: from this to twice as many."""
@@ -75,34 +72,6 @@ def tree_of(vertices: np.ndarray) -> np.ndarray:
         tree[nodes : 2 * nodes] = circles_around(runs, margin)
         nodes *= 2
     return tree
-
-
-class Outlines(NamedTuple):
-    """The cores of some bodies, as the kernels here read them; a Scene has the same fields.
-
-    Core points of body b are rows ``first[b]`` to ``first[b + 1]`` of ``vertices``, its circles the
-    rows from ``2 * first[b]`` on of ``tree``.
-    """
-
-    first: np.ndarray
-    vertices: np.ndarray
-    tree: np.ndarray
-
-
-@lru_cache(maxsize=256)
-def tree_of_shape(shape):
-    return tree_of(shape.vertices)
-
-
-def outlines_of(shapes: Sequence[Shape]) -> Outlines:
-    """The Outlines of some shapes, one body each."""
-    sizes = [len(shape.vertices) for shape in shapes]
-    return Outlines(
-        first=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        # C order whatever the shapes have: another order would be compiled anew.
-        vertices=np.ascontiguousarray(np.concatenate([shape.vertices for shape in shapes])),
-        tree=np.concatenate([tree_of_shape(shape) for shape in shapes]),
-    )
 
 
 def side_of(outlines, body):
@@ -242,6 +211,7 @@ def nearer_child(tree, pose, plan, walk):
     return sibling
 
 
+@hook
 def core_distance(outlines, a, b, pose):
     """Smallest distance [m] between a core point of one body and the core of the other.
 

@@ -1,46 +1,34 @@
 """Whether two placed cores overlap too deeply to start from, and where they touch."""
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.geometry.shapes.cores import (
-    cores_cross,
-    distance_to_edges,
-    edges_of,
-    from_edges,
-    inside_polygon,
-)
+from flocsim.geometry.shapes.cores import edges_of, from_edges
+from flocsim.geometry.shapes.parts import Part, core_gap, cores_overlap
 from flocsim.geometry.shapes.shape import Shape
 
 TOUCHING = 1e-12
 """Gap [m] below which outlines are shown as touching."""
 
 
-def distance_between(a: np.ndarray, b: np.ndarray) -> float:
-    """Smallest distance [m] between a core point of one and the core of the other."""
-    distances = [np.hypot(*(a[0] - b[0]))]
-    for points, core in ((a, b), (b, a)):
-        starts, ends = edges_of(core)
-        if len(starts):
-            distances.append(distance_to_edges(points, starts, ends).min())
-    return min(distances)
-
-
-def overlap_fault(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> str | None:
-    """What is wrong with two placed cores (N, 2) and their radii, in words; None if nothing is."""
-    if inside_polygon(a, b).any() or inside_polygon(b, a).any() or cores_cross(a, b):
+def overlap_fault(a: Sequence[Part], b: Sequence[Part]) -> str | None:
+    """What is wrong with two placed bodies, by their parts, in words; None if nothing is."""
+    pairs = list(product(a, b))
+    if any(cores_overlap(one, other) for one, other in pairs):
         return "with one core inside or across the other"
-    overlap = radius_a + radius_b - distance_between(a, b)
-    if overlap > DEEPEST_OVERLAP * (radius_a + radius_b):
-        return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
+    for one, other in pairs:
+        contact = one.radius + other.radius
+        overlap = contact - core_gap(one, other)
+        if overlap > DEEPEST_OVERLAP * contact:
+            return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
     return None
 
 
 def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
-    """Middles (c, 2) [m] of the overlaps of two placed cores (N, 2) with their radii.
+    """Middles (c, 2) [m] of the overlaps of two placed rings (N, 2) with their radii.
 
     A gap of less than TOUCHING counts: a step that ends at a first touch ends on either side of it.
     """
@@ -59,9 +47,11 @@ def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: flo
 
 def placed_contacts(shapes: Sequence[Shape], places: np.ndarray) -> np.ndarray:
     """Where any two of the bodies at these places (n, 3) touch: (c, 2) [m]."""
-    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
+    bodies = [shape.placed_parts(*place) for shape, place in zip(shapes, places, strict=True)]
     found = [
-        touching_points(cores[a], shapes[a].radius, cores[b], shapes[b].radius)
-        for a, b in combinations(range(len(shapes)), 2)
+        touching_points(ring, one.radius, core, other.radius)
+        for a, b in combinations(bodies, 2)
+        for one, other in product(a, b)
+        for ring, core in product(one.rings, other.rings)
     ]
     return np.concatenate([np.empty((0, 2)), *(np.reshape(each, (-1, 2)) for each in found)])

@@ -80,6 +80,13 @@ def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning):
 
 
 @hook
+def row_radii(scene, work, row):
+    """(of the vertex, of the edge) of a pair: the radii of the disks that sweep them [m]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    return scene.bodies[a, RADIUS], scene.bodies[b, RADIUS]
+
+
+@hook
 def locate_polygons(scene, work, state, row):
     """Geometry of one vertex–edge pair; a vertex right on the edge gets an arbitrary normal."""
     a, point = work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX]
@@ -101,10 +108,11 @@ def locate_polygons(scene, work, state, row):
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
-    middle = 0.5 * (distance + scene.bodies[b, RADIUS] - scene.bodies[a, RADIUS])
+    radius_a, radius_b = row_radii(scene, work, row)
+    middle = 0.5 * (distance + radius_b - radius_a)
     bx = fx + middle * nx
     by = fy + middle * ny
-    gap = distance - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+    gap = distance - radius_a - radius_b
     turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
     store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning)
 

@@ -34,6 +34,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.hooks import hook
 
 
 def keep_slips(work):
@@ -91,6 +92,7 @@ def first_of_pair(work, row):
     return row
 
 
+@hook
 def same_corner(scene, body, point, other):
     """Whether two core points of a body are the same one or follow each other."""
     count = scene.first[body + 1] - scene.first[body]

@@ -9,11 +9,21 @@ from numpy.typing import ArrayLike
 from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
 from flocsim.geometry.fit.coverage import compiled, covered, padded
+from flocsim.geometry.fit.holes import find_holes, hole_ring, wrong_with_holes
 from flocsim.geometry.fit.paper import paper_fit
-from flocsim.geometry.fit.search import AREA, INSCRIBED, PLAIN, count_errors, pattern_fit
+from flocsim.geometry.fit.search import (
+    AREA,
+    INSCRIBED,
+    INSIDE,
+    PLAIN,
+    count_errors,
+    pattern_fit,
+)
 from flocsim.geometry.fit.simple import simple_inset
 from flocsim.geometry.fit.starts import even_start
-from flocsim.geometry.shapes.resize import core_factor
+from flocsim.geometry.shapes.outline import simplicity_fault
+from flocsim.geometry.shapes.parts import Part, Parts
+from flocsim.geometry.shapes.resize import core_factor, parts_factor
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
@@ -30,7 +40,8 @@ class Fit:
 
     shape: SpheroPolygon, or Sphere for one vertex, in pixels around its own centroid.
     vertices: (N, 2) [px] in the mask's frame, x right and y **up**: the centre of the mask's pixel
-    (row i, column j) is (j, −i), so that the body looks as it does in the picture.
+    (row i, column j) is (j, −i), so that the body looks as it does in the picture; those of the
+    outline first, then those of holes, ``hole_sizes`` of each.
     radius: spheroradius [px].  wrong_pixels: V, the pixels where shape and mask differ.
     relative_error: RE = 100 V/P(I) [%], P(I) the mask's pixels (paper, eq. 2).
     """
@@ -40,6 +51,13 @@ class Fit:
     radius: float
     wrong_pixels: int
     relative_error: float
+    hole_sizes: tuple[int, ...] = ()
+
+    @property
+    def parts(self) -> Parts:
+        """The vertices as one part, [px] in the mask's frame."""
+        ends = np.cumsum([len(self.vertices) - sum(self.hole_sizes), *self.hole_sizes])
+        return (Part(tuple(np.split(self.vertices, ends[:-1])), self.radius),)
 
     def scaled(self, pixel_size: float) -> Shape:
         """The shape in metres, for pixels of `pixel_size` [m]; UsageError unless positive."""
@@ -56,6 +74,7 @@ def fit_mask(
     method: str = "pattern",
     preserve_area: bool = False,
     inscribed: bool = False,
+    holes: bool = False,
 ) -> Fit:
     """Fit a spheropolygon to a floc's mask: minimise the pixels where the two differ.
 
@@ -70,8 +89,10 @@ def fit_mask(
     evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
     preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the
     difference of the pixel counts.  inscribed: no pixel outside of the mask is covered ("pattern"
-    only); the shape is then smaller than the floc.  N = 1 is the circle of the mask's area about
-    its centroid; all other options are then ignored.
+    only); the shape is then smaller than the floc.  holes: the N vertices go to the outline and to
+    the holes of the mask, the largest ones first, as long as half of them are left for the outline;
+    a hole that the disk would close stays covered, and all where that makes V less.
+    N = 1 is the circle of the mask's area about its centroid; all other options are then ignored.
 
     Returns a Fit, the same for the same input; its polygon is simple.  By plain V,
     "pattern" and "paper" never end above "even".  Warns if radius ≥ r_eq (paper, section 3.2:
@@ -99,7 +120,15 @@ def fit_mask(
             "the fit cannot follow its outline; use r < r_eq",
             stacklevel=2,
         )
-    return _fit_polygon(floc, int(vertices), float(radius), method, preserve_area, inscribed)
+    options = float(radius), method, preserve_area, inscribed
+    found = find_holes(floc, int(vertices)) if holes else []
+    if not found:
+        return _fit_polygon(floc, int(vertices), *options)
+    fit = _fit_with_holes(floc, found, int(vertices), *options)
+    if inscribed:
+        return fit
+    plain = _fit_polygon(floc, int(vertices), *options)
+    return plain if plain.wrong_pixels < fit.wrong_pixels else fit
 
 
 def _require_one_region(mask: object) -> np.ndarray:
@@ -166,6 +195,42 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
     wrong = _wrong_pixels(mask, points, radius)
     error = 100.0 * wrong / float(mask.sum())
     return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, error)
+
+
+def _fit_with_holes(mask, holes, count, radius, method, preserve_area, inscribed):
+    """The Fit of a mask whose ``holes`` are kept, as far as they lower V."""
+    whole = mask.copy()
+    for hole in holes:
+        whole |= hole.mask
+    left = count - sum(hole.vertices for hole in holes)
+    outer = _fit_polygon(whole, left, radius, method, False, inscribed)
+    weights = INSIDE if inscribed else AREA if preserve_area else PLAIN
+    rings = [outer.vertices]
+    for hole in holes:
+        # Rings that go round clockwise where y is up.
+        ring = hole_ring(mask, hole, radius, weights, method != "even", rings)
+        if ring is not None:
+            rings.append(ring)
+    spare = count - sum(map(len, rings))
+    if spare:
+        # What a hole has not needed, the outline has.
+        outer = _fit_polygon(whole, left + spare, radius, method, False, inscribed)
+        if simplicity_fault(outer.vertices, rings[1:]) is None:
+            rings[0] = outer.vertices
+    shape = SpheroPolygon(rings[0], radius, holes=rings[1:])
+    if preserve_area:
+        factor = parts_factor(shape.parts, float(mask.sum()))
+        rings = [ring * factor + (1.0 - factor) * shape.centroid for ring in rings]
+        shape = SpheroPolygon(rings[0], radius, holes=rings[1:])
+    wrong, outside = wrong_with_holes(mask, rings, radius)
+    if inscribed and outside:
+        raise ShapeError(
+            f"no shape of {count} vertices and spheroradius {radius:g} px with holes was found "
+            f"that lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
+        )
+    sizes = tuple(len(ring) for ring in rings[1:])
+    error = 100.0 * wrong / float(mask.sum())
+    return Fit(shape, np.concatenate(rings), radius, wrong, error, sizes)
 
 
 def _settled(mask, points, radius, area):

@@ -124,6 +124,18 @@ def pattern_search(mask, vertices, radius, directions, steps, active, weights):
     until one nearby moves.  Returns the objective, V for PLAIN weights.
     """
     odd, near = cover(vertices, radius, mask.shape)
+    return search_from(mask, odd, near, vertices, radius, directions, steps, active, weights)
+
+
+def hole_search(mask, vertices, radius, directions, steps, active, weights):
+    """pattern_search of a polygon around a hole: what lies outside of it is covered."""
+    odd, near = cover(vertices, radius, mask.shape)
+    odd = ~odd
+    return search_from(mask, odd, near, vertices, radius, directions, steps, active, weights)
+
+
+def search_from(mask, odd, near, vertices, radius, directions, steps, active, weights):
+    """pattern_search with the counts per pixel of the polygon as it is."""
     wrong, excess = count_wrong(mask, odd, near)
     objective = weighed(wrong, excess, weights)
     count = len(vertices)

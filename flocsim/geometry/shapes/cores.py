@@ -4,6 +4,8 @@ The one place for what is between points and edges, twice at most: on scalars, f
 run compiled or not, and on arrays of points.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
@@ -119,6 +121,24 @@ def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
     crossing = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
     return np.count_nonzero(straddles & (x < crossing), axis=1) % 2 == 1
+
+
+def inside_rings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
+    """Which of the points (k, 2) lie inside a core of several rings: an outer one, and holes."""
+    found = inside_polygon(points, rings[0])
+    for ring in rings[1:]:
+        found = found ^ inside_polygon(points, ring)
+    return found
+
+
+def distance_between(a: np.ndarray, b: np.ndarray) -> float:
+    """Smallest distance [m] between a core point of one and the core of the other."""
+    distances = [np.hypot(*(a[0] - b[0]))]
+    for points, core in ((a, b), (b, a)):
+        starts, ends = edges_of(core)
+        if len(starts):
+            distances.append(distance_to_edges(points, starts, ends).min())
+    return min(distances)
 
 
 def cores_cross(a: np.ndarray, b: np.ndarray) -> bool:

@@ -1,19 +1,84 @@
 """Area, centroid and second moment of a swept outline, exact to round-off, convex or not.
 
-The outline of core ⊕ disk is made of offset edges and of arcs around vertices. Each such piece is
-cut wherever another piece crosses it; what lies nearer than the radius to some other part of the
-core is dropped; Green's theorem over what remains gives the moments, holes included.
+The outline of core ⊕ disk is made of offset edges and of arcs around vertices, of all rings of all
+parts. Each such piece is cut wherever another piece crosses it; what lies nearer than the radius to
+some other part of a core, or inside of one, is dropped; Green's theorem over what remains gives the
+moments of the union, holes included.
 """
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from flocsim.geometry.shapes.cores import (
     cross,
-    distance_to_edges,
     edges_of,
-    inside_polygon,
+    from_edges,
+    inside_rings,
     unit_edges,
 )
+from flocsim.geometry.shapes.parts import Part
+
+
+class Pieces(NamedTuple):
+    """What the outlines of parts are made of.
+
+    ``points`` (p, 2), the corners, with ``first`` (p,) the angle at which the arc around each
+    begins and ``turn`` (p,) how far it goes; ``starts``, ``units``, ``lengths`` of edges;
+    ``side_starts``, ``side_units``, ``side_lengths`` of the sides in the order of a walk, and
+    ``at_start``, ``at_end`` by which their offsets are cut; of points, edges and sides the
+    ``…radius``, and the part that they belong to.
+    """
+
+    points: np.ndarray
+    first: np.ndarray
+    turn: np.ndarray
+    point_radius: np.ndarray
+    point_square: np.ndarray
+    point_part: np.ndarray
+    starts: np.ndarray
+    units: np.ndarray
+    lengths: np.ndarray
+    edge_radius: np.ndarray
+    side_starts: np.ndarray
+    side_units: np.ndarray
+    side_lengths: np.ndarray
+    at_start: np.ndarray
+    at_end: np.ndarray
+    side_radius: np.ndarray
+    side_part: np.ndarray
+
+
+def pieces_of(parts: Sequence[Part]) -> Pieces:
+    """The Pieces of some parts, ring after ring."""
+    return Pieces(*joined(*(
+        ring_pieces(ring, float(part.radius), number)
+        for number, part in enumerate(parts) for ring in part.rings
+    )))  # fmt: skip
+
+
+def ring_pieces(ring, radius, number):
+    """The Pieces of one ring of the part of a number, as a tuple."""
+    starts, units, lengths = unit_edges(ring)
+    if len(ring) == 1:
+        first, turn = np.zeros(1), np.full(1, 2.0 * np.pi)
+        side_starts, side_units, side_lengths = starts, units, lengths
+        at_start = at_end = lengths
+    else:
+        side_starts, side_units, side_lengths = sides_of(ring)
+        before = np.roll(side_units, 1, axis=0)
+        first = np.arctan2(-before[:, 0], before[:, 1])
+        bends = bends_of(side_units)
+        turn = np.maximum(bends, 0.0)
+        at_start, at_end = trims_of(bends, side_lengths, radius)
+    each, sides = len(ring), len(side_lengths)
+    return (
+        ring, first, turn, np.full(each, radius), np.full(each, radius**2), np.full(each, number),
+        starts, units, lengths, np.full(len(lengths), radius),
+        side_starts, side_units, side_lengths, at_start, at_end, np.full(sides, radius),
+        np.full(sides, number),
+    )  # fmt: skip
 
 
 def beside(along, lengths):
@@ -21,60 +86,88 @@ def beside(along, lengths):
     return (along > -1e-9 * lengths) & (along < lengths * (1.0 + 1e-9))
 
 
-def circle_cuts(origins, directions, vertices, radius):
-    """Where lines (rows) cross the circles around the vertices: row numbers and places."""
-    to_centre = vertices[None] - origins[:, None]
+def circle_cuts(origins, directions, found):
+    """Where lines (rows) cross the circles around the points: row numbers and places."""
+    to_centre = found.points[None] - origins[:, None]
     along = np.einsum("pkj,pj->pk", to_centre, directions)
-    half = radius**2 - (np.einsum("pkj,pkj->pk", to_centre, to_centre) - along**2)
+    half = found.point_square - (np.einsum("pkj,pkj->pk", to_centre, to_centre) - along**2)
     rows, columns = np.nonzero(half > 0.0)
     root = np.sqrt(half[rows, columns])
     middle = along[rows, columns]
     return np.tile(rows, 2), np.concatenate([middle - root, middle + root])
 
 
-def offset_cuts(origins, directions, vertices, radius):
+def offset_cuts(origins, directions, found):
     """Where lines (rows) cross the offsets of the edges, on both sides: row numbers and places."""
-    starts, units, lengths = unit_edges(vertices)
+    starts, units, lengths = found.starts, found.units, found.lengths
     slope = cross(directions[:, None], units[None])
     rows, edges = np.nonzero(np.abs(slope) > 1e-12)
     offset = cross(starts[edges] - origins[rows], units[edges])
-    found = []
-    for side in (-radius, radius):
-        place = (offset + side) / slope[rows, edges]
+    cuts = []
+    for side in (-found.edge_radius, found.edge_radius):
+        place = (offset + side[edges]) / slope[rows, edges]
         met = origins[rows] + place[:, None] * directions[rows] - starts[edges]
         on_edge = beside(np.einsum("ij,ij->i", met, units[edges]), lengths[edges])
-        found.append((rows[on_edge], place[on_edge]))
-    return joined(*found)
+        cuts.append((rows[on_edge], place[on_edge]))
+    return joined(*cuts)
 
 
-def arc_circle_cuts(vertices, radius):
-    """Where the circles around vertices (rows) cross each other: row numbers and angles."""
-    to_centre = vertices[None] - vertices[:, None]
+def arc_circle_cuts(found):
+    """Where the circles around points (rows) cross each other: row numbers and angles."""
+    points, radius = found.points, found.point_radius
+    to_centre = points[None] - points[:, None]
     distance = np.hypot(to_centre[..., 0], to_centre[..., 1])
-    rows, columns = np.nonzero((distance > 0.0) & (distance < 2.0 * radius))
-    across = to_centre[rows, columns]
+    widest, least = radius[:, None] + radius, np.abs(radius[:, None] - radius)
+    rows, columns = np.nonzero((distance > least) & (distance < widest))
+    across, apart = to_centre[rows, columns], distance[rows, columns]
     bearing = np.arctan2(across[:, 1], across[:, 0])
-    half = np.arccos(distance[rows, columns] / (2.0 * radius))
+    own, other = radius[rows], radius[columns]
+    cosine = (apart**2 + (own - other) * (own + other)) / (2.0 * apart * own)
+    alike = own == other
+    half = np.arccos(np.where(alike, apart / (2.0 * own), np.clip(cosine, -1.0, 1.0)))
     return np.tile(rows, 2), np.concatenate([bearing - half, bearing + half])
 
 
-def arc_offset_cuts(vertices, radius):
-    """Where the circles around vertices (rows) cross the offsets of edges: rows and angles."""
-    starts, units, lengths = unit_edges(vertices)
+def arc_offset_cuts(found):
+    """Where the circles around points (rows) cross the offsets of edges: rows and angles."""
+    points, radius = found.points, found.point_radius
+    starts, units, lengths = found.starts, found.units, found.lengths
     normals = np.column_stack([units[:, 1], -units[:, 0]])
     facing = np.arctan2(normals[:, 1], normals[:, 0])
-    level = np.einsum("pej,ej->pe", starts[None] - vertices[:, None], normals)
-    found = []
-    for side in (-radius, radius):
-        cosine = (level + side) / radius
-        rows, edges = np.nonzero((np.abs(cosine) < 1.0) & (np.abs(level) >= 1e-9 * radius))
+    level = np.einsum("pej,ej->pe", starts[None] - points[:, None], normals)
+    own = radius[:, None]
+    # A point on the line of an edge of its own radius: they touch, and do not cross.
+    touches = (np.abs(level) < 1e-9 * own) & (found.edge_radius == own)
+    cuts = []
+    for side in (-found.edge_radius, found.edge_radius):
+        cosine = (level + side) / own
+        rows, edges = np.nonzero((np.abs(cosine) < 1.0) & ~touches)
         opening = np.arccos(cosine[rows, edges])
         for angle in (facing[edges] - opening, facing[edges] + opening):
-            met = vertices[rows] - starts[edges]
-            met = met + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+            met = points[rows] - starts[edges]
+            met = met + radius[rows, None] * np.column_stack([np.cos(angle), np.sin(angle)])
             on_edge = beside(np.einsum("ij,ij->i", met, units[edges]), lengths[edges])
-            found.append((rows[on_edge], angle[on_edge]))
-    return joined(*found)
+            cuts.append((rows[on_edge], angle[on_edge]))
+    return joined(*cuts)
+
+
+def touching_cuts(origins, directions, found):
+    """Where lines (rows), offsets of sides, touch the circles around points of other parts: there
+    begins or ends what two parts share."""
+    to_centre = found.points[None] - origins[:, None]
+    apart = np.abs(cross(directions[:, None], to_centre)) - found.point_radius
+    other = found.point_part != found.side_part[:, None]
+    rows, columns = np.nonzero(other & (np.abs(apart) < SHARED * found.point_radius))
+    return rows, np.einsum("ij,ij->i", to_centre[rows, columns], directions[rows])
+
+
+def shared_arc_cuts(found):
+    """Where arcs around the same point (rows), of other parts, begin and end: rows and angles."""
+    apart = np.hypot(*np.moveaxis(found.points[None] - found.points[:, None], -1, 0))
+    other = found.point_part != found.point_part[:, None]
+    rows, columns = np.nonzero(other & (apart < SHARED * found.point_radius))
+    first, turn = found.first[columns], found.turn[columns]
+    return np.tile(rows, 2), np.concatenate([first, first + turn])
 
 
 def joined(*parts):
@@ -108,14 +201,46 @@ COVERED = 1.0 - 1e-9
 """A point nearer to the core than this share of the radius is inside the swept shape."""
 
 
-def exposed(points, vertices, radius):
-    """Which of the points lie on the swept outline, not inside the swept shape."""
-    starts, ends = edges_of(vertices)
-    seen = np.empty(len(points), dtype=bool)
-    for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(starts) // 200_000):
-        near = distance_to_edges(points[rows], starts, ends).min(axis=1) < COVERED * radius
-        seen[rows] = ~near & ~inside_polygon(points[rows], vertices)
+SHARED = 1e-9
+"""Outlines of two parts that are nearer than this share of the radius run along each other."""
+
+
+def exposed(points, normals, owners, parts):
+    """Which of the points, each on the offset of a part with its outward normal, lie on the swept
+    outline, not inside the swept shape."""
+    seen = np.ones(len(points), dtype=bool)
+    for number, part in enumerate(parts):
+        count = sum(len(ring) for ring in part.rings)
+        for rows in np.array_split(np.arange(len(points)), 1 + len(points) * count // 200_000):
+            seen[rows] &= ~covered(points[rows], normals[rows], owners[rows] > number, part)
     return seen
+
+
+def covered(points, normals, later, part):
+    """Which of the points a part covers. Of pieces that two parts share, that of the earlier one
+    counts: ``later`` says which points belong to a later one. Where they share it back to back,
+    both count, in opposite senses."""
+    away = from_rings(points, part.rings)
+    distance = np.hypot(away[..., 0], away[..., 1])
+    nearest = distance.argmin(axis=1)
+    least = distance[np.arange(len(points)), nearest]
+    found = (least < COVERED * part.radius) | inside_rings(points, part.rings)
+    if later.any():
+        foot = away[np.arange(len(points)), nearest]
+        shared = (least < (2.0 - COVERED) * part.radius) & later
+        found |= shared & (np.einsum("ij,ij->i", foot, normals) > 0.0)
+    return found
+
+
+def from_rings(points, rings):
+    """Vectors (k, edges, 2) from the nearest place of each edge of some rings to the points."""
+    return np.concatenate([away_from(points, ring) for ring in rings], axis=1)
+
+
+def away_from(points, ring):
+    if len(ring) == 1:
+        return points[:, None] - ring
+    return from_edges(points, *edges_of(ring))
 
 
 def nodes_on(starts, ends):
@@ -153,18 +278,19 @@ def trims_of(bends, lengths, radius):
     return cut, np.roll(cut, -1)
 
 
-def chord_nodes(vertices, radius):
+def chord_nodes(parts, found):
     """Points, tangents and weights of the exposed parts of the sides' offsets."""
-    starts, units, lengths = sides_of(vertices)
-    at_start, at_end = trims_of(bends_of(units), lengths, radius)
-    origins = starts + radius * np.column_stack([units[:, 1], -units[:, 0]])
-    origins = origins + at_start[:, None] * units
-    cuts = joined(
-        circle_cuts(origins, units, vertices, radius), offset_cuts(origins, units, vertices, radius)
-    )
-    whole = np.maximum(lengths - at_start - at_end, 0.0)
+    units, lengths = found.side_units, found.side_lengths
+    outward = np.column_stack([units[:, 1], -units[:, 0]])
+    origins = found.side_starts + found.side_radius[:, None] * outward
+    origins = origins + found.at_start[:, None] * units
+    cuts = joined(circle_cuts(origins, units, found), offset_cuts(origins, units, found))
+    if len(parts) > 1:
+        cuts = joined(cuts, touching_cuts(origins, units, found))
+    whole = np.maximum(lengths - found.at_start - found.at_end, 0.0)
     rows, low, high = pieces(*cuts, whole)
-    seen = exposed(origins[rows] + (0.5 * (low + high))[:, None] * units[rows], vertices, radius)
+    middle = origins[rows] + (0.5 * (low + high))[:, None] * units[rows]
+    seen = exposed(middle, outward[rows], found.side_part[rows], parts)
     rows = rows[seen]
     place, weights = nodes_on(low[seen], high[seen])
     points = origins[rows, None] + place[..., None] * units[rows, None]
@@ -172,27 +298,29 @@ def chord_nodes(vertices, radius):
     return points.reshape(-1, 2), tangents.reshape(-1, 2), weights.ravel()
 
 
-def arc_nodes(vertices, radius):
+def arc_nodes(parts, found):
     """Points, tangents and weights of the exposed parts of the arcs around convex corners.
 
     An arc reaches from the normal of one side to that of the next; the rest of its circle is
     covered by those two sides.
     """
-    _, units, _ = sides_of(vertices)
-    before = np.roll(units, 1, axis=0)
-    first = np.arctan2(-before[:, 0], before[:, 1])
-    rows, angles = joined(arc_circle_cuts(vertices, radius), arc_offset_cuts(vertices, radius))
+    points, first, radius = found.points, found.first, found.point_radius
+    rows, angles = joined(arc_circle_cuts(found), arc_offset_cuts(found))
+    if len(parts) > 1:
+        rows, angles = joined((rows, angles), shared_arc_cuts(found))
     turns = np.mod(angles - first[rows], 2.0 * np.pi)
-    rows, low, high = pieces(rows, turns, np.maximum(bends_of(units), 0.0))
+    rows, low, high = pieces(rows, turns, found.turn)
     middle = first[rows] + 0.5 * (low + high)
     around = np.column_stack([np.cos(middle), np.sin(middle)])
-    seen = exposed(vertices[rows] + radius * around, vertices, radius)
+    met = points[rows] + radius[rows, None] * around
+    seen = exposed(met, around, found.point_part[rows], parts)
     place, weights = nodes_on(low[seen], high[seen])
     place = place + first[rows[seen], None]
     outward = np.stack([np.cos(place), np.sin(place)], axis=-1)
-    points = vertices[rows[seen], None] + radius * outward
+    reach = radius[rows[seen], None]
+    met = points[rows[seen], None] + reach[..., None] * outward
     tangents = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
-    return points.reshape(-1, 2), tangents.reshape(-1, 2), radius * weights.ravel()
+    return met.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
 
 
 def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarray, float]:
@@ -200,11 +328,19 @@ def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarra
 
     ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
     """
-    if len(vertices) == 1:
-        return np.pi * radius**2, vertices[0].copy(), 0.5 * np.pi * radius**4
-    origin = vertices.mean(axis=0)
-    core = vertices - origin
-    points, tangents, weights = joined(chord_nodes(core, radius), arc_nodes(core, radius))
+    return union_moments((Part((vertices,), radius),))
+
+
+def union_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float]:
+    """The same of all that some parts cover together: outer rings counter-clockwise, those of holes
+    clockwise."""
+    if len(parts) == len(parts[0].rings) == len(parts[0].rings[0]) == 1:
+        radius, [ring] = parts[0].radius, parts[0].rings
+        return np.pi * radius**2, ring[0].copy(), 0.5 * np.pi * radius**4
+    origin = np.concatenate([ring for part in parts for ring in part.rings]).mean(axis=0)
+    placed = [Part(tuple(ring - origin for ring in part.rings), part.radius) for part in parts]
+    found = pieces_of(placed)
+    points, tangents, weights = joined(chord_nodes(placed, found), arc_nodes(placed, found))
     x, y = points.T
     dx, dy = (tangents * weights[:, None]).T
     area = 0.5 * np.sum(x * dy - y * dx)

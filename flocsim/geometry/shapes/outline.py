@@ -1,15 +1,20 @@
 """Outlines as point lists, and whether a polygon is simple. The only room that imports shapely."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from flocsim.errors import ShapeError
+from flocsim.geometry.shapes.parts import Part
 
 
-def simplicity_fault(vertices: np.ndarray) -> str | None:
-    """None where the closed polygon (N ≥ 3, 2) is simple, else where it fails, in words."""
+def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> str | None:
+    """None where the closed polygon (N ≥ 3, 2) is simple and its holes lie inside, apart from each
+    other, else where it fails, in words."""
     import shapely
 
-    polygon = shapely.Polygon(vertices)
+    polygon = shapely.Polygon(vertices, holes)
     return None if polygon.is_valid else shapely.is_valid_reason(polygon)
 
 
@@ -23,13 +28,26 @@ def require_simple(vertices: np.ndarray) -> None:
         )
 
 
-def swept_rings(
-    vertices: np.ndarray, radius: float, points_per_quadrant: int = 16
-) -> list[np.ndarray]:
-    """The outline of core ⊕ disk as closed rings [(k, 2), …] in metres, the outer one first."""
+def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np.ndarray]:
+    """The outline of all parts, each core ⊕ disk, as closed rings [(k, 2), …] in metres: the outer
+    ones first, the largest before others, then the rings of holes."""
     import shapely
 
-    makers = {1: shapely.Point, 2: shapely.LineString}
-    core = makers.get(len(vertices), shapely.Polygon)(np.asarray(vertices))
-    swept = core.buffer(radius, quad_segs=points_per_quadrant)
-    return [np.asarray(ring.coords) for ring in (swept.exterior, *swept.interiors)]
+    swept = [
+        core_geometry(part.rings).buffer(part.radius, quad_segs=points_per_quadrant)
+        for part in parts
+    ]
+    whole = swept[0] if len(swept) == 1 else shapely.union_all(swept)
+    pieces = sorted(getattr(whole, "geoms", [whole]), key=lambda piece: -piece.area)
+    rings = [piece.exterior for piece in pieces]
+    rings += [hole for piece in pieces for hole in piece.interiors]
+    return [np.asarray(ring.coords) for ring in rings]
+
+
+def core_geometry(rings: Sequence[np.ndarray]) -> Any:
+    """A core as shapely has it."""
+    import shapely
+
+    if len(rings[0]) < 3:
+        return {1: shapely.Point, 2: shapely.LineString}[len(rings[0])](rings[0])
+    return shapely.Polygon(rings[0], rings[1:])

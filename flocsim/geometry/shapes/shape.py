@@ -12,6 +12,7 @@ from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
 from flocsim.geometry.shapes.moments import swept_moments
 from flocsim.geometry.shapes.outline import require_simple, swept_rings
+from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
 
 TOO_CLOSE = 1e-12
 """Core points nearer than this share of the core's extent count as repeated."""
@@ -21,19 +22,23 @@ class Swept(NamedTuple):
     """What follows from a core and a radius.
 
     Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
-    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴].
+    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
+    ``parts``, around the centroid as well, where there is more than one ring.
     """
 
     vertices: np.ndarray
     centroid: np.ndarray
     area: float
     second_moment: float
+    parts: Parts = ()
 
 
 class Shape:
     """Core points swept by a disk: all that the disk covers while its centre goes over the core.
 
-    All shapes are one family: a sphere is one core point.
+    All shapes are one family: a sphere is one core point. A core may have holes, and a shape may
+    be of several parts (Composite): those have all their core points one after another in
+    ``vertices``, and in ``parts`` which of them belong together.
 
     A shape of one's own is a frozen subclass that gives two things, each a field or a property
     (examples/own_shape.py):
@@ -73,8 +78,18 @@ class Shape:
         return self.swept.centroid
 
     @property
+    def parts(self) -> Parts:
+        """The parts, each of one or more rings, around the centroid of the whole."""
+        return self.swept.parts or (Part((self.vertices,), self.radius),)
+
+    @property
+    def is_compound(self) -> bool:
+        """Whether the core has more than one ring: holes, or parts."""
+        return bool(self.swept.parts)
+
+    @property
     def area(self) -> float:
-        """Area A of the swept outline [m²]."""
+        """Area A of the swept outline [m²]: what parts share counts once, holes do not count."""
         return self.swept.area
 
     @property
@@ -90,10 +105,12 @@ class Shape:
     @property
     def bounding_radius(self) -> float:
         """R, the largest distance from the centroid to the outline [m]."""
+        if self.is_compound:
+            return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
         return float(np.hypot(*self.vertices.T).max() + self.radius)
 
     def scaled(self, factor: float) -> "Shape":
-        """The same outline, ``factor`` times as large: a Sphere or a SpheroPolygon."""
+        """The same outline, ``factor`` times as large: a Sphere, a SpheroPolygon or a Composite."""
         from flocsim.geometry.shapes.spheropolygon import scaled_outline
 
         return scaled_outline(self, factor)
@@ -103,11 +120,18 @@ class Shape:
         c, s = np.cos(angle), np.sin(angle)
         return self.vertices @ np.array([[c, s], [-s, c]]) + (x, y)
 
+    def placed_parts(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> Parts:
+        """The parts of the body at (x, y), turned by ``angle`` [rad]."""
+        if self.is_compound:
+            return moved_parts(self.parts, x, y, angle)
+        return (Part((self.placed_vertices(x, y, angle),), self.radius),)
+
     def outline(
         self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
     ) -> list[np.ndarray]:
-        """Closed rings [(k, 2), …] of the placed outline, for drawing; the outer one first."""
-        return swept_rings(self.placed_vertices(x, y, angle), self.radius, points_per_quadrant)
+        """Closed rings [(k, 2), …] of the placed outline, for drawing: the outer one, or several of
+        parts that touch in a point, then the rings of holes."""
+        return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
 
 
 def swept_by(core: np.ndarray, radius: float) -> Swept:

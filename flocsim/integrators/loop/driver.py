@@ -6,7 +6,6 @@ from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     CODE,
-    EDGE_BODY,
     FULL,
     GAP,
     GEOMETRY_COLUMNS,
@@ -17,7 +16,6 @@ from flocsim.arrays import (
     NOTHING_FULL,
     NOW,
     PAUSE_AT,
-    RADIUS,
     RECORD_MOTION,
     RECORD_TIME,
     RECORDED,
@@ -27,12 +25,11 @@ from flocsim.arrays import (
     TIME,
     TOLERANCE,
     UNTIL,
-    VERTEX_BODY,
 )
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates, spent
-from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.points import locate_contacts, row_radii
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
 from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
@@ -59,10 +56,8 @@ MOST_STILL = 100
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
     for row in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-        if -work.geometry[NOW, row, GAP] > DEEPEST_OVERLAP * (
-            scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-        ):
+        radius_a, radius_b = row_radii(scene, work, row)
+        if -work.geometry[NOW, row, GAP] > DEEPEST_OVERLAP * (radius_a + radius_b):
             return True
     return False
 

@@ -29,7 +29,6 @@ from flocsim.arrays import (
     NOW,
     PAIR,
     PAIRS,
-    RADIUS,
     SHARE,
     SLIDING,
     SLIP_OFFSET,
@@ -41,6 +40,7 @@ from flocsim.arrays import (
     VERTEX_BODY,
     ContactView,
 )
+from flocsim.geometry.contact.points import row_radii
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
@@ -129,11 +129,11 @@ def sliding_row(scene, work, row):
 
     The arms are p·n and the same for the foot.
     """
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    radius_a, radius_b = row_radii(scene, work, row)
     g = work.geometry
     tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
-    difference = scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
-    distance = g[NOW, row, GAP] + scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    difference = radius_a - radius_b
+    distance = g[NOW, row, GAP] + radius_a + radius_b
     arm_a = g[NOW, row, VERTEX_ARM_T] + 0.5 * (distance + difference)
     arm_b = g[NOW, row, EDGE_ARM_T] - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.

@@ -18,7 +18,6 @@ from flocsim.arrays import (
     MASS,
     NORMAL_X,
     NORMAL_Y,
-    RADIUS,
     SPIN,
     TORQUE,
     VERTEX_ARM_N,
@@ -33,6 +32,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.constants import CENTRE_SOFTENING
+from flocsim.geometry.contact.points import row_radii
 from flocsim.geometry.contact.separation import separation
 from flocsim.hooks import hook
 
@@ -95,10 +95,11 @@ def tangential_rate(work, state, row):
 
 def contact_view(scene, work, state, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    radius_a, radius_b = row_radii(scene, work, row)
     return ContactView(
         -work.geometry[state, row, GAP], -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
-        scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
+        radius_a, radius_b,
     )  # fmt: skip
 
 

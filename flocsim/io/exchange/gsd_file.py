@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.geometry.shapes.parts import Part
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.exchange.outlines import rings_of, spread
+from flocsim.geometry.shapes.spheropolygon import shape_of_parts
+from flocsim.io.exchange.outlines import is_hole, rings_of, spread
 from flocsim.io.files import Rule, keep, write_file
 
 MICRO = 1e6
@@ -67,10 +69,26 @@ def in_space(flat: np.ndarray) -> np.ndarray:
     return np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)
 
 
+def outer_ring(shape: Shape) -> np.ndarray:
+    """The outer ring of an outline (k, 2) [m]. GSD has one for each body: disks of parts that touch
+    in a point only are drawn a little wider."""
+    for wider in WIDER:
+        parts = [Part(part.rings, part.radius * wider) for part in shape.parts]
+        known = shape if wider == 1.0 else shape_of_parts(parts)
+        rings = rings_of(known)
+        if len(rings) == 1 or is_hole(rings[1]):
+            break
+    return rings[0] + known.centroid * (known is not shape)
+
+
+WIDER = (1.0, 1.01, 1.03, 1.1, 1.3)
+"""Factors of radii that are tried until there is one outer ring."""
+
+
 def shape_of(shape: Shape) -> dict:
     """What GSD says of a shape: a sphere, or the outer ring of the outline as a polygon."""
     if len(shape.vertices) == 1:
         return {"type": "Sphere", "diameter": 2.0 * MICRO * shape.radius}
-    ring = (MICRO * rings_of(shape)[0]).tolist()
+    ring = (MICRO * outer_ring(shape)).tolist()
     # As numbers of JSON, which is how the file holds them.
     return json.loads(json.dumps({"type": "Polygon", "rounding_radius": 0, "vertices": ring}))

@@ -16,14 +16,24 @@ def frames_of(count: int) -> np.ndarray:
 
 
 def rings_of(shape: Shape) -> list[np.ndarray]:
-    """The rings (k, 2) [m] of an outline about its centroid, the outer one first, then holes.
+    """The rings (k, 2) [m] of an outline about its centroid, outer ones first, then holes.
 
-    Open (the first point is not said twice), the outer one counter-clockwise.
+    Open (the first point is not said twice), outer ones counter-clockwise, holes clockwise. Most
+    outlines have one outer ring; parts that touch in a point have several.
     """
     rings = [np.asarray(ring, dtype=float) for ring in shape.outline(0.0, 0.0, 0.0)]
     rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
-    outer, *holes = sorted(rings, key=lambda ring: -abs(area_of(ring)))
-    return [outer if area_of(outer) > 0.0 else outer[::-1], *holes]
+    if not shape.is_compound:
+        outer, *holes = sorted(rings, key=lambda ring: -abs(area_of(ring)))
+        return [outer if area_of(outer) > 0.0 else outer[::-1], *holes]
+    # shapely's outer rings go round in one sense, those of holes in the other.
+    sense = 1.0 if area_of(rings[0]) > 0.0 else -1.0
+    return [ring if sense > 0.0 else ring[::-1] for ring in rings]
+
+
+def is_hole(ring: np.ndarray) -> bool:
+    """Whether a ring of `rings_of` is that of a hole, where it is not the first."""
+    return area_of(ring) <= 0.0
 
 
 def area_of(ring: np.ndarray) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.exchange.outlines import frames_of, placed, rings_of
+from flocsim.io.exchange.outlines import frames_of, is_hole, placed, rings_of
 
 KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
@@ -32,7 +32,7 @@ def write_vtkhdf(
     frames, count = points.shape[:2]
     lengths = [len(ring) for each in rings for ring in each]
     owners = [n for n, each in enumerate(rings) for _ in each]
-    holes = [int(place > 0) for each in rings for place in range(len(each))]
+    holes = [int(place > 0 and is_hole(ring)) for each in rings for place, ring in enumerate(each)]
 
     group = file.create_group("VTKHDF")
     group.attrs["Version"] = np.array([2, 0], "i8")

@@ -159,7 +159,9 @@ def segment_mask(
         spare += len(pieces) - 1
     filters = Filters(min_radius, max_radius, clear_of_border=False)
     regions, rejected = sorted_out(found, None, filters, numbers)
-    return Segmentation(labels > 0, regions, rejected, "masked", float("nan"))
+    seen = mask > 0
+    holes = filled(seen) & ~seen
+    return Segmentation(labels > 0, regions, rejected, "masked", float("nan"), holes=holes)
 
 
 def _pieces(mask, box):

@@ -30,7 +30,8 @@ class Segmentation:
     foreground: (h, w) bool, everything past the threshold, holes filled, rejected regions too;
     regions: the flocs; rejected: the others; flocs: "bright" or "dark"; threshold: the contrast,
     against the background, that separates the two (0 = background, 1 = full range); left_whole:
-    regions with necks that were taken for fractal aggregates, and not parted.
+    regions with necks that were taken for fractal aggregates, and not parted; holes: (h, w) bool,
+    what was filled in the foreground, None where nobody asks any more.
     """
 
     foreground: np.ndarray
@@ -39,6 +40,7 @@ class Segmentation:
     flocs: str
     threshold: float
     left_whole: int = 0
+    holes: np.ndarray | None = None
 
     @property
     def foreground_share(self) -> float:
@@ -102,9 +104,12 @@ def segment(
     contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
     if threshold is None:
         threshold = find_threshold(contrast, noise, saturated)
-    foreground = filled(contrast > threshold)
+    seen = contrast > threshold
+    foreground = filled(seen)
     regions, rejected, whole = find_regions(foreground, contrast, filters)
-    return Segmentation(foreground, regions, rejected, flocs, threshold, whole)
+    return Segmentation(
+        foreground, regions, rejected, flocs, threshold, whole, foreground & ~seen
+    )  # fmt: skip
 
 
 def _checked(grey):

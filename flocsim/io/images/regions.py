@@ -128,6 +128,20 @@ def reason_to_reject(box, shape, radius, blur, filters):
     return None
 
 
+def with_holes(region: Region, holes: np.ndarray) -> Region:
+    """The Region without those of its pixels that are ``holes`` (h, w) of the picture; its softness
+    stays that of its outline."""
+    top, left, bottom, right = region.bbox
+    mask = region.mask.copy()
+    mask[1:-1, 1:-1] &= ~holes[top:bottom, left:right]
+    area = int(mask.sum())
+    box = slice(top, bottom), slice(left, right)
+    return attrs.evolve(
+        region, mask=mask, area=area, equivalent_radius=float(np.sqrt(area / np.pi)),
+        centroid=centroid_of(mask[1:-1, 1:-1], box),
+    )  # fmt: skip
+
+
 def centroid_of(mask, box):
     rows, columns = np.nonzero(mask)
     return float(columns.mean() + box[1].start), float(rows.mean() + box[0].start)

@@ -363,12 +363,29 @@ def time_unit(times):
 
 
 def draw_bodies(axes, frame):
-    from matplotlib.patches import Polygon
+    from matplotlib.patches import PathPatch, Polygon
 
     for number, body in enumerate(frame):
         colour = BODY_COLOURS[number % len(BODY_COLOURS)]
-        for polygon in body:
-            axes.add_patch(Polygon(polygon, facecolor=(colour, 0.3), edgecolor=colour, lw=0.9))
+        style = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
+        if len(body) == 1:
+            axes.add_patch(Polygon(body[0], **style))
+        else:
+            axes.add_patch(PathPatch(rings_path(body), **style))
+
+
+def rings_path(rings):
+    """The rings of a body as one path, in which those of holes stay open."""
+    from matplotlib.path import Path as Outline
+
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in closed(rings)))
+
+
+def closed(rings):
+    """The rings, each with its first point again at its end."""
+    for ring in rings:
+        ring = np.asarray(ring)
+        yield ring if np.array_equal(ring[0], ring[-1]) else np.concatenate([ring, ring[:1]])
 
 
 def draw_paths(axes, paths):

@@ -70,7 +70,7 @@ def draw_overlay(
         for region, fit in flocs:
             first_row, first_column = region.bbox[:2]
             # The mask has a margin of one pixel, and the fit's y counts upwards.
-            for ring in swept_rings(fit.vertices, fit.radius):
+            for ring in swept_rings(fit.parts):
                 axes.plot(*(ring * (1.0, -1.0) + (first_column - 1, first_row - 1)).T,
                           color=FLOC_COLOUR, linewidth=0.8)  # fmt: skip
             labels.put(str(region.label), region.bbox, FLOC_COLOUR, 7)

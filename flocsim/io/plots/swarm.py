@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
 from flocsim.io.outputs import redrawn
+from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
     Figure,
     frame_of,
@@ -22,7 +23,7 @@ from flocsim.io.plots.style import (
     new_figure,
     save_gif,
 )
-from flocsim.io.results.swarm_file import SwarmResults, mean
+from flocsim.io.results.swarm_file import GONE, SwarmResults, mean
 
 MICRO = 1e6
 MOST_POINTS = 160
@@ -30,6 +31,12 @@ MOST_POINTS = 160
 
 ALONE, FIXED = "0.78", "0.35"
 """Colours of bodies that belong to no cluster of two or more, and of walls."""
+
+BOND_COLOURS = (
+    ("certificate", "certificate", "#0072B2"), ("rest", "rest", "#56B4E9"),
+    ("hook", "hook", "#E69F00"), ("touching", "touching", "0.82"),
+)  # fmt: skip
+"""Kinds of bonds, from below, with their words and colours."""
 
 SNAPSHOTS = 4
 """Times that the figure of snapshots shows."""
@@ -63,8 +70,8 @@ def clusters(results: SwarmResults) -> Figure:
         ("settling", 1e3, "settling [mm/s]"),
     ]
     with house_style():
-        figure = new_figure(7.4, 2.3)
-        panels = figure.subplots(1, len(shown))
+        figure = new_figure(9.2, 2.3)
+        *panels, last = figure.subplots(1, len(shown) + 1)
         for axes, (name, factor, label) in zip(panels, shown, strict=True):
             values = factor * counts[name]
             for each in values if len(values) > 1 else ():
@@ -77,7 +84,21 @@ def clusters(results: SwarmResults) -> Figure:
             panels[0].plot([], [], color="0.8", linewidth=0.7, label="a swarm")
             panels[0].plot([], [], color="#0072B2", label="mean")
             panels[0].legend()
+        draw_bonds(last, results)
         return figure
+
+
+def draw_bonds(axes, results):
+    """The pairs that touch over time, by what holds them, in the mean over swarms."""
+    counts, times, below = results.groups["counts"], results.scales["time"], 0.0
+    for kind, word, colour in BOND_COLOURS:
+        level = below + mean(counts[f"bonds_{kind}"])
+        axes.fill_between(times, below, level, color=colour, label=word, linewidth=0.0)
+        below = level
+    axes.set_xlabel("time [s]")
+    axes.set_title("bonds", fontsize=8.0)
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="upper left", fontsize=6)
 
 
 def sizes(results: SwarmResults) -> Figure:
@@ -125,8 +146,9 @@ def classes(results: SwarmResults) -> Figure:
 
 def last_known(results: SwarmResults) -> int:
     """The place of the last time that the first swarm has reached."""
-    known = np.isfinite(results.groups["snapshots"]["position"][0, :, :, 0]).all(axis=1)
-    return int(np.flatnonzero(known)[-1])
+    snapshots = results.groups["snapshots"]
+    known = np.isfinite(snapshots["position"][0, :, :, 0]) | (snapshots["cluster"][0] == GONE)
+    return int(np.flatnonzero(known.all(axis=1))[-1])
 
 
 def sizes_of(labels: np.ndarray) -> np.ndarray:
@@ -139,19 +161,21 @@ def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
     """The shape of a body, made of what the file has of it."""
     bodies = results.groups["bodies"]
     first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
-    radius = float(bodies["spheroradius"][replicate, body])
-    if count == 1:
-        return Sphere(radius)
-    return SpheroPolygon(bodies["points"][replicate, first : first + count], radius)
+    rows = slice(first, first + count)
+    columns = (
+        bodies[name][replicate, rows]
+        for name in ("points", "point_part", "point_ring", "point_radius")
+    )
+    return shape_of_parts(parts_in(PointTable(*columns)))
 
 
-def outlines_of(results: SwarmResults, replicate: int) -> list[np.ndarray]:
-    """The outer outline of every body about its centroid, (k, 2) [m]."""
+def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]:
+    """The rings of the outline of every body about its centroid, (k, 2) [m]."""
     bodies = results.groups["bodies"]["r_eq"].shape[1]
     found = []
     for body in range(bodies):
-        ring = shape_of(results, replicate, body).outline(0.0, 0.0, 0.0)[0]
-        found.append(ring[:: max(1, len(ring) // MOST_POINTS)])
+        rings = shape_of(results, replicate, body).outline(0.0, 0.0, 0.0)
+        found.append([ring[:: max(1, len(ring) // MOST_POINTS)] for ring in rings])
     return found
 
 
@@ -174,27 +198,31 @@ def cluster_colours(labels: np.ndarray) -> list:
 
 def draw_bodies(axes, results, replicate, place, outlines=None):
     """All bodies at a time, inside the box, which repeats itself where it does."""
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import PathCollection
 
     outlines = outlines_of(results, replicate) if outlines is None else outlines
     width, height = results.groups["bodies"]["box"][replicate]
     repeats = str(results.run.get("periodic", "xy"))
     position = results.groups["snapshots"]["position"][replicate, place]
     colours = cluster_colours(results.groups["snapshots"]["cluster"][replicate, place])
-    polygons, shades = [], []
+    paths, shades, lowest = [], [], []
     for outline, (x, y, angle), colour in zip(outlines, position, colours, strict=True):
+        if not np.isfinite(x):
+            continue  # It has left the box.
         c, s = np.cos(angle), np.sin(angle)
-        turned = outline @ np.array([[c, s], [-s, c]])
+        turned = [ring @ np.array([[c, s], [-s, c]]) for ring in outline]
         if colour != FIXED:
             x, y = (x % width if "x" in repeats else x), (y % height if "y" in repeats else y)
-        reach = np.hypot(*outline.T).max()
+        reach = max(np.hypot(*ring.T).max() for ring in outline)
         for i in shifts(x, reach, width, "x" in repeats and colour != FIXED):
             for j in shifts(y, reach, height, "y" in repeats and colour != FIXED):
-                polygons.append(MICRO * (turned + [x + i, y + j]))
+                rings = [MICRO * (ring + [x + i, y + j]) for ring in turned]
+                paths.append(rings_path(rings))
+                lowest.append(min(ring[:, 1].min() for ring in rings))
                 shades.append(colour)
-    axes.add_collection(PolyCollection(polygons, facecolors=shades, edgecolors="0.25", lw=0.2))
+    axes.add_collection(PathCollection(paths, facecolors=shades, edgecolors="0.25", lw=0.2))
     axes.set_xlim(0.0, MICRO * width)
-    low = 0.0 if "y" in repeats else float(np.nanmin([each[:, 1].min() for each in polygons]))
+    low = 0.0 if "y" in repeats else float(min(lowest, default=0.0))
     high = MICRO * height
     axes.set_ylim(max(min(low, 0.0), -0.1 * high) if "y" not in repeats else 0.0, high)
     axes.set_aspect("equal")

@@ -3,6 +3,7 @@
 - ``counts``     numbers on the clusters of every replicate over time, and clusters by size class
 - ``snapshots``  places, velocities and clusters of all bodies at every time
 - ``bodies``     the bodies of every replicate: sizes, masses, core points, and its box
+- ``bonds``      the pairs that touch, and what holds them, at every time
 - ``ends``       how every replicate ended, and what it took
 - ``run``        scalars: config text, versions, machine
 """
@@ -16,6 +17,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
@@ -24,7 +26,7 @@ from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 ROOT = {"format": "text", "schema_version": "i8"}
 
 WALL = -2
@@ -39,6 +41,12 @@ COUNTS = {
     "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass"),
     "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
     "settling": ("f8", "m s-1", "downward velocity of clusters, in the mean over mass"),
+    "bonds_certificate": ("f8", "1", "touching pairs that no later load can part"),
+    "bonds_hook": ("f8", "1", "touching pairs at rest that their shapes hold, not attraction"),
+    "bonds_rest": ("f8", "1", "touching pairs at rest, by attraction that outweighs the load"),
+    "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
+    "removed": ("f8", "1", "bodies that have left the box for good"),
+    "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
@@ -50,10 +58,27 @@ SNAPSHOTS = {
 }
 """Columns (replicate, time, body, component)."""
 
-CLUSTER = {"cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known")}
+CLUSTER = {
+    "cluster": ("i4", "1", "cluster of a body at that time; -1: a wall, or not known; -2: it left")
+}
+GONE = -2
+"""The cluster of a body that has left the box for good."""
+
+BONDS = {
+    "bond_replicate": ("i4", "1", "replicate of the pair"),
+    "bond_time": ("i4", "1", "place of the snapshot among the times"),
+    "bond_later": ("i4", "1", "the later one of two bodies that touch"),
+    "bond_earlier": ("i4", "1", "the earlier one"),
+    "bond_kind": ("i4", "1", "0 touching, 1 certificate, 2 hook, 3 rest"),
+}
+"""Columns (bond,): the pairs that touch at all times of all replicates."""
+
+KIND_COUNT = 4
+"""Kinds of bonds."""
+
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
-    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core"),
+    "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
     "mass": ("f8", "kg", "mass"),
     "floc": ("i4", "1", "floc of the library or the pool; -1 a sphere, -2 a wall"),
     "first_point": ("i8", "1", "place in points of the first core point"),
@@ -62,6 +87,13 @@ BODIES = {
 """Columns (replicate, body)."""
 
 POINTS = {"points": ("f8", "m", "core points of all bodies, about their centroids")}
+RINGS = {
+    "point_part": ("i4", "1", "part of its body that a core point belongs to"),
+    "point_ring": ("i4", "1", "ring of the part: 0 its outline, from 1 its holes"),
+    "point_radius": ("f8", "m", "radius of the disk that sweeps the part"),
+}
+"""Columns (replicate, point)."""
+
 BOX = {"box": ("f8", "m", "width and height of the box")}
 ENDS = {
     "finished": ("i4", "1", "1: came to its end; 0: stopped before it"),
@@ -81,6 +113,7 @@ SCALES = {
     "component": ("text", "1", "of a place, and of its rate"),
     "axis": ("text", "1", "of a point"),
     "point": ("i8", "1", "number of the core point"),
+    "bond": ("i8", "1", "number of the pair"),
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
@@ -89,8 +122,10 @@ GROUPS: dict[str, list[tuple[dict, tuple[str, ...]]]] = {
     "snapshots": [(SNAPSHOTS, (*MOMENTS, "body", "component")), (CLUSTER, (*MOMENTS, "body"))],
     "bodies": [
         (BODIES, ("replicate", "body")), (POINTS, ("replicate", "point", "axis")),
+        (RINGS, ("replicate", "point")),
         (BOX, ("replicate", "axis")),
     ],
+    "bonds": [(BONDS, ("bond",))],
     "ends": [(ENDS, ("replicate",))],
 }  # fmt: skip
 """Groups → columns and their axes."""
@@ -234,10 +269,28 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
     for name in ("r_eq", "spheroradius"):
         if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
             raise ValueError(f"bodies/{name} holds what is no radius")
+    for replicate, body in np.ndindex(*first.shape):
+        begin, many = int(first[replicate, body]), int(count[replicate, body])
+        columns = (
+            bodies[name][replicate, begin : begin + many] for name in (*POINTS, *RINGS)
+        )  # fmt: skip
+        table = PointTable(*columns)
+        if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
+            raise ValueError("bodies/point_radius holds what is no radius")
+        parts_in(table)
     if not np.all((bodies["box"] > 0.0) & np.isfinite(bodies["box"])):
         raise ValueError("its box has no size")
     if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
         raise ValueError("its times do not rise")
+    check_bonds(groups["bonds"], groups["snapshots"]["cluster"].shape)
     labels = groups["snapshots"]["cluster"]
-    if np.any(labels < -1) or np.any(labels >= max(labels.shape[-1], 1)):
+    if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
         raise ValueError("snapshots/cluster holds what is no cluster")
+
+
+def check_bonds(bonds: Mapping[str, np.ndarray], shape: tuple[int, ...]) -> None:
+    """ValueError for pairs that are none of (replicates, times, bodies), or of no kind."""
+    limits = (*shape, shape[2], KIND_COUNT)
+    for name, limit in zip(BONDS, limits, strict=True):
+        if np.any(bonds[name] < 0) or np.any(bonds[name] >= limit):
+            raise ValueError(f"bonds/{name} holds what cannot be")

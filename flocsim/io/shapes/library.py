@@ -1,6 +1,6 @@
 """The shape library: flocs fitted at several numbers of vertices, in one HDF5 file.
 
-Layout, schema version 1; n flocs, in the order in which they were written:
+Layout, schema versions 1 and 2; n flocs, in the order in which they were written:
 
     /                       attributes: kind = "flocsim shape library", schema_version = 1,
                             and what the fits were made with, as far as given: method, …
@@ -16,6 +16,12 @@ Layout, schema version 1; n flocs, in the order in which they were written:
     /fits/N/radius          (n) [m], spheroradius; for N = 1 the circle's radius
     /fits/N/relative_error  (n) [%], paper eq. 2
 
+and, in version 2, where flocs have holes or several parts:
+
+    /fits/N/part            (n, N) part that a vertex belongs to, from 0
+    /fits/N/ring            (n, N) its ring in there: 0 the outline, from 1 holes
+    /fits/N/point_radius    (n, N) [m] spheroradius of its part
+
 for every N, so that between conditions nothing changes but N.  Every dataset has the attributes
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
@@ -30,9 +36,10 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
+from flocsim.geometry.shapes.parts import Part, PointTable, is_compound, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column, hold_against
 from flocsim.io.hdf5.structure import Node
@@ -48,7 +55,9 @@ SHIPPED = Path(__file__).with_name("synthetic.h5")
 """Its place; flocsim.io.shapes.shipped made it."""
 
 KIND = "flocsim shape library"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION, COMPOUND_VERSION = 1, 2
+"""Of libraries of polygons, and of those with holes or parts."""
+
 MOST_VERTICES = 10_000
 LARGEST = 1.0
 """Metres beyond which nothing of a floc lies."""
@@ -72,20 +81,39 @@ FIT_COLUMNS = {
 }
 
 
+POINT_COLUMNS: dict[str, tuple[str, type, str, str]] = {
+    # name: (column of a PointTable, type, units, long name)
+    "part": ("part", np.int64, "", "part of the floc that a vertex belongs to"),
+    "ring": ("ring", np.int64, "", "ring of the part: 0 its outline, from 1 its holes"),
+    "point_radius": ("radius", float, "m", "spheroradius of the part"),
+}
+
+
 @attrs.frozen(eq=False)
 class StoredFit:
-    """One fit: vertices (N, 2) [m] about the floc's centroid, y up; radius [m]; RE [%]."""
+    """One fit: vertices (N, 2) [m] about the floc's centroid, y up; radius [m], the smallest of
+    its parts; RE [%]; of a core with holes, or of several parts, the ``table`` of its points."""
 
     vertices: np.ndarray
     radius: float
     relative_error: float
+    table: PointTable | None = None
 
     @property
     def shape(self) -> Shape:
-        """The Sphere (N = 1) or SpheroPolygon [m], around its own centroid."""
+        """The Sphere (N = 1), SpheroPolygon or Composite [m], around its own centroid."""
         if len(self.vertices) == 1:
             return Sphere(self.radius)
+        if self.table is not None:
+            return shape_of_parts(parts_in(self.table))
         return SpheroPolygon(self.vertices, self.radius)
+
+    @property
+    def points(self) -> PointTable:
+        """Its core points, with the parts and rings that they belong to."""
+        if self.table is not None:
+            return self.table
+        return table_of((Part((self.vertices,), self.radius),))
 
 
 @attrs.frozen(eq=False)
@@ -126,17 +154,21 @@ def make_entry(
     top, left = region.bbox[:2]
     # The mask has a margin of one pixel, and y counts downwards there.
     centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
-    stored = {
-        int(count): StoredFit(
-            (fit.vertices - centroid) * pixel_size, fit.radius * pixel_size, fit.relative_error
-        )
-        for count, fit in fits.items()
-    }
+    stored = {int(count): stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
     floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     return ShapeEntry(
         floc_id, image, float(pixel_size), region.centroid, region.area,
         region.equivalent_radius, float(spheroradius), stored,
     )  # fmt: skip
+
+
+def stored_fit(fit: "Fit", centroid: np.ndarray, pixel_size: float) -> StoredFit:
+    """The StoredFit of a Fit in a mask where the floc's centroid lies at ``centroid`` [px]."""
+    vertices, radius = (fit.vertices - centroid) * pixel_size, fit.radius * pixel_size
+    table = None
+    if fit.hole_sizes:
+        table = table_of(fit.parts)._replace(place=vertices, radius=np.full(len(vertices), radius))
+    return StoredFit(vertices, radius, fit.relative_error, table)
 
 
 def write_library(
@@ -172,10 +204,11 @@ def write_library(
             "size of one, as in '0.95 um'"
         )
 
+    compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
     image = io.BytesIO()
     with h5py.File(image, "w", track_order=False) as file:
         file.attrs["kind"] = KIND
-        file.attrs["schema_version"] = SCHEMA_VERSION
+        file.attrs["schema_version"] = COMPOUND_VERSION if compound else SCHEMA_VERSION
         file.attrs.update(settings or {})
         group = file.create_group("flocs")
         for name, (attribute, kind, units, long_name) in FLOC_COLUMNS.items():
@@ -188,12 +221,23 @@ def write_library(
             for name, (units, long_name) in FIT_COLUMNS.items():
                 column = np.array([getattr(fit, name) for fit in fits], dtype=float)
                 _write_column(group, name, column, units, long_name)
+            if compound:
+                write_rings(group, [fit.points for fit in fits])
     write_file(path, seal(image.getvalue()), rule)
+
+
+def write_rings(group, tables):
+    """The columns of POINT_COLUMNS of some fits."""
+    for name, (attribute, kind, units, long_name) in POINT_COLUMNS.items():
+        values = np.array([getattr(table, attribute) for table in tables], dtype=kind)
+        _write_column(group, name, values, units, long_name)
 
 
 def reach_of(entry):
     """The largest coordinate or radius of a floc's fits [m]."""
-    return max(max(np.abs(fit.vertices).max(), fit.radius) for fit in entry.fits.values())
+    return max(
+        max(np.abs(fit.vertices).max(), fit.points.radius.max()) for fit in entry.fits.values()
+    )
 
 
 def _write_column(group, name, values, units, long_name):
@@ -230,12 +274,12 @@ def read_library(path: str | Path) -> list[ShapeEntry]:
         version = nodes[""].attributes.get("schema_version") == ("i8", ()) and int(
             file.attrs["schema_version"]
         )
-        if version != SCHEMA_VERSION:
+        if version not in (SCHEMA_VERSION, COMPOUND_VERSION):
             raise FileError(
                 f"{path} has schema version {version or 'unknown'}, this flocsim reads "
-                f"{SCHEMA_VERSION}: make it again with flocsim fit"
+                f"{SCHEMA_VERSION} and {COMPOUND_VERSION}: make it again with flocsim fit"
             )
-        check_structure(nodes)
+        check_structure(nodes, version == COMPOUND_VERSION)
         entries = _entries(file)
     return entries
 
@@ -250,7 +294,7 @@ def opened(path: str | Path) -> AbstractContextManager[tuple[Any, dict[str, Node
     )
 
 
-def check_structure(nodes: Mapping[str, Node]) -> None:
+def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
     """ValueError unless the groups and datasets of a file are those of a shape library."""
     kinds = {str: "text", float: "f8", np.int64: "i8"}
     columns = {
@@ -267,6 +311,11 @@ def check_structure(nodes: Mapping[str, Node]) -> None:
                 name: Column("f8", ("floc", int(count), 2) if name == "vertices" else ("floc",))
                 for name in FIT_COLUMNS
             }
+            if compound:
+                groups[path] |= {
+                    name: Column(kinds[about[1]], ("floc", int(count)))
+                    for name, about in POINT_COLUMNS.items()
+                }
     lengths = hold_against(nodes, groups, groups)
     if lengths["floc"] < 1 or len(groups) < 3:
         raise ValueError("there are no flocs")
@@ -297,8 +346,8 @@ def _entries(file):
     entries = []
     for row in range(len(flocs["floc_id"])):
         stored = {
-            count: StoredFit(vertices[row], float(radius[row]), float(error[row]))
-            for count, (vertices, radius, error) in sorted(fits.items())
+            count: StoredFit(vertices[row], float(radius[row]), float(error[row]), tables[row])
+            for count, (vertices, radius, error, tables) in sorted(fits.items())
         }
         values = {attribute: column[row] for attribute, column in flocs.items()}
         entries.append(ShapeEntry(**values, fits=stored))
@@ -306,7 +355,7 @@ def _entries(file):
 
 
 def _fits(count, group):
-    """(vertices, radius, relative error) of all flocs at N = ``count``."""
+    """(vertices, radius, relative error, tables of points) of all flocs at N = ``count``."""
     vertices, radius, error = (group[name][()] for name in FIT_COLUMNS)
     for name, values, most in (
         ("vertices", np.abs(vertices), LARGEST),
@@ -317,4 +366,19 @@ def _fits(count, group):
             raise ValueError(f"fits/{count}/{name} holds values that are no numbers of a floc's")
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
-    return vertices, radius, error
+    return vertices, radius, error, _tables(count, group, vertices, radius)
+
+
+def _tables(count, group, vertices, radius):
+    """The PointTables of all flocs at N = ``count``; None for those of one ring."""
+    if "part" not in group:
+        return [None] * len(vertices)
+    columns = {column: group[name][()] for name, (column, *_) in POINT_COLUMNS.items()}
+    wide = columns["radius"]
+    if not np.all((wide > 0.0) & (wide <= LARGEST)) or np.any(wide.min(axis=1) != radius):
+        raise ValueError(f"fits/{count}/point_radius holds values that are no radii of a floc's")
+    tables = []
+    for row, place in enumerate(vertices):
+        table = PointTable(place, **{name: values[row] for name, values in columns.items()})
+        tables.append(table if is_compound(parts_in(table)) else None)
+    return tables

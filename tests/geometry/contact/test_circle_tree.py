@@ -19,7 +19,6 @@ from flocsim.geometry.contact.circle_tree import (
     descended,
     leaves_of,
     level_runs,
-    outlines_of,
     passed,
     plan_of,
     reversed_pose,
@@ -28,6 +27,7 @@ from flocsim.geometry.contact.circle_tree import (
     tree_of,
 )
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
+from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
 
 COUNTS = (1, 2, 3, 4, 5, 7, 16, 33, 64, 512)

@@ -8,11 +8,12 @@ from hypothesis import strategies as st
 
 from flocsim import Sphere
 from flocsim.geometry.contact.overlap import (
-    distance_between,
     overlap_fault,
     placed_contacts,
     touching_points,
 )
+from flocsim.geometry.shapes.cores import distance_between
+from flocsim.geometry.shapes.parts import Part
 from tests.reference.contacts import contacts
 from tests.reference.outline import core_geometry
 from tests.reference.samples import SEEDS, random_core, scene_of
@@ -31,7 +32,7 @@ def test_fault_and_distance_are_those_of_shapely(seed, make_a, make_b, x, y, ang
     a = random_core(make_a, rng)
     b = random_core(make_b, rng) @ rotation(angle).T + (x, y)
     distance = shapely.distance(core_geometry(a), core_geometry(b))
-    fault = overlap_fault(a, 0.1, b, 0.2)
+    fault = overlap_fault([Part((a,), 0.1)], [Part((b,), 0.2)])
     if distance == 0.0:
         assert fault is not None
     else:
@@ -41,10 +42,12 @@ def test_fault_and_distance_are_those_of_shapely(seed, make_a, make_b, x, y, ang
 
 def test_the_depth_is_named():
     one = np.zeros((1, 2))
-    assert overlap_fault(one, 1.0, one + (0.9, 0.0), 1.0) == (
-        "overlapping by 1.1 m, more than half of r_i + r_j"
-    )
-    assert overlap_fault(one, 1.0, one + (1.1, 0.0), 1.0) is None
+
+    def fault(apart):
+        return overlap_fault([Part((one,), 1.0)], [Part((one + (apart, 0.0),), 1.0)])
+
+    assert fault(0.9) == "overlapping by 1.1 m, more than half of r_i + r_j"
+    assert fault(1.1) is None
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -7,6 +7,7 @@ import shapely
 from flocsim import SpheroPolygon
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.outline import require_simple, simplicity_fault, swept_rings
+from flocsim.geometry.shapes.parts import Part
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, spiral, star
 
@@ -41,6 +42,6 @@ def test_rings_enclose_the_area_holes_included():
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_points_segments_and_polygons_have_one_ring(count):
     core = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]])[:count]
-    (ring,) = swept_rings(core, 1.0)
+    (ring,) = swept_rings([Part((core,), 1.0)])
     distance = shapely.Polygon(ring).exterior.distance(shapely.Point(core[0]))
     assert distance == pytest.approx(1.0, rel=1e-2)

@@ -4,12 +4,20 @@ import numpy as np
 import pytest
 import shapely
 
-from flocsim import Sphere, SpheroPolygon
+from flocsim import Composite, Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import UsageError
-from flocsim.io.exchange.gsd_file import write_gsd
-from flocsim.io.exchange.outlines import MOST_FRAMES, area_of, frames_of, placed, rings_of
+from flocsim.io.exchange.gsd_file import outer_ring, write_gsd
+from flocsim.io.exchange.outlines import (
+    MOST_FRAMES,
+    area_of,
+    frames_of,
+    is_hole,
+    placed,
+    rings_of,
+)
 from flocsim.io.trajectory import read_trajectory, write_trajectory
+from tests.helpers.compound_shapes import beads, framed
 
 SHAPES = (
     SpheroPolygon([[0, 0], [9e-6, 0], [9e-6, 6e-6], [1e-6, 5e-6]], 5e-7),
@@ -46,13 +54,26 @@ def test_outlines_are_placed_where_the_shapes_are():
     assert len(rings_of(RING)) == 2
 
 
+def test_rings_of_holes_and_of_disks_that_touch():
+    outer, hole = rings_of(framed(1e-6))
+    assert area_of(outer) > 0.0 > area_of(hole) and is_hole(hole)
+    pair = Composite([(Sphere(1e-6), (0.0, 0.0)), (Sphere(2e-6), (3e-6, 0.0))])
+    assert [is_hole(ring) for ring in rings_of(pair)] == [False, False]
+    # GSD has one ring for a body: that of both, a little wider.
+    joined = outer_ring(pair)
+    assert pair.area < area_of(joined) < 1.1 * pair.area
+    middle = shapely.Polygon(joined).centroid
+    assert [1e6 * middle.x, 1e6 * middle.y] == pytest.approx([0.0, 0.0], abs=0.1)
+    assert np.array_equal(outer_ring(framed(1e-6)), outer)
+
+
 def test_long_motions_are_thinned_and_keep_their_ends():
     assert frames_of(5).tolist() == [0, 1, 2, 3, 4]
     rows = frames_of(123_457)
     assert len(rows) == MOST_FRAMES and rows[0] == 0 and rows[-1] == 123_456
 
 
-@pytest.mark.parametrize("shapes", [SHAPES, (RING, SHAPES[0])])
+@pytest.mark.parametrize("shapes", [SHAPES, (RING, SHAPES[0]), (framed(1e-6), beads(1e-6))])
 def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes):
     hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="needs flocsim[formats]")
     from vtkmodules.util.numpy_support import vtk_to_numpy

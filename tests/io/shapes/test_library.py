@@ -7,10 +7,19 @@ import pytest
 
 from flocsim.errors import FileError, UsageError
 from flocsim.geometry.fit import fit_mask
+from flocsim.geometry.shapes.parts import table_of
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.images.pictures import segment
-from flocsim.io.shapes.library import make_entry, read_library, write_library
+from flocsim.io.images.regions import with_holes
+from flocsim.io.shapes.library import (
+    FIT_COLUMNS,
+    StoredFit,
+    make_entry,
+    read_library,
+    write_library,
+)
+from tests.helpers.compound_shapes import beads
 
 PIXEL = 0.95e-6
 
@@ -150,3 +159,79 @@ def test_what_cannot_be_written_is_refused(tmp_path, entries):
     with pytest.raises(UsageError, match=r"reaches .* m far, .* with pixels of 0.5 m\?"):
         write_library(tmp_path / "s.h5", [attrs.evolve(entries[0], fits=fits, pixel_size=0.5)])
     assert not list(tmp_path.iterdir())
+
+
+def holed_entries():
+    """Flocs of a picture with a hole in one of them, at two numbers of vertices."""
+    y, x = np.mgrid[:60, :80]
+    grey = picture()
+    grey[np.hypot(x - 60, y - 25) < 4] = 0.0
+    found = segment(grey, noise_scale=0)
+    regions = [with_holes(region, found.holes) for region in found.regions]
+    return [
+        make_entry(
+            "a.png", region,
+            {n: fit_mask(region.mask, vertices=n, holes=True) for n in (1, 8, 16)}, PIXEL, 1.0,
+        )
+        for region in regions
+    ]  # fmt: skip
+
+
+def test_holes_survive_the_file(tmp_path):
+    entries = holed_entries()
+    path = tmp_path / "s.h5"
+    write_library(path, entries)
+    read = read_library(path)
+    assert [entry.fits[16].shape.is_compound for entry in read] == [False, True]
+    for old, new in zip(entries, read, strict=True):
+        for n in (8, 16):
+            one, other = old.fits[n].shape, new.fits[n].shape
+            assert one.is_compound == other.is_compound
+            assert other.area == one.area
+            assert all(map(np.array_equal, one.parts[0].rings, other.parts[0].rings))
+            assert other.area == pytest.approx(new.area * PIXEL**2, rel=0.1)
+    write_library(tmp_path / "again.h5", read)
+    assert read_sealed(tmp_path / "again.h5") == read_sealed(path)
+
+
+def test_composites_are_kept(tmp_path):
+    """Of several radii, which no picture gives, but a library of one's own may have."""
+    shape = beads(1e-6)
+    fit = StoredFit(shape.vertices, shape.radius, 0.0, table_of(shape.parts))
+    entry = attrs.evolve(holed_entries()[0], fits={len(shape.vertices): fit})
+    write_library(tmp_path / "s.h5", [entry])
+    [again] = read_library(tmp_path / "s.h5")
+    there = again.fits[len(shape.vertices)].shape
+    assert [part.radius for part in there.parts] == [part.radius for part in shape.parts]
+    assert there.area == pytest.approx(shape.area, rel=1e-12)
+
+
+def test_libraries_of_polygons_are_of_the_first_version(tmp_path, entries):
+    write_library(tmp_path / "s.h5", entries)
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file.attrs["schema_version"] == 1 and set(file["fits/6"]) == set(FIT_COLUMNS)
+
+
+def drop_rings(file):
+    del file["fits/8/ring"]
+
+
+def other_part(file):
+    file["fits/16/part"][0, 3] = 7
+
+
+def no_radius(file):
+    file["fits/8/point_radius"][1, 0] = -1e-6
+
+
+def claims_the_first_version(file):
+    file.attrs["schema_version"] = 1
+
+
+@pytest.mark.parametrize("change", [drop_rings, other_part, no_radius, claims_the_first_version])
+def test_rings_that_cannot_be_are_refused(tmp_path, change):
+    path = tmp_path / "s.h5"
+    write_library(path, holed_entries())
+    changed(path, change)
+    with pytest.raises(FileError, match="is not a complete shape library"):
+        read_library(path)

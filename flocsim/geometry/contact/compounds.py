@@ -1,0 +1,222 @@
+"""What replaces the polygon code in a scene with cores of several rings: holes, and parts of
+several radii.
+
+Rows of core points have more columns then: by how much the point's disk is wider than the narrowest
+of its body (SWELL), which is the body's spheroradius; how far behind it the point lies at which its
+edge ends (ONWARD); and what begins there (BEGINS): nothing at the second point of a segment, an
+edge, or a lone point. Circles of the trees go round points that are swept by their SWELL, so that
+all that is said of cores elsewhere holds of cores swept so.
+
+A lone point touches edges as their vertex, and other lone points; two of those make one pair, that
+of the later body being its vertex.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from flocsim.arrays import EARLIER, EDGE_BODY, EDGE_START, LATER, RADIUS, VERTEX, VERTEX_BODY, X, Y
+from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
+from flocsim.geometry.contact import points as contacts
+from flocsim.geometry.contact.circle_tree import (
+    ROUNDING,
+    START,
+    at_leaves,
+    circles_met,
+    descended,
+    goes_on,
+    leaves_of,
+    nearer_child,
+    passed,
+    plan_of,
+    posed,
+    reversed_pose,
+    run_of,
+    side_of,
+    within,
+)
+from flocsim.geometry.contact.near_pairs import add_pair, pose_of
+from flocsim.geometry.shapes.cores import segment_distance2
+from flocsim.geometry.shapes.shape import Shape
+
+SWELL, ONWARD, BEGINS, POINT_COLUMNS = range(2, 6)
+"""Columns of core points behind X and Y: [m], rows, and one of …"""
+
+NOTHING, EDGE, LONE = 0.0, 1.0, 2.0
+
+
+def point_columns(shape: Shape) -> np.ndarray:
+    """The core points of a shape (N, 5)."""
+    return np.concatenate([
+        ring_columns(ring, part.radius - shape.radius) for part in shape.parts
+        for ring in part.rings
+    ])  # fmt: skip
+
+
+def ring_columns(ring: np.ndarray, swell: float) -> np.ndarray:
+    """The core points of a ring whose disk is so much wider than the body's narrowest [m]."""
+    count = len(ring)
+    rows = np.zeros((count, POINT_COLUMNS))
+    rows[:, :2], rows[:, SWELL] = ring, swell
+    if count == 1:
+        rows[0, BEGINS] = LONE
+    else:
+        rows[:, ONWARD], rows[:, BEGINS] = 1.0, EDGE
+        rows[-1, ONWARD] = 1.0 - count
+    if count == 2:
+        rows[-1, ONWARD], rows[-1, BEGINS] = 0.0, NOTHING
+    return rows
+
+
+def compound_tree(shape: Shape) -> np.ndarray:
+    """The tree (2N, 3) of circle_tree.tree_of over the swollen core points of a shape."""
+    rows = point_columns(shape)
+    points = len(rows)
+    tree = np.zeros((2 * points, 3))
+    margin = ROUNDING * np.abs(rows[:, :2]).max()
+    ends = np.arange(points) + rows[:, ONWARD].astype(int)
+    nodes = 1
+    while nodes <= leaves_of(points):
+        bounds = np.arange(nodes + 1) * points // nodes
+        for node in range(nodes):
+            members = np.arange(bounds[node], bounds[node + 1])
+            members = np.union1d(members, ends[members])
+            run, swell = rows[members, :2], rows[members, SWELL]
+            low, high = (run - swell[:, None]).min(axis=0), (run + swell[:, None]).max(axis=0)
+            centre = 0.5 * (low + high)
+            reach = (np.hypot(*(run - centre).T) + swell).max()
+            tree[nodes + node] = [*centre, reach + margin]
+        nodes *= 2
+    return tree
+
+
+def begins_pair(vertices, point, start, is_later):
+    """Whether a core point and what begins at one of the other body make a pair of features."""
+    begins = vertices[start, BEGINS]
+    if begins == LONE:
+        return is_later and vertices[point, BEGINS] == LONE
+    return begins == EDGE
+
+
+def feature_distance2(vertices, pose, point, start):
+    """Squared distance of the cores of a point and of what begins at another body's point [m²]."""
+    x, y = posed(pose, vertices[point, X], vertices[point, Y])
+    end = start + int(vertices[start, ONWARD])
+    return segment_distance2(
+        x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
+    )
+
+
+def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
+    """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
+    vertices = scene.vertices
+    start_a, end_a = run_of(side_a, leaf_a)
+    start_b, end_b = run_of(side_b, leaf_b)
+    room = True
+    for point in range(start_a, end_a):
+        for start in range(start_b, end_b):
+            if begins_pair(vertices, point, start, a == work.pairs[pair, LATER]):
+                limit = reach + vertices[point, SWELL] + vertices[start, SWELL]
+                if feature_distance2(vertices, pose, point, start) < limit * limit:
+                    end = start + int(vertices[start, ONWARD])
+                    room = add_pair(work, pair, a, point, b, start, end) and room
+    return room
+
+
+def list_compounds(scene, work, pair, cutoff):
+    """List the pairs of features of two bodies, both ways round; False for a full list."""
+    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    side_a, side_b = side_of(scene, a), side_of(scene, b)
+    reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
+    pose = pose_of(scene, work, a, b)
+    back = reversed_pose(pose)
+    plan = plan_of(scene.tree, side_a, side_b)
+    walk = START
+    room = True
+    while goes_on(walk) and room:
+        if not within(scene.tree, pose, plan, walk, reach):
+            walk = passed(plan, walk)
+        elif at_leaves(plan, walk):
+            i, j, _, _ = walk
+            room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
+            room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
+            walk = passed(plan, walk)
+        else:
+            walk = descended(plan, walk)
+    return room
+
+
+def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
+    """The smaller of ``least`` and the distances from a's points to b's edges, both swollen."""
+    start_a, end_a = run_of(side_a, leaf_a)
+    start_b, end_b = run_of(side_b, leaf_b)
+    for point in range(start_a, end_a):
+        for start in range(start_b, end_b):
+            apart = math.sqrt(feature_distance2(vertices, pose, point, start))
+            least = min(least, apart - vertices[point, SWELL] - vertices[start, SWELL])
+    return least
+
+
+def leaf_distance(vertices, pose, side_a, side_b, walk, least):
+    """The smaller of ``least`` and the distance of the runs of two leaves."""
+    i, j, _, _ = walk
+    least = run_distance(vertices, pose, side_a, i, side_b, j, least)
+    return run_distance(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
+
+
+def can_be_nearer(tree, pose, plan, walk, least):
+    """Whether the runs of the two nodes can be nearer to each other than a distance, which is below
+    0 where swollen cores overlap."""
+    distance2, radii = circles_met(tree, pose, plan, walk)
+    reach = radii + least
+    return reach > 0.0 and distance2 < reach * reach
+
+
+def swollen_distance(outlines, a, b, pose):
+    """circle_tree.core_distance of two cores, each swept by the SWELL of its points [m]; below 0
+    where they overlap."""
+    vertices, tree = outlines.vertices, outlines.tree
+    side_a, side_b = side_of(outlines, a), side_of(outlines, b)
+    plan = plan_of(tree, side_a, side_b)
+    walk = START
+    while not at_leaves(plan, walk):
+        walk = nearer_child(tree, pose, plan, walk)
+    least = leaf_distance(vertices, pose, side_a, side_b, walk, math.inf)
+    walk = START
+    while goes_on(walk):
+        if not can_be_nearer(tree, pose, plan, walk, least):
+            walk = passed(plan, walk)
+        elif at_leaves(plan, walk):
+            least = leaf_distance(vertices, pose, side_a, side_b, walk, least)
+            walk = passed(plan, walk)
+        else:
+            walk = descended(plan, walk)
+    return least
+
+
+def swollen_radii(scene, work, row):
+    """points.row_radii, of the parts that the vertex and the edge belong to [m]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    point, start = work.candidates[row, VERTEX], work.candidates[row, EDGE_START]
+    return (
+        scene.bodies[a, RADIUS] + scene.vertices[point, SWELL],
+        scene.bodies[b, RADIUS] + scene.vertices[start, SWELL],
+    )
+
+
+def same_corner(scene, body, point, other):
+    """Whether two core points of a body are the same one or ends of one edge."""
+    apart = other - point
+    if apart == 0 or apart == int(scene.vertices[point, ONWARD]):
+        return True
+    return apart == -int(scene.vertices[other, ONWARD])
+
+
+FILLINGS: dict[Callable, Callable] = {
+    near_pairs.list_polygons: list_compounds,
+    circle_tree.core_distance: swollen_distance,
+    contacts.row_radii: swollen_radii,
+    slip_transfer.same_corner: same_corner,
+}
+"""The replacements, for flocsim.compiler.composer.compose."""

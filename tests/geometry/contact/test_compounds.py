@@ -1,0 +1,179 @@
+"""Contact of cores of several rings: which pairs are listed, how near they are, where they act."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flocsim import Body, Composite, Fluid, Sphere, SpheroPolygon
+from flocsim.arrays import (
+    CANDIDATES,
+    EDGE_BODY,
+    EDGE_END,
+    EDGE_START,
+    PAIRS,
+    RADIUS,
+    VERTEX,
+    VERTEX_BODY,
+    work_of,
+)
+from flocsim.body import scene_of
+from flocsim.geometry.contact import compounds
+from flocsim.geometry.contact.circle_tree import CIRCLE_RADIUS, CIRCLE_X, CIRCLE_Y, run_of, side_of
+from flocsim.geometry.contact.near_pairs import pose_of
+from flocsim.geometry.contact.overlap import overlap_fault, placed_contacts
+from flocsim.geometry.shapes.cores import segment_distance2
+from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, cross, drawn, framed
+
+SHAPES = [*(make() for make in MAKERS), Sphere(0.8), SpheroPolygon(2.0 * SQUARE, 0.3)]
+
+
+def features(shape, place):
+    """(points, lone points, edges) of a placed shape, each with its radius."""
+    points, lone, edges = [], [], []
+    for part in shape.placed_parts(*place):
+        for ring in part.rings:
+            first = len(points)
+            points += [(point, part.radius) for point in ring]
+            if len(ring) == 1:
+                lone.append(first)
+            count = len(ring) - 1 if len(ring) < 3 else len(ring)
+            edges += [(first + k, first + (k + 1) % len(ring)) for k in range(count)]
+    return points, lone, edges
+
+
+def pairs_between(a, b, place_a, place_b):
+    """{(is of a, vertex, start, end): gap} of all pairs of features, b the later body."""
+    own, other = features(a, place_a), features(b, place_b)
+    found = {}
+    for of_a, (points, lone, _), (others, lone_there, edges) in (
+        (True, own, other), (False, other, own),
+    ):  # fmt: skip
+        known = [*product(range(len(points)), edges)]
+        known += [(p, (q, q)) for p in lone for q in lone_there if not of_a]
+        for point, (start, end) in known:
+            (p, r), (q, s), (t, _) = points[point], others[start], others[end]
+            apart = math.sqrt(segment_distance2(*p, *q, *t))
+            found[of_a, point, start, end] = apart - r - s
+    return found
+
+
+def placed(a, b, x, y, turn_a, turn_b):
+    """(scene, work) of two bodies, the later one at (x, y)."""
+    scene = scene_of([Body(a, density=1.0), Body(b, density=1.0)], Fluid())
+    if scene.vertices.shape[1] == 2:
+        columns = [compounds.point_columns(each) for each in (a, b)]
+        scene = scene._replace(vertices=np.concatenate(columns))
+    position = np.array([[0.0, 0.0, turn_a], [x, y, turn_b]])
+    return scene, work_of(scene, position, np.zeros((2, 3)), 4096)
+
+
+DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0),
+         st.floats(-14.0, 14.0), st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))  # fmt: skip
+
+
+@settings(max_examples=60, deadline=None)
+@given(*DRAWN, st.floats(0.01, 6.0))
+def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
+    scene, work = placed(a, b, x, y, turn_a, turn_b)
+    assert work.tally[PAIRS] == 1 and compounds.list_compounds(scene, work, 0, cutoff)
+    rows = work.candidates[: work.tally[CANDIDATES]]
+    bodies = [VERTEX_BODY, VERTEX, EDGE_START, EDGE_END]
+    first = scene.first
+    found = set()
+    for of, vertex, start, end in rows[:, bodies].tolist():
+        found.add((of == 0, vertex - first[of], start - first[1 - of], end - first[1 - of]))
+    assert np.all(rows[:, EDGE_BODY] == 1 - rows[:, VERTEX_BODY]) and len(found) == len(rows)
+    gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
+    clear = {key for key, gap in gaps.items() if gap < cutoff - 1e-9}
+    assert clear <= found <= {key for key, gap in gaps.items() if gap < cutoff + 1e-9}
+
+
+@settings(max_examples=60, deadline=None)
+@given(*DRAWN)
+def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
+    scene, work = placed(a, b, x, y, turn_a, turn_b)
+    contact = scene.bodies[:, RADIUS].sum()
+    gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
+    both = [(0, 1), (1, 0)]
+    for one, other in both:
+        pose = pose_of(scene, work, one, other)
+        gap = compounds.swollen_distance(scene, one, other, pose) - contact
+        assert gap == pytest.approx(min(gaps.values()), abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(*DRAWN)
+def test_the_gap_is_that_of_shapely(a, b, x, y, turn_a, turn_b):
+    import shapely
+    from shapely import affinity
+
+    scene, work = placed(a, b, x, y, turn_a, turn_b)
+    there = affinity.rotate(drawn(b, 60), turn_b, (0.0, 0.0), use_radians=True)
+    there = affinity.translate(there, x, y)
+    here = affinity.rotate(drawn(a, 60), turn_a, (0.0, 0.0), use_radians=True)
+    apart = shapely.distance(here, there)
+    pose = pose_of(scene, work, 1, 0)
+    gap = compounds.swollen_distance(scene, 1, 0, pose) - scene.bodies[:, RADIUS].sum()
+    if apart > 1e-2:
+        assert gap == pytest.approx(apart, abs=2e-3)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_circles_hold_their_runs(shape):
+    scene, _ = placed(shape, SHAPES[0], 40.0, 0.0, 0.0, 0.0)
+    tree = compounds.compound_tree(shape)
+    rows = compounds.point_columns(shape)
+    side = side_of(scene, 0)
+    node, leaves = 1, side[3]
+    while node < 2 * leaves:
+        least = node
+        while least < leaves:
+            least *= 2
+        most = least + leaves // (1 << (node.bit_length() - 1))
+        first, last = run_of(side, least)[0], run_of(side, most - 1)[1]
+        x, y, reach = tree[node, CIRCLE_X], tree[node, CIRCLE_Y], tree[node, CIRCLE_RADIUS]
+        for point in range(first, last):
+            for each in (point, point + int(rows[point, compounds.ONWARD])):
+                away = math.hypot(rows[each, 0] - x, rows[each, 1] - y)
+                assert away + rows[each, compounds.SWELL] <= reach * (1.0 + 1e-9)
+        node += 1
+
+
+def test_corners_follow_each_other_in_a_ring_alone():
+    scene, _ = placed(framed(), cross(), 40.0, 0.0, 0.0, 0.0)
+    for body, shape in enumerate((framed(), cross())):
+        points, _, edges = features(shape, (0.0, 0.0, 0.0))
+        meet = {(p, p) for p in range(len(points))} | {*edges} | {(q, p) for p, q in edges}
+        first = scene.first[body]
+        for p, q in product(range(len(points)), repeat=2):
+            found = compounds.same_corner(scene, body, first + p, first + q)
+            assert found == ((p, q) in meet)
+
+
+def test_a_disk_in_a_hole_starts_there():
+    frame, disk = framed(), Sphere(1.5)
+    for x, fault in ((0.0, None), (0.45, None), (1.0, None), (2.6, "one core"), (4.0, "one core")):
+        found = overlap_fault(frame.placed_parts(), disk.placed_parts(x, 0.0, 0.0))
+        # The core of the frame begins at 3, that of the disk is a point: 1.5 + 1 - (3 - x) deep.
+        deep = x > 0.5 + 0.5 * 2.5
+        assert (found is not None) == deep, (x, fault)
+
+
+def test_contacts_of_parts_are_seen():
+    beads_there = beads()
+    at = beads_there.parts[1].points[0]
+    touching = np.array([[0.0, 0.0, 0.0], [at[0], at[1] - 2.5 + 1e-3, 0.0]])
+    found = np.unique(placed_contacts([beads_there, Sphere(0.5)], touching), axis=0)
+    assert len(found) == 1
+    assert found[0] == pytest.approx([at[0], at[1] - 2.0], abs=2e-3)
+
+
+def test_a_lone_disk_as_a_part_is_a_disk():
+    scene, work = placed(Composite([(Sphere(1.0), (7.0, 3.0))]), Sphere(2.0), 3.5, 0.0, 0.0, 0.0)
+    assert compounds.list_compounds(scene, work, 0, 1.0) and work.tally[CANDIDATES] == 1
+    pose = pose_of(scene, work, 1, 0)
+    assert compounds.swollen_distance(scene, 1, 0, pose) == pytest.approx(3.5, rel=1e-14)
