@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import (
+    DENSE,
     ERROR,
     EVALUATIONS,
     NOW,
@@ -37,6 +38,7 @@ from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.radau import dense_only
 from flocsim.laws import compiled_calls, law_table
 from flocsim.plausibility.doubts import warn_of
 from flocsim.run import Run
@@ -167,7 +169,8 @@ class System:
     def fillings(self, observer: Fillings | None = None) -> Fillings:
         """{hook: function} of integrator, shapes and an observer."""
         shapes: Fillings = spheres_only.FILLINGS if self.spheres_only else {}
-        filled = {**self.integrator.fillings, **shapes, **(observer or {})}
+        algebra: Fillings = dense_only.FILLINGS if len(self.bodies) <= DENSE else {}
+        filled = {**self.integrator.fillings, **shapes, **algebra, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "

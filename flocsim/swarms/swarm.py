@@ -18,6 +18,7 @@ from flocsim.geometry.contact.separation import PERIODIC
 from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.radau import dense_only
 from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.contacts import Gauge
@@ -152,7 +153,9 @@ class Swarm:
     def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of integrator, shapes and the watch over paths; the same with a box and
         without, so that one engine serves both."""
-        return {**self.system.fillings({observe: watch_paths}), **PERIODIC}
+        found = {**self.system.fillings({observe: watch_paths}), **PERIODIC}
+        # Steps across switches solve sparse systems of few bodies as well.
+        return {hook: found[hook] for hook in found if hook not in dense_only.FILLINGS}
 
     def run(
         self, until: float | str, *, every: float | str | None = None,

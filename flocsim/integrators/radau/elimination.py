@@ -11,6 +11,7 @@ each other cancels in these, so that they are written without it, and momentum i
 """
 
 from flocsim.arrays import DAMPING, EARLIER, LATER, PAIRS, STIFFNESS
+from flocsim.hooks import hook
 from flocsim.integrators.radau.ordering import NONE, find_pattern, is_leader
 from flocsim.integrators.radau.tableau import EIGENVALUES, PAIR, REAL
 from flocsim.integrators.rhs.blocks import lower_block, own_block, upper_block
@@ -203,6 +204,7 @@ def factorise_row(e, row):
     return invert(e.pivot, row)
 
 
+@hook
 def factorise_sparse(scene, work, step):
     """Write and factorise both systems; False where one is singular, or where there is no room."""
     if not find_pattern(scene, work):
@@ -253,6 +255,7 @@ def divide_pair(e, loads, place, row):
         loads[PAIR, row + i] = total + entry(e.pivot, place, i, 2) * z
 
 
+@hook
 def solve_sparse(work, both):
     """Replace the load of the real system, or of ``both``, by the solution."""
     e, loads = work.elimination, work.loads
