@@ -304,9 +304,9 @@ PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
 """Room at first for the pairs of bodies, and for the blocks of sparse systems, of a body."""
 
 
-def elimination_of(n: int, pairs: int, room: int) -> Elimination:
-    """Arrays for the sparse systems of n bodies (none for few)."""
-    if n <= DENSE:
+def elimination_of(n: int, pairs: int, room: int, dense: int = DENSE) -> Elimination:
+    """Arrays for the sparse systems of n bodies (none for up to ``dense``)."""
+    if n <= dense:
         n = pairs = room = 0
     return Elimination(
         place=np.zeros(n, dtype=np.int64),

@@ -1,13 +1,13 @@
-"""What a swarm costs: a body and step, 1,000 flocs for 10 s, pairs, threads, memory, Verlet.
+"""What a swarm costs: a body and step, flocs for 10 s, beds, pairs, threads, memory, Verlet.
 
-    python -m benchmarks.speed.swarms [--quick] [--parts cost flocs pairs threads verlet memory]
+    python -m benchmarks.speed.swarms [--quick] [--parts cost flocs bed pile pairs threads …]
 
 Swarms are those of studies (`[scene] kind = "swarm"`, preset `si`, van der Waals cut at 1 um). CPU
 time of this process, compiled code warm.
 """
 
+import gc
 import math
-import resource
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,13 +15,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim import Body, Fluid, Sphere, Swarm, System
+from flocsim import Body, Fluid, Sphere, Swarm, System, floor
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.suspension.runner import warm
 from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
-from flocsim.integrators import VelocityVerlet
+from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.base import Status
+from flocsim.swarms.placement import place_at_random
 
 STUDY = """\
 preset = "si"
@@ -46,16 +47,21 @@ debye_length = "9.6 nm"
 """
 
 WATER = Fluid(buoyancy=True)
-PARTS = ("cost", "flocs", "pairs", "threads", "verlet", "memory")
+PARTS = ("cost", "flocs", "bed", "pile", "pairs", "threads", "verlet", "memory")
+SMALL, LARGE = 5e-6, 1.4
+"""Radius of the smaller discs of a bed [m], and that of the larger ones over it."""
+
 SAFE = 0.2
 """Verlet's step over 1/ω of the contact: at 2 it is unstable, at .2 its error is some percent."""
 
 
-def swarm_of(number, fraction, vertices, duration=10.0):
-    """The Swarm of replicate 0 of such a study."""
+def swarm_of(number, fraction, vertices, duration=10.0, extra=""):
+    """The Swarm of replicate 0 of such a study, with more lines in its scene."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "swarm.toml"
         text = STUDY.format(number=number, fraction=fraction, vertices=vertices, duration=duration)
+        if extra:
+            text = text.replace(f"area_fraction = {fraction}", extra)
         path.write_text(text, "utf-8")
         swarm, _, _ = SwarmStudy(load_any_config(path)).swarm(0)
     warm(swarm)
@@ -136,6 +142,57 @@ def lone_pair(number, count):
     ]
 
 
+def bed_of(number, tolerance, seed=0, fraction=0.4):
+    """Frictionless discs of 5 and 7 um, half of each, over a floor of √n discs' width, settling."""
+    rng = np.random.default_rng(seed)
+    radii = rng.permutation(np.where(np.arange(number) % 2 == 0, SMALL, LARGE * SMALL))
+    width = 2.4 * SMALL * max(10.0, math.sqrt(number))
+    height = math.pi * float(np.sum(radii**2)) / (fraction * width)
+    shapes, water = [Sphere(float(radius)) for radius in radii], Fluid(buoyancy=True)
+    places = place_at_random(shapes, (width, height), rng)
+    excess = 2650.0 - water.density
+    bodies = [floor(width, beyond=4.0 * SMALL)]
+    for shape, (x, y, _) in zip(shapes, places.tolist(), strict=True):
+        down = 2.0 / 9.0 * excess * 9.81 * shape.radius**2 / water.viscosity
+        bodies.append(Body(shape, (x, y + 3.0 * SMALL), 0.0, (0.0, -down), density=2650.0))
+    forces = [Gravity(), StokesDrag(), Contact(k_t=0.0)]
+    return Swarm(bodies, forces, Implicit(tolerance=tolerance), water, box=(width, None))
+
+
+def bulk_fraction(position, radii, width, low):
+    """Area fraction of discs between a height and that of four fifths of their centres."""
+    high, total = float(np.quantile(position[:, 1], 0.8)), 0.0
+    for y, radius in zip(position[:, 1], radii, strict=True):
+        part = np.clip([(low - y) / radius, (high - y) / radius], -1.0, 1.0)
+        area = np.arcsin(part) + part * np.sqrt(1.0 - part**2)
+        total += float(radius**2 * (area[1] - area[0]))
+    return total / (width * (high - low))
+
+
+def bed(arguments, table):
+    """Bidisperse discs settle to a bed, and rest."""
+    for number in (100, 1000) if arguments.quick else (100, 1000, 10_000):
+        swarm = bed_of(number, 1e-8)
+        until = 6.0 * math.sqrt(number / 100.0)
+        spent, _, found = run(swarm, until, most=arguments.seconds)
+        radii = np.array([body.shape.radius for body in swarm.bodies[1:]])
+        fraction = bulk_fraction(found.position[-1, 1:], radii, swarm.box[0], 3.0 * SMALL)
+        effort = found.effort
+        speed = float(np.hypot(*found.velocity[-1, 1:, :2].T).max())
+        table.add(number, float(found.t[-1]), spent, effort.body_steps,
+                  1e6 * spent / effort.body_steps, speed, fraction, found.status.name)  # fmt: skip
+
+
+def pile(arguments, table):
+    """Flocs of N = 16 come to rest on a floor; and then as long again."""
+    number = 50 if arguments.quick else 500
+    swarm = swarm_of(number, 0.2, 16, extra='floor = true\nbox = ["200 um", "2 mm"]')
+    spent, _, found = run(swarm, 20.0, most=arguments.seconds)
+    more, _, later = run(swarm, 40.0, most=arguments.seconds)
+    table.add(number, float(found.t[-1]), spent, found.effort.body_steps, float(later.t[-1]), more,
+              later.effort.body_steps, later.status.name)  # fmt: skip
+
+
 def threads(arguments, table):
     """Wall time of one thread over that of two, and whether the bytes are the same."""
     swarm = swarm_of(1000, 0.02, 1)
@@ -165,16 +222,36 @@ def verlet(arguments, table):
     table.add(len(swarm.bodies), found.t[-1], spent, step, steps, whole, whole / spent)
 
 
+def resident():
+    """Memory of this process now [bytes], not the most that it has had."""
+    with Path("/proc/self/statm").open(encoding="ascii") as file:
+        return 4096 * int(file.read().split()[1])
+
+
+def bytes_of(arrays):
+    """Bytes of the arrays of a tuple, and of tuples in it."""
+    return sum(each.nbytes if isinstance(each, np.ndarray) else bytes_of(each)
+               for each in arrays if isinstance(each, np.ndarray | tuple))  # fmt: skip
+
+
 def memory(arguments, table):
-    """Kilobytes a body that running a swarm adds to the process."""
+    """Kilobytes a body: of the arrays of a swarm and of its islands, of what the process grows."""
     number = 2000 if arguments.quick else 10_000
-    swarm = swarm_of(number, 0.05, 16)
-    progress = swarm.begin(1.0)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    progress.advance(1e-3)
-    progress.advance(2e-3)
-    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    table.add(number, 1e-3 * before, 1e-3 * after, (after - before) / number)
+    for fraction in (0.05, 0.3):
+        swarm = swarm_of(number, fraction, 16)
+        gc.collect()
+        before = resident()
+        progress = swarm.begin(1.0)
+        for _ in range(3):
+            progress.advance(1.0)
+        whole = bytes_of(progress.swarm)
+        islands = sum(bytes_of((place.scene, place.work, place.observed))
+                      for own in progress.runner.threads
+                      for place in own.by_size.values())  # fmt: skip
+        largest = max(max(own.by_size) for own in progress.runner.threads)
+        grown = resident() - before
+        table.add(number, fraction, largest, 1e-3 * whole / number, 1e-3 * islands / number,
+                  1e-3 * grown / number)  # fmt: skip
 
 
 TABLES = {
@@ -190,7 +267,15 @@ TABLES = {
         "bodies", "one [s]", "two [s]", "ratio", "bytes")),
     "verlet": (verlet, "Velocity Verlet, extrapolated", (
         "bodies", "time [s]", "implicit [s]", "step [s]", "steps run", "Verlet [s]", "ratio")),
-    "memory": (memory, "Memory", ("bodies", "before [MB]", "after [MB]", "kB a body")),
+    "bed": (bed, "Frictionless discs of 5 and 7 um settle, tolerance 10 nm", (
+        "bodies", "time [s]", "CPU [s]", "body steps", "us/body step", "fastest [m/s]",
+        "bulk fraction", "ended")),
+    "pile": (pile, "Flocs of N = 16 on a floor", (
+        "bodies", "time [s]", "CPU [s]", "body steps", "time [s]", "CPU [s]", "body steps",
+        "ended")),
+    "memory": (memory, "Memory of flocs of N = 16", (
+        "bodies", "area fraction", "largest island", "swarm [kB a body]", "islands [kB a body]",
+        "process [kB a body]")),
 }  # fmt: skip
 
 

@@ -32,6 +32,14 @@ from flocsim.errors import KernelError
 INLINED_SIZE = 1200
 """Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
 
+
+def apart(function: Callable) -> Callable:
+    """Mark a function that is compiled by itself, however short it is: one that reaches much and is
+    called from several places, into each of which all of that would be put."""
+    function.apart = True  # type: ignore[attr-defined]
+    return function
+
+
 UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of functions that only compiled code calls."""
 
@@ -88,6 +96,7 @@ class Linker:
         )
         copy.__qualname__ = f"{function.__qualname__}_{len(self.clones)}"
         copy.__module__ = function.__module__
+        copy.__dict__.update(function.__dict__)
         return copy
 
 
@@ -112,7 +121,7 @@ def linked_module(entry, fillings, name, options):
     def transform(clone):
         clone.__module__ = name
         # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
-        small = len(clone.__code__.co_code) < INLINED_SIZE
+        small = len(clone.__code__.co_code) < INLINED_SIZE and not hasattr(clone, "apart")
         return typed_once(numba.njit(clone, **inner, forceinline=small))
 
     module = types.ModuleType(name)

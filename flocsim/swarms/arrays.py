@@ -21,6 +21,10 @@ first; core point of the vertex and first one of the edge, of all bodies'."""
 SLIP, OFFSET = range(2)
 """Columns of ``slips``: the displacement [m] and the error that it is carried with."""
 
+METHOD, METHOD_STEP, METHOD_COLUMNS = range(3)
+"""Columns of ``methods``: which one a body's island was run by last (swarms.methods), and the size
+of its next step across switches [s]."""
+
 STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
 """Columns of ``costs``, of every island."""
 
@@ -36,12 +40,12 @@ class Swarm(NamedTuple):
 
     ``bodies`` (n, 7), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
     ``carried`` (n, 6), ``errors`` (n, 4), ``steps`` (n,): the state, the vector of its error, what
-    the errors of steps and switches have led to, the size of the next step [s].  ``wander`` (n,):
-    how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),
-    ``links`` (k, 4), ``slips`` (k, 2): contacts with a tangential displacement, those of later body
-    b from ``first_link[b]`` on.  ``new_motion`` … ``strayed``: the same at the window's end, the
-    stated error of every body [m], and how far it strayed.  ``discs``, ``order``, ``starts``: what
-    the sweep for neighbours works on.  ``times``: see BEGIN.
+    the errors of steps and switches have led to, the size of the next step [s].  ``methods``
+    (n, 2): see METHOD.  ``wander`` (n,): how far a body may stray from a straight path in a window
+    [m].  ``first_link`` (n + 1,), ``links`` (k, 4), ``slips`` (k, 2): contacts with a tangential
+    displacement, those of later body b from ``first_link[b]`` on.  ``new_motion`` … ``strayed``:
+    the same at the window's end, the stated error of every body [m], and how far it strayed.
+    ``discs``, ``order``, ``starts``: what the sweep for neighbours works on.  ``times``: see BEGIN.
     """
 
     bodies: np.ndarray
@@ -52,6 +56,7 @@ class Swarm(NamedTuple):
     carried: np.ndarray
     errors: np.ndarray
     steps: np.ndarray
+    methods: np.ndarray
     wander: np.ndarray
     first_link: np.ndarray
     links: np.ndarray
@@ -60,6 +65,7 @@ class Swarm(NamedTuple):
     new_carried: np.ndarray
     new_errors: np.ndarray
     new_steps: np.ndarray
+    new_methods: np.ndarray
     stated: np.ndarray
     strayed: np.ndarray
     discs: np.ndarray
@@ -81,6 +87,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_ste
         carried=np.zeros((n, MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
         steps=np.full(n, float(first_step)),
+        methods=np.zeros((n, METHOD_COLUMNS)),
         wander=np.zeros(n),
         first_link=np.zeros(n + 1, dtype=np.int64),
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
@@ -89,6 +96,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_ste
         new_carried=np.zeros((n, MOTION_COLUMNS)),
         new_errors=np.zeros((n, ERROR_COLUMNS)),
         new_steps=np.full(n, float(first_step)),
+        new_methods=np.zeros((n, METHOD_COLUMNS)),
         stated=np.zeros(n),
         strayed=np.zeros(n),
         discs=np.zeros((n, DISC_COLUMNS)),

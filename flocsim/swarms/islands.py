@@ -44,7 +44,8 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
-from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
+from flocsim.integrators.backward_euler.driver import NEXT_STEP
+from flocsim.integrators.loop.driver import FINISHED, NO_ROOM
 from flocsim.swarms.arrays import (
     ALLOWED,
     AT_EDGE,
@@ -57,6 +58,8 @@ from flocsim.swarms.arrays import (
     FURTHEST,
     HORIZON_AT,
     LATER_BODY,
+    METHOD,
+    METHOD_STEP,
     OFFSET,
     PATH_VX,
     PATH_VY,
@@ -67,6 +70,7 @@ from flocsim.swarms.arrays import (
     STEPS_REJECTED,
     STEPS_TAKEN,
 )
+from flocsim.swarms.methods import ACROSS, LOCATES, advance_island
 
 STRAYED = 1
 """The observer's code where a body strays from its path by more than it may."""
@@ -217,6 +221,18 @@ def put_times(
     clock[STEP] = step if step < math.inf else start_clock[STEP]
 
 
+def put_method(swarm, work, euler, members, first):
+    """The method that the island begins with: the one across switches where it has been in use for
+    any of its bodies, with their shortest step."""
+    method, step = LOCATES, math.inf
+    for body in range(work.bodies.shape[0]):
+        member = members[first + body]
+        if swarm.bodies[member, FREE] == 1.0 and swarm.methods[member, METHOD] == ACROSS:
+            method, step = ACROSS, min(step, swarm.methods[member, METHOD_STEP])
+    euler[NEXT_STEP] = step
+    return method
+
+
 def take_slips(swarm, scene, work, found, members, first):
     """Write down the displacements of its contacts; False without room."""
     count, begin = keep_slips(work), found.filled[0]
@@ -240,8 +256,8 @@ def take_slips(swarm, scene, work, found, members, first):
     return True
 
 
-def take_state(swarm, work, observed, clock, members, first):
-    """Write the state of its bodies at the window's end."""
+def take_state(swarm, work, observed, clock, euler, method, members, first):
+    """Write the state of its bodies at the window's end, and how they got there."""
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
         swarm.strayed[member] = observed[body, FURTHEST]
@@ -254,10 +270,12 @@ def take_state(swarm, work, observed, clock, members, first):
             swarm.new_errors[member, kind] = work.bodies[body, ERROR_PLACE + kind]
         swarm.new_steps[member] = clock[STEP]
         swarm.stated[member] = clock[ERROR]
+        swarm.new_methods[member, METHOD] = method
+        swarm.new_methods[member, METHOD_STEP] = euler[NEXT_STEP]
 
 
 def run_islands(
-    swarm, scene, work, observed, clock, counts, record, start_clock, start_counts,
+    swarm, scene, work, observed, clock, counts, record, euler, start_clock, start_counts,
     members, starts, codes, costs, found, first, last, all_in,
 ):  # fmt: skip
     """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
@@ -276,7 +294,8 @@ def run_islands(
         put_times(
             swarm, work, observed, clock, counts, start_clock, start_counts, members, begin, all_in
         )
-        code = advance(scene, work, observed, clock, counts, record)
+        method = put_method(swarm, work, euler, members, begin)
+        code, method = advance_island(scene, work, observed, clock, counts, record, euler, method)
         if code == NO_ROOM:
             return island
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
@@ -285,5 +304,5 @@ def run_islands(
         costs[island, STEPS_TAKEN] = counts[STEPS]
         costs[island, STEPS_REJECTED] = counts[REJECTED]
         costs[island, FORCES_SUMMED] = work.tally[EVALUATIONS]
-        take_state(swarm, work, observed, clock, members, begin)
+        take_state(swarm, work, observed, clock, euler, method, members, begin)
     return last

@@ -57,7 +57,7 @@ ALL_BUT = 0.999
 
 
 OF_CONTACTS = ("links", "slips")
-STATE = ("motion", "carried", "errors", "steps", "wander", *OF_CONTACTS)
+STATE = ("motion", "carried", "errors", "steps", "methods", "wander", *OF_CONTACTS)
 """Arrays of a swarm that the rest of a run follows from."""
 
 
@@ -224,6 +224,7 @@ class Progress:
         for old, new in (
             (swarm.motion, swarm.new_motion), (swarm.carried, swarm.new_carried),
             (swarm.errors, swarm.new_errors), (swarm.steps, swarm.new_steps),
+            (swarm.methods, swarm.new_methods),
         ):  # fmt: skip
             old[free] = new[free]
         length = swarm.times[END] - swarm.times[BEGIN]

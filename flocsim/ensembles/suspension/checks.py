@@ -10,7 +10,15 @@ from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Par
 from flocsim.fields import is_number, is_whole
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
-from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, ERROR_COLUMNS, LATER_BODY
+from flocsim.swarms.arrays import (
+    AT_EDGE,
+    AT_VERTEX,
+    EARLIER_BODY,
+    ERROR_COLUMNS,
+    LATER_BODY,
+    METHOD_COLUMNS,
+)
+from flocsim.swarms.methods import ACROSS, LOCATES
 from flocsim.swarms.progress import Effort
 
 EFFORT = tuple(field.name for field in attrs.fields(Effort))
@@ -99,13 +107,16 @@ def check_state(part: Part, form: Form) -> None:
     shaped(part, {
         "seen": ("f8", (n, 6)),
         "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
-        "steps": ("f8", (n,)), "wander": ("f8", (n,)), "links": ("i8", (count, 4)),
+        "steps": ("f8", (n,)), "wander": ("f8", (n,)),
+        "methods": ("f8", (n, METHOD_COLUMNS)), "links": ("i8", (count, 4)),
         "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
         "error": ("f8", one), "effort": ("i8", (len(EFFORT),)),
         "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
     for name in ("steps", "wander"):
         demand(np.all(part.arrays[name] > 0.0), name)
+    method, step = part.arrays["methods"].T
+    demand(np.all((method == LOCATES) | (method == ACROSS)) and np.all(step >= 0.0), "methods")
     demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
     gone, returns = part.arrays["gone"], part.arrays["returns"]
     demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")

@@ -1,0 +1,331 @@
+"""One step of backward Euler: the velocities at its end, by a semismooth Newton method.
+
+    M (v₁ − v₀)/h = F(x₀ + h v₁, v₁, contacts of the end)
+
+The derivatives are those of the contacts that are closed, stick and slide at the iterate, and
+follow it: with contacts as springs these are the active sets of the complementarity problem that
+hard contacts pose (Moreau 1988, Jean 1999; Christensen, Klarbring, Pang & Strömberg 1998 for the
+method). A full step may close and open contacts by turns for ever; so the way along it ends where
+the forces have done their work, g(α) = Σ r(α)·d = 0, r being what the forces do not balance: the
+minimum of the potential that there is without friction, where Newton's method with such a search
+ends after finitely many steps.
+
+The iterate stands in NOW; the step's start in START, and in TRIAL its gaps and displacements.
+"""
+
+import math
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CHANGE,
+    CLOSED,
+    EDGE_BODY,
+    EVALUATIONS,
+    FORCE,
+    FREE,
+    GAP,
+    LEADER_FORCE,
+    LEADER_RATE,
+    MEMORY,
+    MOTION_COLUMNS,
+    NEW,
+    NOW,
+    RADIUS,
+    SOLVES,
+    START,
+    TIME,
+    TOLERANCE,
+    TRIAL,
+    VELOCITY,
+    VERTEX_BODY,
+)
+from flocsim.compiler.composer import apart
+from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.backward_euler.contact_mean import (
+    HELD,
+    SLIDES_BOTH_WAYS,
+    add_all_derivatives,
+    add_mean_forces,
+    flag_close,
+    mode_of,
+)
+from flocsim.integrators.backward_euler.real_system import factorise_real
+from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.elimination import solve_sparse
+from flocsim.integrators.radau.tableau import REAL
+from flocsim.integrators.rhs.error import end_of_run, rounding_size
+from flocsim.integrators.rhs.forces import (
+    add_body_forces,
+    add_centre_forces,
+    add_surface_forces,
+)
+from flocsim.integrators.rhs.jacobian import add_centres, add_surfaces, weigh_velocities
+from flocsim.integrators.rhs.surface_gap import flag_near
+from flocsim.integrators.rhs.views import inertia, lever
+from flocsim.laws import BODY_FORCE, CENTRE_FORCE, CONTACT_FORCE, has
+
+NEWTON_SHARE = 1e-3
+"""Newton's method goes on until what is left is below this share of the tolerance."""
+
+GOOD_PACE = 0.1
+"""Factors are used again while the sets are the same and changes shrink by so much at least."""
+
+FULL_STEPS, MOST_OVERSHOT, OVERSHOT = 3, 10.0, 0.5
+"""A change is cut where the forces are so many times as far from balance along it behind as
+before, the other way: in the first iterations and later."""
+
+CUT_TO = 0.5
+"""It is cut to where they are but so many times as far from balance."""
+
+MOST_CUTS = 12
+"""Places tried along a step."""
+
+
+def begin_step(work):
+    """Keep the start of the step."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[START, body, axis] = work.motion[NOW, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        work.geometry[TRIAL, row, GAP] = work.geometry[NOW, row, GAP]
+        work.slip[TRIAL, row] = work.slip[NOW, row]
+        work.candidates[row, CLOSED] = 0
+        work.geometry[NEW, row, HELD] = 0.0
+
+
+@apart
+def take_back(scene, work):
+    """Go back to the start of the step."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[NOW, body, axis] = work.motion[START, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        work.slip[NOW, row] = work.slip[TRIAL, row]
+    locate_contacts(scene, work, NOW)
+
+
+def place_ends(work, step):
+    """Places at the end from the velocities there."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            start = work.motion[START, body, axis]
+            work.motion[NOW, body, axis] = start + step * work.motion[NOW, body, VELOCITY + axis]
+
+
+@apart
+def evaluate_others(scene, work, time, step):
+    """All forces at the end of the step but those of contacts, which are located."""
+    place_ends(work, step)
+    locate_contacts(scene, work, NOW)
+    work.tally[EVALUATIONS] += 1
+    for body in range(work.bodies.shape[0]):
+        for axis in range(3):
+            work.rates[NOW, body, FORCE + axis] = 0.0
+    if has(scene, BODY_FORCE):
+        add_body_forces(scene, work, time + step, NOW)
+    if has(scene, CENTRE_FORCE):
+        add_centre_forces(scene, work, time + step, NOW)
+    if scene.surface_reach > 0.0:
+        flag_near(scene, work, NOW, 0.0)
+        add_surface_forces(scene, work, time + step, NOW)
+
+
+def evaluate_end(scene, work, time, step):
+    """All forces at the end of the step; False where bodies are too deep in each other."""
+    evaluate_others(scene, work, time, step)
+    if has(scene, CONTACT_FORCE):
+        add_mean_forces(scene, work, step)
+    return not is_too_deep(scene, work)
+
+
+def is_too_deep(scene, work):
+    """Whether a pair overlaps by more than half of what the contact law takes."""
+    for row in range(work.tally[CANDIDATES]):
+        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        size = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+        if -work.geometry[NOW, row, GAP] > 0.5 * DEEPEST_OVERLAP * size:
+            return True
+    return False
+
+
+def momentum_change(scene, work, body, axis, step):
+    """Mass times acceleration in the step."""
+    before = work.motion[START, body, VELOCITY + axis]
+    return inertia(scene, body, axis) * (work.motion[NOW, body, VELOCITY + axis] - before) / step
+
+
+def unbalanced(scene, work, body, axis, step):
+    """Force less mass times acceleration."""
+    force = work.rates[NOW, body, FORCE + axis]
+    return force - momentum_change(scene, work, body, axis, step)
+
+
+def along_change(scene, work, step):
+    """g: what the forces do not balance, along the change that is in CHANGE."""
+    total = 0.0
+    for body in range(work.bodies.shape[0]):
+        if scene.bodies[body, FREE] == 1.0:
+            for axis in range(3):
+                change = work.motion[CHANGE, body, VELOCITY + axis]
+                total += change * unbalanced(scene, work, body, axis, step)
+    return total
+
+
+def write_load(scene, work, step):
+    """What the forces do not balance, of a cluster as a whole in the rows of its first body: forces
+    and rates apart, so that what is mutual cancels."""
+    bodies, n = work.bodies, work.bodies.shape[0]
+    for body in range(n):
+        for axis in range(2):
+            bodies[body, LEADER_FORCE + axis] = bodies[body, LEADER_RATE + axis] = 0.0
+    for body in range(n):
+        leader = work.cluster[body]
+        for axis in range(2):
+            bodies[leader, LEADER_FORCE + axis] += work.rates[NOW, body, FORCE + axis]
+            rate = momentum_change(scene, work, body, axis, step)
+            bodies[leader, LEADER_RATE + axis] += rate
+    for body in range(n):
+        free = scene.bodies[body, FREE]
+        for axis in range(3):
+            load = unbalanced(scene, work, body, axis, step)
+            if axis < 2 and work.cluster[body] == body:
+                load = bodies[body, LEADER_FORCE + axis] - bodies[body, LEADER_RATE + axis]
+            work.loads[REAL, 3 * body + axis] = free * load
+
+
+@apart
+def assemble_others(scene, work, clock, step):
+    """Derivatives of all forces at the end of the step but those of contacts."""
+    time = clock[TIME] + step
+    weigh_velocities(scene, work, time, max(end_of_run(clock) - clock[TIME], step))
+    if has(scene, CENTRE_FORCE):
+        add_centres(scene, work, time)
+    if scene.surface_reach > 0.0:
+        add_surfaces(scene, work, time)
+
+
+def refresh(scene, work, clock, step):
+    """Factorise anew at the iterate; False where that fails."""
+    flag_close(scene, work)
+    gather_clusters(scene, work)
+    assemble_others(scene, work, clock, step)
+    if has(scene, CONTACT_FORCE):
+        add_all_derivatives(scene, work, step)
+    return factorise_real(scene, work, step)
+
+
+@apart
+def solve_change(scene, work, step):
+    """Newton's change of velocities into CHANGE; the largest that it makes in place [m]."""
+    write_load(scene, work, step)
+    solve_sparse(work, False)
+    work.tally[SOLVES] += 1
+    largest = 0.0
+    for body in range(work.bodies.shape[0]):
+        memory = step + work.bodies[body, MEMORY]
+        for axis in range(3):
+            change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body, FREE]
+            work.motion[CHANGE, body, VELOCITY + axis] = change
+            if not abs(change) < math.inf:
+                return math.inf
+            largest = max(largest, lever(scene, body, axis) * memory * abs(change))
+    return largest
+
+
+def go_along(work, way):
+    """Add a share of the change to the velocities."""
+    for body in range(work.bodies.shape[0]):
+        for axis in range(VELOCITY, VELOCITY + 3):
+            work.motion[NOW, body, axis] += way * work.motion[CHANGE, body, axis]
+
+
+@apart
+def search(scene, work, time, step, overshot):
+    """Go along the change until the forces have done their work: the share of it that is gone, −1
+    where no place is found. The whole change will do where they are but ``overshot`` times as far
+    from balance along it as before, the other way."""
+    before = along_change(scene, work, step)
+    go_along(work, 1.0)
+    fits = evaluate_end(scene, work, time, step)
+    at = along_change(scene, work, step) if fits else -math.inf
+    if overshot == math.inf or at >= -overshot * abs(before):
+        return 1.0
+    low, high, share = 0.0, 1.0, 1.0
+    at_low, at_high = before, at
+    for _ in range(MOST_CUTS):
+        middle = 0.5 * (low + high)
+        if 0.0 < at_low < math.inf and -math.inf < at_high < 0.0:
+            # Not too near to either end: the function has kinks.
+            middle = low + (high - low) * at_low / (at_low - at_high)
+            middle = min(max(middle, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
+        go_along(work, middle - share)
+        share = middle
+        fits = evaluate_end(scene, work, time, step)
+        at = along_change(scene, work, step) if fits else -math.inf
+        if abs(at) <= CUT_TO * abs(before):
+            return share
+        if at > 0.0:
+            low, at_low = share, at
+        else:
+            high, at_high = share, at
+    return share if at > -math.inf else -1.0
+
+
+@apart
+def note_modes(work):
+    """Write down what all pairs do now, in the gaps of NEW; (how many do another thing than before,
+    whether any is held from now on, or no more)."""
+    changed, held = 0, False
+    for row in range(work.tally[CANDIDATES]):
+        mode, before = float(mode_of(work, row)), work.geometry[NEW, row, GAP]
+        was_held = work.geometry[NEW, row, HELD]
+        turns = was_held == 0.0 and mode + before == SLIDES_BOTH_WAYS and mode != before
+        work.geometry[NEW, row, HELD] = 1.0 if turns else 0.0
+        held = held or turns or was_held == 1.0
+        if before != mode or turns or was_held == 1.0:
+            changed += 1
+            work.geometry[NEW, row, GAP] = mode
+    return changed, held
+
+
+@apart
+def solve_end(scene, work, clock, step, most):
+    """Find the end of the step, of which begin_step has kept the start, from velocities that are
+    near it; False where it is not found in so many iterations."""
+    time = clock[TIME]
+    if not evaluate_end(scene, work, time, step):
+        return False
+    note_modes(work)
+    for row in range(work.tally[CANDIDATES]):
+        work.geometry[NEW, row, HELD] = 0.0
+    before, fresh = math.inf, False
+    for iteration in range(most):
+        if not fresh:
+            if not refresh(scene, work, clock, step):
+                return False
+            fresh = True
+        change = solve_change(scene, work, step)
+        if not change < math.inf:
+            return False
+        goal = max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
+        overshot = MOST_OVERSHOT if iteration < FULL_STEPS else OVERSHOT
+        if change <= goal:
+            # Rounding may well have the last word on the balance along it.
+            overshot = math.inf
+        share = search(scene, work, time, step, overshot)
+        if share < 0.0:
+            return False
+        pace = change / before if before < math.inf else 0.5
+        changed, held = note_modes(work)
+        if held and not evaluate_end(scene, work, time, step):
+            return False
+        same = changed == 0
+        if same and share == 1.0:
+            if pace < 1.0 and change * pace <= goal * (1.0 - pace):
+                return True
+            fresh = before == math.inf or pace < GOOD_PACE
+            before = change
+        else:
+            fresh, before = False, math.inf
+    return False
