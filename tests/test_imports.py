@@ -69,6 +69,7 @@ INNER_ROWS = {
         ["pilot"],
         ["estimates"],
         ["storage"],
+        ["kernels"],
         ["study", "doubts"],
         ["preflight"],
         ["impact"],
