@@ -101,7 +101,9 @@ class Encounter:
     @functools.cached_property
     def pull(self) -> np.ndarray:
         """What pair forces make of the speed of the two (2, gaps) [m/s]: meetings.speeds_of."""
-        return meetings.speeds_of(self.system, [mobility for _, mobility in self.settling])
+        radii, mobilities = zip(*self.yielding, strict=True)
+        system = self.system
+        return meetings.speeds_of(system.forces, system.fluid, radii, sum(mobilities))
 
     @functools.cached_property
     def start_gap(self) -> float:

@@ -24,20 +24,19 @@ from flocsim.ensembles.config.schema import EXTENSION, SETTLING, SHEAR
 from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
-from flocsim.forces.check import sample_pairs
-from flocsim.forces.codegen import laws_of
+from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
 from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5
 """A flow's start is at least so many times as far as its ways are from i's centre there."""
 
-GAPS = np.geomspace(1e-10, 1e-2, 400)
+GAPS = np.geomspace(1e-10, 1e-2, 240)
 """Gaps [m] at which forces are looked at."""
 
 LEAST_START = 0.01
 """Start gap over r_i + r_j where hardly anything acts."""
 
-ANGLES = 720
+ANGLES, FEW = 720, 7
 """Angles of a body at which its turning is looked at."""
 
 FULL_TURN = 4.0 * math.pi
@@ -116,27 +115,31 @@ def turn_in_flow(
     return min(FULL_TURN / math.sqrt(1.0 - share * share), LONGEST_TURN) / rate
 
 
-def speeds_of(system: Any, mobilities: Sequence[float]) -> np.ndarray:
-    """Speeds [m/s] of the bodies against each other by their forces at GAPS, each taken for
-    repulsive: (all together, attractive ones) (2, gaps); the bodies' pair forces alone."""
-    i, j = system.bodies
-    r_i, r_j = i.shape.equivalent_radius, j.shape.equivalent_radius
+def speeds_of(
+    forces: Sequence[Force], fluid: Fluid, radii: Sequence[float], mobility: float
+) -> np.ndarray:
+    """Speeds [m/s] of two bodies against each other by their pair forces at GAPS: (all together,
+    each taken for repulsive; the sum) (2, gaps).
+
+    ``radii``: r_eq [m] of both; ``mobility``: the sum of theirs [s/kg].
+    """
+    r_i, r_j = radii
+    size, found = r_i + r_j, np.zeros((2, len(GAPS)))
     pair = sample_pairs(math.inf)[0]._replace(
-        gap_rate=0.0, radius_i=r_i, radius_j=r_j, reduced_radius=r_i * r_j / (r_i + r_j)
+        gap_rate=0.0, radius_i=r_i, radius_j=r_j, reduced_radius=r_i * r_j / size
     )
-    found = np.zeros((2, len(GAPS)))
-    for force in system.pieces.used.values():
-        if not isinstance(force, PairForce):
+    for force in forces:
+        if not isinstance(force, PairForce) or force.absent:
             continue
-        own = laws_of([force], system.fluid)
-        law = own.laws.get("centre_force") or own.laws.get("surface_force")
-        if law is None:
-            continue
-        views = (pair._replace(gap=gap, centre_distance=r_i + r_j + gap) for gap in GAPS.tolist())
-        values = np.array([law(view, own.parameters) for view in views])
+        kernel, end = force.kernel_in(fluid), reach_of(force)
+        arguments = kernel_arguments(force, fluid, kernel)
+        views = (pair._replace(gap=gap, centre_distance=size + gap) for gap in GAPS.tolist())
+        values = np.array(
+            [float(kernel(view, *arguments)) if view.gap < end else 0.0 for view in views]
+        )
         found[0] += np.abs(values)
         found[1] += values
-    return found * sum(mobilities)
+    return found * mobility
 
 
 def far_gap(speeds: np.ndarray, speed: float, share: float, size: float) -> float:
@@ -172,20 +175,34 @@ def attraction_width(speeds: np.ndarray, speed: float, way: float) -> float:
 
 
 def turning_rates(system: Any, body: Body) -> np.ndarray:
-    """Spins [rad/s] at which the body forces on a lone body put no torque on it, at ANGLES angles.
+    """Spins [rad/s] at which the body forces on a lone body put no torque on it, at even angles.
 
     Of all body forces together, so that a force under which shapes turn unevenly has its say.
+    ANGLES of them, or a FEW where these are alike.
     """
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     scale = max(map(abs, system.fluid.gradient), default=0.0) or 1.0
-    found = np.zeros(ANGLES)
-    for place, angle in enumerate(2.0 * np.pi * np.arange(ANGLES) / ANGLES):
-        view = lone_view(attrs.evolve(body, angle=float(angle)), system.fluid, 0.0, 0.0)
-        ends = [force(view._replace(spin=spin), pieces.parameters)[2] for spin in (-scale, scale)]
-        if ends[0] > ends[1]:
-            found[place] = scale * (ends[0] + ends[1]) / (ends[0] - ends[1])
-    return found
+    lone = lone_view(body, system.fluid, 0.0, 0.0)
+
+    def rates(count: int) -> np.ndarray:
+        found = np.zeros(count)
+        for place, angle in enumerate((2.0 * np.pi * np.arange(count) / count).tolist()):
+            view = lone._replace(angle=angle)
+            less, more = (
+                force(view._replace(spin=spin), pieces.parameters)[2] for spin in (-scale, scale)
+            )
+            if less > more:
+                found[place] = scale * (less + more) / (less - more)
+        return found
+
+    few = rates(FEW)
+    return few if is_even(few) else rates(ANGLES)
+
+
+def is_even(rates: np.ndarray) -> bool:
+    """Whether a body turns alike at all angles, or not at all."""
+    return bool(np.ptp(rates) <= 1e-6 * np.abs(rates).max())
 
 
 def angles_by_turning(rates: np.ndarray) -> Callable[[float], float]:
@@ -195,8 +212,7 @@ def angles_by_turning(rates: np.ndarray) -> Callable[[float], float]:
     Uniform for even turning or none; bodies that come to lie still have the angles at which they
     do, each as often as angles lead there.
     """
-    largest = np.abs(rates).max()
-    if np.ptp(rates) <= 1e-6 * largest or largest == 0.0:
+    if is_even(rates):
         return lambda number: 2.0 * math.pi * number
     step = 2.0 * math.pi / len(rates)
     if rates.min() > 0.0 or rates.max() < 0.0:
