@@ -1,4 +1,4 @@
-"""`flocsim export`: motion in a format of another program, rates as tables for population balances."""
+"""`flocsim export`: motion in a format of another program, rates as tables for other models."""
 
 import argparse
 from pathlib import Path
@@ -6,16 +6,16 @@ from typing import Any
 
 from flocsim.errors import UsageError
 from flocsim.io.exchange.gsd_file import write_gsd
-from flocsim.io.exchange.kernel_tables import (
+from flocsim.io.files import write_file
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.results.file import read_results
+from flocsim.io.results.kernel_tables import (
     MODELS,
     QUANTITIES,
     REFERENCES,
     kernel_csv,
     kernel_matrix,
 )
-from flocsim.io.files import write_file
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.results.file import read_results
 from flocsim.io.trajectory import read_trajectory
 
 SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}

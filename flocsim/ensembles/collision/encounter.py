@@ -111,7 +111,7 @@ class Encounter:
         if not isinstance(self.options.start_gap, str):
             return self.options.start_gap
         size = sum(shape.equivalent_radius for shape in self.shapes)
-        share = self.options.far  # type: ignore[attr-defined]
+        share = self.options.far
         return meetings.far_gap(self.pull, math.hypot(*self.drift), share, size)
 
     @functools.cached_property

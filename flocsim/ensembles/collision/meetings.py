@@ -221,15 +221,21 @@ def angles_by_turning(rates: np.ndarray) -> Callable[[float], float]:
         spent = np.append(0.0, np.cumsum(0.5 * (1.0 / np.abs(rates) + 1.0 / np.abs(ahead))))
         edges = step * np.arange(len(rates) + 1)
         return lambda number: float(np.interp(number * spent[-1], spent, edges))
-    ends = []
-    for place, rate in enumerate(rates):
-        here, way = place, 1 if rate > 0.0 else -1
-        for _ in range(len(rates)):
-            if rates[here] * way <= 0.0:
-                break
-            here = (here + way) % len(rates)
-        ends.append(step * here)
+    ends = [step * resting_place(rates, place) for place in range(len(rates))]
     return lambda number: ends[int(number * len(ends)) % len(ends)]
+
+
+def resting_place(rates: np.ndarray, place: int) -> float:
+    """Where, in steps between the angles, a body comes to lie still that begins at a place."""
+    way = 1 if rates[place] > 0.0 else -1
+    before = float(rates[place])
+    for ahead in range(1, len(rates) + 1):
+        after = float(rates[(place + way * ahead) % len(rates)])
+        if after * way <= 0.0:
+            share = before / (before - after) if before != after else 0.0
+            return (place + way * (ahead - 1 + share)) % len(rates)
+        before = after
+    return float(place)
 
 
 def refuse_drift(drift: np.ndarray, speed: float, names: Sequence[str]) -> None:

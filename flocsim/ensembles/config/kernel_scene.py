@@ -81,14 +81,14 @@ class KernelScene(SceneConfig):
         unit="m",
         help='equivalent radii of the size classes; without it, pairs = "measured"',
     )
-    pairs: str | None = choice(  # type: ignore[assignment]
+    pairs: str | None = choice(
         MEASURED,
         default=None,
         help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
     )
     weight: str | None = inherited("weight")
     classes: int | tuple[float, ...] | None = inherited("classes")
-    types: None = fixed(None)  # type: ignore[assignment]
+    types: None = fixed(None)
     delta: tuple[float, ...] = fixed((1.0,))
     delta_max: str = fixed("radius")
     receiver: str = fixed("free")

@@ -12,7 +12,7 @@ is a closure: it takes what the plane shows at |b| for what a ring of that radiu
 exact for spheres without forces, where β₃ is π R² |Δw|, 4/3 G R³ and 8/3 s R³, and an assumption
 for shapes (they lie in the plane) and for forces in a flow.
 
-Of S scrambles each gives a mean; the interval is Student's of these. Where all points agree, it is
+Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all points agree, it is
 Wilson's at their number. What numerics do is bounded by the share of points that flip where run
 again (`estimates.numerical`), times the largest weight of a point.
 """
@@ -57,8 +57,9 @@ def weights_of(
     encounter: Encounter, angles: np.ndarray, numbers: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """The fields of Weighted for points of one encounter; ``angles`` (2, n), ``numbers`` (n,)."""
-    low, high = bounds_of(encounter, *angles)
-    offset = np.abs(offsets_of(encounter, *angles, numbers))
+    low, high = bounds_of(encounter, angles[0], angles[1])
+    signed = offsets_of(encounter, angles[0], angles[1], numbers)
+    offset = np.abs(signed)
     size = sum(shape.equivalent_radius for shape in encounter.shapes)
     speed = math.hypot(*encounter.drift)
     ones = np.ones(len(numbers))
@@ -73,7 +74,6 @@ def weights_of(
         plane = factor * high * high
         space = 2.0 * plane * offset
         spheres = factor * size * size, 4.0 / 3.0 * factor * size**3
-    signed = offsets_of(encounter, *angles, numbers)
     rim = EDGE * encounter.reach
     edge = (encounter.reach > 0.0) & ((signed < low + rim) | (signed > high - rim))
     return width, plane, space, np.outer(spheres, ones), speed * ones, edge
@@ -119,11 +119,24 @@ def student(scrambles: int) -> float:
     return float(stdtrit(scrambles - 1, 0.975))
 
 
-def mean_of(values: np.ndarray, agree: tuple[bool, float]) -> tuple[float, float, float]:
+def half_width(values: np.ndarray, point: float) -> float:
+    """Of the 95 % interval of the mean of what scrambles gave (S,), to which one point of a
+    scramble adds ``point``.
+
+    Even points in a simple set are as many in every scramble, up to one: their scatter is taken for
+    half a point at least.
+    """
+    scatter = max(float(values.std(ddof=1)), 0.5 * point)
+    return student(len(values)) * scatter / math.sqrt(len(values))
+
+
+def mean_of(
+    values: np.ndarray, agree: tuple[bool, float], point: float = 0.0
+) -> tuple[float, float, float]:
     """(mean, low, high) of what scrambles gave (S,); ``agree``: whether all points agree, and how
-    much of the sampled mean that bounds."""
+    much of the sampled mean that bounds; ``point``: see half_width."""
     mean = float(values.mean())
-    half = student(len(values)) * float(values.std(ddof=1)) / math.sqrt(len(values))
+    half = half_width(values, 0.0 if agree[0] else point)
     all_agree, unseen = agree
     low, high = max(mean - half, 0.0), mean + half
     if all_agree and mean == 0.0:
@@ -131,15 +144,27 @@ def mean_of(values: np.ndarray, agree: tuple[bool, float]) -> tuple[float, float
     return mean, min(low, mean * (1.0 - unseen)) if all_agree else low, high
 
 
-def ratio_of(above: np.ndarray, below: np.ndarray) -> tuple[float, float, float]:
-    """(ratio, low, high) of the means of two numbers that each scramble gave."""
+def ratio_of(
+    above: np.ndarray, below: np.ndarray, point: float = 0.0
+) -> tuple[float, float, float]:
+    """(ratio, low, high) of the means of two numbers that each scramble gave; ``point``: see
+    half_width, of the first."""
     mean = float(below.mean())
     if not mean > 0.0:
         return math.nan, math.nan, math.nan
     ratio = float(above.mean()) / mean
-    scatter = float((above - ratio * below).std(ddof=1)) / mean
-    half = student(len(above)) * scatter / math.sqrt(len(above))
+    half = half_width(above - ratio * below, point) / mean
     return ratio, max(ratio - half, 0.0), ratio + half
+
+
+def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, float]:
+    """(low, high) of an efficiency (value, low, high), at least Wilson's where all encounters that
+    touched, or none of them, aggregated."""
+    _, low, high = ends
+    if touched and bound in (0, touched):
+        least, most = (float(end) for end in wilson(bound, touched))
+        return min(low, least), max(high, most)
+    return low, high
 
 
 @attrs.define(eq=False)
@@ -174,9 +199,10 @@ def estimate(
         """The means of the scrambles, which replicates belong to in turn."""
         return values.reshape(-1, scrambles).mean(axis=0)
 
-    values, largest, by_scramble = {}, {}, {}
-    low_share, high_share = (float(end) for end in wilson(0, n))
-    assert low_share == 0.0
+    values: dict[str, float] = {}
+    largest: dict[str, float] = {}
+    by_scramble: dict[str, np.ndarray] = {}
+    high_share = float(wilson(0, n)[1])
     columns = {
         "beta2_c": (points.plane, "c"), "beta2": (points.plane, "a"),
         "beta3_c": (points.space, "c"), "beta3": (points.space, "a"),
@@ -187,7 +213,8 @@ def estimate(
         agrees = bool(chi[what].all() or not chi[what].any())
         unseen = high_share * (1.0 if chi[what].any() else float(weight.mean()))
         by_scramble[name] = parts(weight * chi[what])
-        ends = list(mean_of(by_scramble[name], (agrees, unseen)))
+        point = float(weight.max()) * scrambles / n
+        ends = list(mean_of(by_scramble[name], (agrees, unseen), point))
         most = float(weight.max())
         if flow:
             assert rate is not None
@@ -203,9 +230,13 @@ def estimate(
         "efficiency2": (by_scramble["beta2"], parts(points.reference[0])),
         "efficiency3": (by_scramble["beta3"], parts(points.reference[1])),
     }.items():
-        ends = list(ratio_of(above, below))
-        values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         weight = points.space if name == "efficiency3" else points.plane
+        sure = name == "alpha" and np.array_equal(chi["a"], chi["c"])
+        point = 0.0 if sure else float(weight.max()) * scrambles / n
+        ends = list(ratio_of(above, below, point))
+        if name == "alpha":
+            ends[1:] = widened(ends, int(np.sum(chi["c"] & chi["a"])), int(np.sum(chi["c"])))
+        values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         largest[name] = float(weight.max() / below.mean()) if below.mean() > 0.0 else math.nan
     unknown = np.isin(rows["outcome"], UNKNOWN)
     caught = float(np.sum(points.plane * chi["a"]))
@@ -273,10 +304,10 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
     numerical = numerical_parts(found, shape)
     arrays = {name: np.full(shape, np.nan) for name in KERNEL}
     fill_alike(arrays, scene.meeting, scene.sizes is not None)
-    for place, each in found.items():
-        for name, value in (each.values | numerical[place]).items():
-            for a, b in {(place[2], place[3]), (place[3], place[2])}:
-                arrays[name][(*place[:2], a, b)] = value
+    for cell, each in found.items():
+        m, v, i, j = cell
+        for name, value in (each.values | numerical[cell]).items():
+            arrays[name][m, v, i, j] = arrays[name][m, v, j, i] = value
     return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays)
 
 

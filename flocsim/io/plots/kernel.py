@@ -76,7 +76,7 @@ def draw_line(axes, kernel, name, place, colour, lines):
         kernel.arrays[name + end][m, v, smaller, larger] for end in ("", "_low", "_high")
     )
     known = np.isfinite(value)
-    style = dict(color=colour, marker=MARKERS[v % len(MARKERS)])
+    style = {"color": colour, "marker": MARKERS[v % len(MARKERS)]}
     if kernel.vertices[v] == 1:
         style |= {"linestyle": ":", "markerfacecolor": "white"}
     axes.errorbar(

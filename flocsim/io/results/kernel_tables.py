@@ -37,7 +37,7 @@ REFERENCES = {
         "spheres": (1.0, "8/3 s (r_i + r_j)^3, rectilinear, of the equivalent spheres"),
     },
 }
-"""{mechanism: {model: (what the efficiency over the rectilinear kernel is multiplied by, words)}}."""
+"""{mechanism: {model: (factor on the efficiency over the rectilinear kernel, words)}}."""
 
 MODELS = ("spheres", "flocmod")
 QUANTITIES = ("efficiency", *ESTIMATES)
@@ -59,8 +59,8 @@ def kernel_csv(kernel: Kernel) -> str:
     for m, v, i, j in np.ndindex(*kernel.arrays["alpha"].shape):
         if i > j:
             continue
-        values = [number(kernel.arrays[name][m, v, i, j]) for name in KERNEL]
-        sizes = [number(kernel.radii[i]), number(kernel.radii[j])]
+        values = [number(float(kernel.arrays[name][m, v, i, j])) for name in KERNEL]
+        sizes = [number(float(kernel.radii[place])) for place in (i, j)]
         labels = [kernel.mechanisms[m], int(kernel.vertices[v]), kernel.labels[i], kernel.labels[j]]
         writer.writerow([*labels, *sizes, *values])
     return text.getvalue()
@@ -91,7 +91,7 @@ def kernel_matrix(
         values = efficiency_for(kernel, mechanism, vertices, model)
         what = [
             f"efficiency in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
-            "(that product is the kernel of encounters that aggregate, closed for three dimensions)",
+            "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
         ]
     elif quantity in ESTIMATES:
         values = kernel.arrays[quantity][m, v]
