@@ -12,9 +12,9 @@ is a closure: it takes what the plane shows at |b| for what a ring of that radiu
 exact for spheres without forces, where β₃ is π R² |Δw|, 4/3 G R³ and 8/3 s R³, and an assumption
 for shapes (they lie in the plane) and for forces in a flow.
 
-Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all points agree, it is
-Wilson's at their number. What numerics do is bounded by the share of points that flip where run
-again (`estimates.numerical`), times the largest weight of a point.
+Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all
+points agree, it is Wilson's at their number. What numerics do is bounded by the share of points
+that flip where run again (`estimates.numerical`), times the largest weight of a point.
 """
 
 import math
