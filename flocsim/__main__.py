@@ -9,7 +9,7 @@ from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 from flocsim.limits import check_memory, is_limited
 
-if {"ensemble", "swarm"}.intersection(sys.argv[1:2]):
+if {"ensemble", "kernel", "swarm"}.intersection(sys.argv[1:2]):
     fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
@@ -39,7 +39,7 @@ COMMANDS = (
 )  # fmt: skip
 
 
-STUDIES = {"ensemble", "swarm"}
+STUDIES = {"ensemble", "kernel", "swarm"}
 """Commands that run studies, also under mpirun."""
 
 

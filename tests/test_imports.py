@@ -70,6 +70,7 @@ INNER_ROWS = {
         ["pilot"],
         ["estimates"],
         ["storage"],
+        ["kernels"],
         ["study", "doubts"],
         ["preflight"],
         ["impact"],

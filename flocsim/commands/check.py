@@ -23,6 +23,7 @@ from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
 from flocsim.ensembles.preflight import check_study, measured_flocs
@@ -243,7 +244,7 @@ class Checker:
             config = stiff(self.config, stiffness)
             check_study(config)
             self.flocs = flocs_of(config) if self.flocs is None else self.flocs
-            self.studies[stiffness] = Study(config, self.flocs, first_methods(config))
+            self.studies[stiffness] = study_of(config, self.flocs, first_methods(config))
         return self.studies[stiffness]
 
     def judge(self, case: Case, reference: float) -> Verdict:
@@ -272,11 +273,13 @@ class Scene:
     case: Case
     encounter: Encounter
     angles: tuple[float, float]
+    share: float
 
     @classmethod
     def of(cls, study: Study, case: Case) -> "Scene":
         drawn = study.drawn(case.condition, case.vertices, case.replicate)
-        return cls(study, case, *drawn)
+        share = study.share_of(drawn[0], case.delta, case.replicate)
+        return cls(study, case, *drawn, share)
 
     def run(
         self, method: Integrator, more: int = 1, until: float = math.inf,
@@ -284,7 +287,7 @@ class Scene:
     ) -> tuple[Run, dict]:  # fmt: skip
         """(Run that has ended, its row); ``moved`` may change the start."""
         made = self.encounter.begin(
-            self.study.driver(self.encounter, method), self.angles, self.case.delta,
+            self.study.driver(self.encounter, method), self.angles, self.share,
             more * self.study.config.integrator.max_steps, until, integrator=method,
         )  # fmt: skip
         if moved is not None:

@@ -1,5 +1,5 @@
 """`flocsim ensemble cfg.toml`: the same as `python -m flocsim.ensemble cfg.toml`; and by another
-name, `flocsim swarm`, for a config whose scene is a swarm."""
+name, `flocsim swarm` and `flocsim kernel`, for a config of that kind of scene."""
 
 from argparse import Namespace
 from typing import Any
@@ -8,6 +8,8 @@ from flocsim.ensembles.cli import add_arguments, run_command
 
 NAMES = {
     "ensemble": "run the ensemble of a config file",
+    "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
+    "kernels and efficiencies for population balances",
     "swarm": 'run a study of many bodies (scene.kind = "swarm"), as ensemble does',
 }
 

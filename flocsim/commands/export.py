@@ -1,4 +1,4 @@
-"""`flocsim export gsd run.h5`: motion in a format of another program."""
+"""`flocsim export`: motion in a format of another program, rates as tables for other models."""
 
 import argparse
 from pathlib import Path
@@ -6,35 +6,101 @@ from typing import Any
 
 from flocsim.errors import UsageError
 from flocsim.io.exchange.gsd_file import write_gsd
+from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.results.file import read_results
+from flocsim.io.results.kernel_tables import (
+    MODELS,
+    QUANTITIES,
+    REFERENCES,
+    kernel_csv,
+    kernel_matrix,
+)
 from flocsim.io.trajectory import read_trajectory
+
+SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}
 
 
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "export",
-        help="write a file of motion in a format of another program",
-        description="Write the motion that flocsim trajectory --save or Trajectory.save put into "
-        "a file in a format of another program: gsd, for OVITO and HOOMD's tools, with lengths in "
-        "um. (ParaView and xarray open the file itself.)",
+        help="write motion, or rates of encounters, in a format of another program",
+        description="gsd: the motion that flocsim trajectory --save or Trajectory.save put into a "
+        "file, for OVITO and HOOMD's tools, with lengths in um. (ParaView and xarray open the file "
+        "itself.) Of the results of a kernel study, csv: a table of all pairs of size classes; "
+        "matrix: a square matrix for each mechanism and N, which says what it multiplies.",
     )
     add = parser.add_argument
-    add("format", choices=("gsd",))
-    add("motion", help="file that flocsim trajectory --save wrote")
-    add("-o", "--output", metavar="FILE.gsd",
-        help="file to write (default: run.gsd for run.h5, in the current folder)")  # fmt: skip
+    add("format", choices=tuple(SUFFIXES))
+    add("source", help="file that flocsim trajectory --save, or flocsim kernel, wrote")
+    add("-o", "--output", metavar="FILE",
+        help="file to write (default: run.gsd for run.h5, in the current folder); of matrices "
+        "the start of their names")  # fmt: skip
+    add("--what", choices=QUANTITIES, default="efficiency",
+        help="of matrices: what they hold (default: %(default)s)")  # fmt: skip
+    add("--model", choices=MODELS, default="spheres",
+        help="of matrices of efficiencies: whose kernels they multiply (default: %(default)s); "
+        "flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the file and print its path; returns the exit code."""
-    path = Path(args.output or f"{Path(args.motion).stem}.gsd")
-    if path.suffix.lower() != ".gsd":
-        raise UsageError(f"--output {path}: the name must end in .gsd")
+    """Write the files and print their paths; returns the exit code."""
+    if args.format == "matrix":
+        return run_matrices(args)
+    path = named(args)
     rule = data_rule(args.overwrite)
-    check_outputs([Output(path, rule)], [args.motion])
-    motion = read_trajectory(args.motion)
-    write_gsd(path, motion.t, motion.position, motion.velocity, motion.shapes, rule)
+    check_outputs([Output(path, rule)], [args.source])
+    if args.format == "csv":
+        write_file(path, kernel_csv(kernel_in(args.source)).encode(), rule)
+    else:
+        motion = read_trajectory(args.source)
+        write_gsd(path, motion.t, motion.position, motion.velocity, motion.shapes, rule)
     print(path)
+    return 0
+
+
+def named(args):
+    """The file to write; UsageError where its name has another ending."""
+    suffix = SUFFIXES[args.format]
+    path = Path(args.output or f"{Path(args.source).stem}{suffix}")
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"--output {path}: the name must end in {suffix}")
+    return path
+
+
+def kernel_in(path):
+    """The rates in a results file; UsageError where it has none."""
+    kernel = read_results(path, replicates=False).kernel
+    if kernel is None:
+        raise UsageError(
+            f"{path} is of no kernel study and has no rates: run flocsim kernel with a config of "
+            'scene.kind = "kernel"'
+        )
+    return kernel
+
+
+def run_matrices(args):
+    """Write a matrix for each mechanism, that the model has, and N."""
+    kernel, rule = kernel_in(args.source), data_rule(args.overwrite)
+    start = Path(args.output or Path(args.source).stem)
+    start = start.with_suffix("") if start.suffix.lower() == ".csv" else start
+    ending = args.model if args.what == "efficiency" else ""
+    texts = {}
+    for mechanism in kernel.mechanisms:
+        if args.what == "efficiency" and args.model not in REFERENCES.get(mechanism, {}):
+            continue
+        for count in kernel.vertices.tolist():
+            parts = (mechanism, f"N{count}", args.what, ending)
+            name = f"{start.name}-{'-'.join(filter(None, parts))}.csv"
+            texts[start.with_name(name)] = kernel_matrix(
+                kernel, mechanism, count, args.what, args.model
+            )
+    if not texts:
+        raise UsageError(f"{args.model} has no kernel for {', '.join(kernel.mechanisms)}")
+    check_outputs([Output(path, rule) for path in texts], [args.source])
+    for path, text in texts.items():
+        write_file(path, text.encode(), rule)
+        print(path)
     return 0

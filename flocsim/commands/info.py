@@ -15,7 +15,13 @@ from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.pilot.choice import choice_lines
-from flocsim.ensembles.report import checked_line, efficiency_lines, format_table, undecided_line
+from flocsim.ensembles.report import (
+    checked_line,
+    efficiency_lines,
+    format_table,
+    kernel_lines,
+    undecided_line,
+)
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
@@ -169,6 +175,8 @@ def results_text(path, results, totals):
     if len(said.failed) > MOST_FAILURES:
         lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    if results.kernel is not None:
+        return "\n".join([*lines, "", *kernel_lines(results.kernel)])
     return "\n".join([*lines, *efficiency_block(results), "", table])
 
 

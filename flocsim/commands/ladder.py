@@ -18,6 +18,7 @@ from flocsim.ensembles.collision.encounter import replicate_row
 from flocsim.ensembles.collision.failures import FAILED
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.pilot.choice import (
     ALLOWED,
     REFERENCE,
@@ -98,6 +99,7 @@ def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
     condition, vertices, share, replicate = job.task
     encounter, angles = study.drawn(condition, vertices, replicate)
     driver = study.driver(encounter, job.integrator)
+    share = study.share_of(encounter, share, replicate)
     run = encounter.begin(
         driver, angles, share, job.max_steps, record=True, integrator=job.integrator
     )
@@ -200,7 +202,7 @@ def run(args: Namespace) -> int:
         checked_format(path)
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
-    study = Study(config, flocs_of(config), first_methods(config))
+    study = study_of(config, flocs_of(config), first_methods(config))
     target = ALLOWED * sampling_error(config)
     climbed: list[Measured] = []
     panels: dict[str, list[Rung]] = {}

@@ -6,6 +6,7 @@ from typing import Any
 
 from flocsim.errors import FileError, UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
+from flocsim.io.plots.kernel import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import FORMATS, mark_figure, save
@@ -24,6 +25,8 @@ Of the joined file of flocsim sweep:
 {sweep}
 Of a swarm study:
 {swarm}
+Of a kernel study:
+{kernel}
 Of a study that still runs, its figures so far are drawn, marked as unfinished.
 Figures are numbered as in Tang et al. (2014)."""
 
@@ -64,6 +67,7 @@ def add_parser(subparsers: Any) -> None:
             motion=listed(MOTION_FIGURES),
             sweep=listed(SWEEP_FIGURES),
             swarm=listed(SWARM_FIGURES),
+            kernel=listed(KERNEL_FIGURES),
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -154,13 +158,17 @@ def read_content(path):
         return found, kept, ""
     if kind != FORMAT and is_library(path):
         return read_library(path), POPULATION_FIGURES, ""
-    return read_results(path, replicates=False), FIGURES, ""
+    results = read_results(path, replicates=False)
+    return results, FIGURES if results.kernel is None else KERNEL_FIGURES, ""
 
 
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES)
+    known = (
+        *POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES,
+        *KERNEL_FIGURES,
+    )  # fmt: skip
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

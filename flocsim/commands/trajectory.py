@@ -8,7 +8,6 @@ from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.collision.snapshots import frames_of
-from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
@@ -163,7 +162,7 @@ def run(args: Namespace) -> int:
     study = one_count_study(config, place[1])
     record = Record()
     row = study.run(*place, args.replicate, record)
-    encounter = study.encounter(*place[:2], draws(config.seed, args.replicate))
+    encounter = study.encounter(*place[:2], study.numbers(args.replicate))
     title = outcome_line(config, place, args.replicate, row)
     print(title)
     arrays = record.arrays()

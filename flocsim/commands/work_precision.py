@@ -87,7 +87,7 @@ def replicate(config, place, number):
     study = one_count_study(config, place[1])
     found = study.run(*place, number)
     encounter, angles = study.drawn(*place[:2], number)
-    system = replicate_system(encounter, angles, place[2])
+    system = replicate_system(encounter, angles, study.share_of(encounter, place[2], number))
     return system, float(found["t_end"]), found
 
 

@@ -95,6 +95,7 @@ def checked_config(arguments, sources):
     from flocsim.ensembles.preflight import check_study, inputs_of
 
     config = load_any_config(arguments.config, overrides(arguments), sources)
+    refuse_other_kinds(arguments, config)
     if config.is_swarm:
         from flocsim.ensembles.suspension.runner import check_swarm
 
@@ -104,6 +105,15 @@ def checked_config(arguments, sources):
     if not arguments.dry_run:
         check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
     return config
+
+
+def refuse_other_kinds(arguments, config):
+    """UsageError where `flocsim kernel` is given a config of anything else."""
+    if getattr(arguments, "command", "") == "kernel" and not config.is_kernel:
+        raise UsageError(
+            f'{arguments.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
+            'kind = "kernel" with sizes, as examples/kernel.toml has'
+        )
 
 
 def results_of(config, arguments):
@@ -201,10 +211,13 @@ def verdict(results, output):
 
 
 def report(ended, output):
-    from flocsim.ensembles.report import checked_line, format_table
+    from flocsim.ensembles.report import checked_line, format_table, kernel_lines
 
     results = ended.results
-    tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
+    if results.kernel is not None:
+        tell("\n".join(kernel_lines(results.kernel)))
+    else:
+        tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
     if line := checked_line(results):
         tell(line)
     total = int(results.probabilities["n_total"].sum())

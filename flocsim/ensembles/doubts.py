@@ -17,14 +17,21 @@ from flocsim.plausibility.reynolds import settled
 def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[str]:
     """Lines on a study, by the equivalent spheres of its collision types; none where all is
     usual."""
+    systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
+    # In a flow bodies meet without their weight.
+    acting = [id(force) for force in systems[0].forces]
     names = Names(
         fluid="fluid",
         body="bodies",
-        forces=tuple(f"forces.{name}" for name in config.force_names),
+        forces=tuple(
+            f"forces.{name}"
+            for name, force in zip(config.force_names, config.forces, strict=True)
+            if id(force) in acting
+        ),
         buoyancy="fluid.buoyancy = true",
         drop="give {} = false",
     )
-    lines = doubts_of([pair.system for _, pair in sphere_pairs(config, flocs, "largest")], names)
+    lines = doubts_of(systems, names)
     options = config.shapes
     if options.own is None and options.size == "scene" and max(options.vertices) > 1:
         least = min(min(each.radii) for each in pairings(config, flocs))

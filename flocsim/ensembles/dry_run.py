@@ -11,6 +11,7 @@ from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
@@ -150,7 +151,7 @@ def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[st
     """(Study, its Forecast for so many ranks, lines on a choice of its methods, seconds that
     compiling or loading took), from a pilot that is run here."""
     began = time.process_time()
-    study = Study(config, flocs_of(config), first_methods(config))
+    study = study_of(config, flocs_of(config), first_methods(config))
     grown = time.process_time() - began
     compiled = -time.monotonic()
     study.compile(study.kinds)

@@ -55,7 +55,8 @@ def sphere_pairs(
     for pairing in pairings(config, flocs):
         radius_i, radius_j = getattr(pairing, which)
         zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
-        yield pairing.name, make_encounter(config, (Sphere(radius_i), Sphere(radius_j)), zone)
+        spheres = (Sphere(radius_i), Sphere(radius_j))
+        yield pairing.name, make_encounter(config, spheres, zone, meeting=pairing.meeting)
 
 
 def check_study(config: Config) -> None:
@@ -171,7 +172,8 @@ def stand_in(shape, options):
 
 def placed_system(config: Config, system: System, shapes: Sequence[Shape]) -> System:
     """The system with these shapes, the start gap apart."""
-    reach = sum(shape.bounding_radius for shape in shapes) + config.scene.start_gap
+    gap = config.scene.start_gap
+    reach = sum(shape.bounding_radius for shape in shapes) + (0.0 if isinstance(gap, str) else gap)
     places = ((0.0, 0.0), (0.0, reach))
     bodies = [
         attrs.evolve(body, shape=shape, position=place)

@@ -1,5 +1,6 @@
 """The table of a study for the terminal."""
 
+import itertools
 import json
 from collections.abc import Mapping, Sequence
 
@@ -11,6 +12,7 @@ from flocsim.errors import visible
 from flocsim.io.confidence import wilson
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.file import CLASSES
+from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.schema import Results
 
 ENDS = {
@@ -96,6 +98,67 @@ def efficiency_lines(results: Results) -> list[str]:
         for name, count, planar, axial in efficiency_rows(results)
     ]
     return [f"efficiency: {EFFICIENCY}", *lines] if lines else []
+
+
+RECTILINEAR = (
+    "upper bounds: bodies come along straight ways, or those of the flow, as the water that one "
+    "displaces moves no other (no hydrodynamic interaction)"
+)
+"""What is to be known of all widths and kernels."""
+
+KERNEL_HEADER = (
+    ("class", "i"), ("", "j"), ("width [um]", "touched"), ("", "aggregated"),
+    ("alpha", "95 %    num."), ("beta2", "[m2/s]"), ("beta3 [m3/s]", "+- 95 %"),
+    ("over ref.", "sphere"),
+)  # fmt: skip
+
+
+def kernel_lines(kernel: Kernel) -> list[str]:
+    """The rates of a kernel study as tables of text: one for each mechanism and N."""
+    lines = [f"capture widths and kernels, {RECTILINEAR}"]
+    for m, mechanism in enumerate(kernel.mechanisms):
+        for v, count in enumerate(kernel.vertices):
+            rows = [
+                kernel_row(kernel, (m, v, i, j))
+                for i, j in itertools.combinations_with_replacement(range(len(kernel.labels)), 2)
+                if kernel.arrays["checked"][m, v, i, j] >= 0.0
+            ]
+            rows = [row for row in rows if row]
+            upper, lower = zip(*KERNEL_HEADER, strict=True)
+            widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
+            lines += ["", f"{mechanism}, N = {count}", align(upper, widths), align(lower, widths)]
+            lines += [align(row, widths) for row in rows]
+    edge = np.nanmax(kernel.arrays["edge"], initial=0.0)
+    if edge > 0.0:
+        lines.append(
+            f"warning: up to {100.0 * edge:.2g} % of what aggregates came from the outermost "
+            "offsets, so that attraction may reach farther than was sampled"
+        )
+    undecided = np.nanmax(kernel.arrays["undecided"], initial=0.0)
+    if undecided > 0.0:
+        lines.append(
+            f"up to {100.0 * undecided:.2g} % of a pair's encounters are undecided or failed: they "
+            "count as not aggregated"
+        )
+    return lines
+
+
+def kernel_row(kernel, place):
+    """One pair of size classes; nothing for bodies that do not meet."""
+    found = {name: float(values[place]) for name, values in kernel.arrays.items()}
+    if not found["width_c"] > 0.0:
+        return ()
+    error = max(found["alpha"] - found["alpha_low"], found["alpha_high"] - found["alpha"])
+    spread = max(found["beta3"] - found["beta3_low"], found["beta3_high"] - found["beta3"])
+    numerical = found["alpha_numerical"]
+    told = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
+    alpha = "-" if np.isnan(found["alpha"]) else f"{share(found['alpha'])} +-{share(error)} {told}"
+    return (
+        visible(kernel.labels[place[2]], ""), visible(kernel.labels[place[3]], ""),
+        f"{1e6 * found['width_c']:.2f}", f"{1e6 * found['width_a']:.2f}", alpha,
+        f"{found['beta2']:.3g}", f"{found['beta3']:.3g} +-{spread:.1g}",
+        f"{found['efficiency3']:.3f}",
+    )  # fmt: skip
 
 
 def undecided_line(results: Results) -> str:

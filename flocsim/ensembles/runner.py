@@ -19,8 +19,10 @@ from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
+from flocsim.ensembles.kernels.study import KernelStudy, study_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
 from flocsim.ensembles.parallel.assembly import assemble, assist
 from flocsim.ensembles.parallel.communicator import (
@@ -52,6 +54,7 @@ from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
 from flocsim.io.results.file import read_results
+from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results
 from flocsim.io.terminal import Progress, tell
@@ -168,7 +171,7 @@ def join(
     """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
-    study = Study(config, flocs=hear(comm, flocs), methods=first_methods(config))
+    study = study_of(config, hear(comm, flocs), first_methods(config))
     own, line = own_facts(study, comm)
     leader = hear(comm, own)
     if own is not None:
@@ -365,22 +368,25 @@ def make_results(
         output = None  # it has more than was asked for, and keeps it
     reader = Reader(start.store, (*study.shape[:3], count))
     run = facts(study, start, state.notes, ended, comm.size)
+    kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     if output is None:
         sums = sums_of(reader.codes, len(study.conditions), 0, count)
-        return results_of(study, count, sums, run, reader.arrays(COLUMNS) if in_memory else None)
+        rows = reader.arrays(COLUMNS) if in_memory else None
+        return results_of(study, count, sums, run, rows, kernel)
     nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
     # Its tables have no values yet, but their places: where the rows go follows from them.
-    draft = results_of(study, count, nothing, run)
+    draft = results_of(study, count, nothing, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:
         sums, digests = assemble(reader, file, comm, progress.warn)
-        results = results_of(study, count, sums, run)
+        results = results_of(study, count, sums, run, kernel=kernel)
         file.complete(results, digests)
     return results
 
 
 def results_of(
-    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None
-) -> Results:
+    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
+    kernel: Kernel | None = None,
+) -> Results:  # fmt: skip
     """The Results of so many replicates of each condition from their Sums."""
     config = study.config
     probabilities, pooled, differences = tables_of(sums)
@@ -397,6 +403,7 @@ def results_of(
         differences=differences,
         count=count,
         radii=study.radii,
+        kernel=kernel,
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
+from typing import Any
 
 import attrs
 import numpy as np
@@ -18,7 +19,7 @@ from flocsim.ensembles.collision.encounter import (
 from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
-from flocsim.ensembles.collision.start import draws, orientations
+from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
@@ -86,7 +87,7 @@ class Study:
 
     def by_methods(self, methods: dict[str, Integrator]) -> "Study":
         """The same study by other methods; the shapes that have been made are shared."""
-        other = Study(self.config, flocs=self.flocs, methods=methods)
+        other = type(self)(self.config, flocs=self.flocs, methods=methods)
         other.floc_pool, other.pairings = self.floc_pool, self.pairings
         return other
 
@@ -106,6 +107,18 @@ class Study:
     @property
     def size(self) -> int:
         return int(np.prod(self.shape))
+
+    def numbers(self, replicate: int) -> np.ndarray:
+        """The random numbers of a replicate in [0, 1): two orientations, two choices of floc."""
+        return draws(self.config.seed, replicate)
+
+    def facts(self) -> dict[str, Any]:
+        """{name: value} of what rows follow from besides the config."""
+        return {}
+
+    def share_of(self, encounter: Encounter, share: float, replicate: int) -> float:
+        """The displacement of a replicate over δ_max in a condition of this ``share``."""
+        return share
 
     def choose_flocs(
         self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
@@ -128,8 +141,9 @@ class Study:
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
             self.encounters[key] = make_encounter(
-                self.config, shapes, self.zone(name, shapes), self.methods[name]
-            )
+                self.config, shapes, self.zone(name, shapes), self.methods[name],
+                self.pairings[condition].meeting,
+            )  # fmt: skip
         return self.encounters[key]
 
     def zone(self, name: str, shapes: Sequence[Shape]) -> float:
@@ -143,8 +157,9 @@ class Study:
         self, condition: int, vertices: int, replicate: int
     ) -> tuple[Encounter, tuple[float, float]]:
         """The Encounter and the two angles [rad] that a replicate's random numbers give."""
-        numbers = draws(self.config.seed, replicate)
-        return self.encounter(condition, vertices, numbers), orientations(numbers)
+        numbers = self.numbers(replicate)
+        encounter = self.encounter(condition, vertices, numbers)
+        return encounter, encounter.orientations(numbers)
 
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
@@ -179,10 +194,11 @@ class Study:
 
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
-        numbers = draws(self.config.seed, replicate)
+        numbers = self.numbers(replicate)
         encounter = self.encounter(condition, vertices, numbers)
         driver = self.driver(encounter)
-        angles = orientations(numbers)
+        angles = encounter.orientations(numbers)
+        share = self.share_of(encounter, share, replicate)
         max_steps = self.config.integrator.max_steps
         row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)
         if row is None:

@@ -12,7 +12,9 @@ Rest: the bodies touch and have rested as one rigid doublet, which does not swin
 stated time, with the load at its worst: the faster settling one straight below (a fixed receiver
 cannot turn, so it need not; nor need a floc that lies nested around the other's centre, or hovers
 over it behind a barrier, if it rests for far longer). That shows that the doublet holds, not that
-no kick could open it. Where attraction alone could not even carry the load, the shapes do: such a
+no kick could open it. In a flow alone the load is at its worst twice in every turn of the doublet,
+or where it has come to lie still: there the stated time is that of a whole turn. Where attraction
+alone could not even carry the load, the shapes do: such a
 rest is a hook.
 """
 
@@ -39,6 +41,7 @@ from flocsim.ensembles.collision.observed import (
     BODY_J,
     DRIFT_X,
     DRIFT_Y,
+    IN_FLOW,
     LOAD,
     REST_ANGLE,
     REST_SINCE,
@@ -211,7 +214,7 @@ def rest_of(scene, work, observed, time):
     # A doublet that still swings passes the worst direction, but may yet be thrown open.
     outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
     swing = abs(work.motion[NOW, BODY_I, SPIN]) * outer
-    if swing > CALM * drift:
+    if swing > CALM * drift and observed[IN_FLOW] == 0.0:
         return 0.0
     return (time - observed[REST_SINCE]) / observed[REST_TIME]
 
@@ -227,6 +230,8 @@ def has_rested(scene, work, observed, time, gap, nx, ny, distance):
     sizes = scene.bodies[BODY_I, EQUIVALENT_RADIUS] + scene.bodies[BODY_J, EQUIVALENT_RADIUS]
     if (gap >= 0.0 or distance < NEST * sizes) and rested >= FAR_LONGER:
         return True
+    if observed[IN_FLOW] != 0.0:
+        return gap < 0.0 and rested >= 1.0
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     hanging = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y] >= HANGING * drift
     hanging = hanging or scene.bodies[BODY_I, FREE] == 0.0

@@ -2,7 +2,9 @@
 
 Body j is carried along the steady drift against i, at the orientations of now, by as much at a time
 as still lies between the outlines, until it has passed all of i. What is left of present velocities
-and spins, until drag has used it up, must fit into what remains between them on the way.
+and spins, until drag has used it up, must fit into what remains between them on the way. In a flow
+alone, they have parted once it carries them apart beyond all reach of their outlines: in shear and
+in extension it does so for ever then.
 """
 
 import math
@@ -26,6 +28,11 @@ from flocsim.ensembles.collision.observed import (
     DRIFT_X,
     DRIFT_Y,
     ESCAPE,
+    FLOW_XX,
+    FLOW_XY,
+    FLOW_YX,
+    FLOW_YY,
+    IN_FLOW,
     MOBILITY_I,
     MOBILITY_J,
 )
@@ -128,8 +135,28 @@ def can_meet_again(scene, work, observed, time):
     return True
 
 
+def is_carried_away(scene, work, observed, time, nx, ny, distance):
+    """Whether a flow alone draws the bodies apart, beyond where their outlines reach and faster
+    than attraction draws them together."""
+    outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
+    if distance < outer + observed[ESCAPE]:
+        return False
+    stretch = nx * (observed[FLOW_XX] * nx + observed[FLOW_XY] * ny)
+    stretch += ny * (observed[FLOW_YX] * nx + observed[FLOW_YY] * ny)
+    speed = stretch * distance
+    if has(scene, CENTRE_FORCE):
+        repulsion = centre_force(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I))
+        speed += min(repulsion, 0.0) * (observed[MOBILITY_I] + observed[MOBILITY_J])
+    motion = work.motion
+    rate = nx * (motion[NOW, BODY_J, VX] - motion[NOW, BODY_I, VX])
+    rate += ny * (motion[NOW, BODY_J, VY] - motion[NOW, BODY_I, VY])
+    return speed > 0.0 and rate > 0.0
+
+
 def has_departed(scene, work, observed, time, nx, ny, distance, gap):
     """Whether the bodies have parted for good; ``gap``: the least of the listed pairs [m]."""
+    if observed[IN_FLOW] != 0.0:
+        return is_carried_away(scene, work, observed, time, nx, ny, distance)
     return (
         is_parting(scene, work, observed, time, nx, ny)
         and is_away(scene, work, observed, distance, gap)

@@ -10,11 +10,11 @@ import numpy as np
 from flocsim import hooks
 from flocsim.arrays import EQUIVALENT_RADIUS, NOW, Scene, Work, work_of
 from flocsim.body import Body
+from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided, outcome_of
-from flocsim.ensembles.collision.start import largest_displacement, place_pair
-from flocsim.ensembles.config.schema import Config, SceneConfig
+from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
+from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
@@ -47,17 +47,23 @@ class Encounter:
     """Two shapes that meet: everything about them but orientation and displacement.
 
     Made once for each pair of shapes and used for all replicates that draw it. ``zone_distance``
-    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j, alone.
+    is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j, alone;
+    ``meeting`` says what brings them together (flocsim.ensembles.collision.meetings).
     """
 
     system: System
     options: SceneConfig
     zone_distance: float
+    meeting: str = SETTLING
     settling: tuple[tuple[np.ndarray, float], ...] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
+        if self.rate is not None:
+            names = [type(force).__name__ for force in self.system.forces]
+            meetings.refuse_drift(motions[1][0] - motions[0][0], -self.drift[1], names)
+            return
         if not math.hypot(*self.drift) > 0.0:
             raise UsageError(
                 "the two bodies settle at the same speed and never meet: give scene.pairs two "
@@ -74,9 +80,64 @@ class Encounter:
         return tuple(body.shape for body in self.system.bodies)
 
     @property
+    def rate(self) -> float | None:
+        """That of the flow in which the two meet [1/s], None where they settle."""
+        return None if self.meeting == SETTLING else self.options.rate
+
+    @property
     def drift(self) -> np.ndarray:
-        """Settling velocity of j relative to i (2,) [m/s]."""
+        """Settling velocity of j relative to i (2,) [m/s]; in a flow one of about the speed at
+        which they meet, its rate times r_i + r_j."""
+        if self.rate is not None:
+            size = sum(shape.equivalent_radius for shape in self.shapes)
+            return np.array([0.0, -self.rate * size])
         return self.settling[1][0] - self.settling[0][0]
+
+    @property
+    def outer(self) -> float:
+        """R_i + R_j, the largest centroid-to-outline distances [m]."""
+        return sum(shape.bounding_radius for shape in self.shapes)
+
+    @functools.cached_property
+    def pull(self) -> np.ndarray:
+        """What pair forces make of the speed of the two (2, gaps) [m/s]: meetings.speeds_of."""
+        radii, mobilities = zip(*self.yielding, strict=True)
+        system = self.system
+        return meetings.speeds_of(system.forces, system.fluid, radii, sum(mobilities))
+
+    @functools.cached_property
+    def start_gap(self) -> float:
+        """Distance of the outlines at the start [m]."""
+        if not isinstance(self.options.start_gap, str):
+            return self.options.start_gap
+        size = sum(shape.equivalent_radius for shape in self.shapes)
+        share = self.options.far
+        return meetings.far_gap(self.pull, math.hypot(*self.drift), share, size)
+
+    @functools.cached_property
+    def reach(self) -> float:
+        """How far beyond where they meet anyway attraction makes the two meet, at most [m]."""
+        return meetings.attraction_width(self.pull, math.hypot(*self.drift), 2.0 * self.outer)
+
+    @functools.cached_property
+    def far(self) -> float:
+        """Distance of the centres where they start in a flow [m]."""
+        return max(self.outer + self.start_gap, meetings.SLACK * (self.outer + self.reach))
+
+    @functools.cached_property
+    def turning(self) -> tuple[Callable[[float], float], ...]:
+        """From uniform numbers to the angles [rad] of i and j at the start in a flow."""
+        return tuple(
+            meetings.angles_by_turning(meetings.turning_rates(self.system, body))
+            for body in self.system.bodies
+        )
+
+    def orientations(self, numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
+        """Angles [rad] of i and j at the start, by a replicate's random numbers."""
+        if self.rate is None:
+            return orientations(numbers)
+        turn_i, turn_j = self.turning
+        return turn_i(float(numbers[0])), turn_j(float(numbers[1]))
 
     @property
     def turn_time(self) -> float:
@@ -98,8 +159,10 @@ class Encounter:
         """The pull on the bond of a settling doublet in its worst orientation [N].
 
         |drift|/(µ_i + µ_j); where drag is not linear, at the least mobilities up to the speed of
-        the faster one, which bounds it from above.
+        the faster one, which bounds it from above. In a flow that of meetings.flow_load.
         """
+        if self.rate is not None:
+            return meetings.flow_load(self.meeting, self.rate, self.outer, self.yielding)
         fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
         least = [
             least_mobility(self.system, body, fastest, mobility)
@@ -107,36 +170,75 @@ class Encounter:
         ]
         return math.hypot(*self.drift) / sum(least)
 
+    @property
+    def yielding(self) -> list[tuple[float, float]]:
+        """(r_eq [m], mobility [s/kg]) of i and j."""
+        pairs = zip(self.shapes, self.settling, strict=True)
+        return [(shape.equivalent_radius, mobility) for shape, (_, mobility) in pairs]
+
+    def rest_time(self) -> float:
+        """How long a doublet must rest as a rigid body to count as bound [s]."""
+        if not isinstance(self.options.rest_time, str):  # "auto"
+            return self.options.rest_time
+        if self.rate is None:
+            return REST_TURNS * self.turn_time
+        return meetings.turn_in_flow(self.meeting, self.rate, self.outer, self.yielding)
+
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
         observed = np.zeros(numbers.OBSERVED_SIZE)
-        escape = options.start_gap if options.escape_gap == "start_gap" else options.escape_gap
-        rest = REST_TURNS * self.turn_time if options.rest_time == "auto" else options.rest_time
+        given = options.escape_gap
+        escape = self.start_gap if isinstance(given, str) else given  # "start_gap"
         observed[numbers.ZONE] = self.zone_distance
         observed[numbers.ESCAPE] = escape
-        observed[numbers.REST_TIME] = rest
+        observed[numbers.REST_TIME] = self.rest_time()
         observed[numbers.DRIFT_X : numbers.DRIFT_Y + 1] = self.drift
         observed[numbers.MOBILITY_I], observed[numbers.MOBILITY_J] = self.mobilities
         observed[numbers.LOAD] = self.largest_load
+        if self.rate is not None:
+            observed[numbers.IN_FLOW] = 1.0
+            flow = slice(numbers.FLOW_XX, numbers.FLOW_YY + 1)
+            observed[flow] = self.system.fluid.gradient
         return observed
 
-    def time_limit(self) -> float:
-        """Simulated time [s] after which a replicate is undecided."""
+    def time_limit(self, share: float = 1.0) -> float:
+        """Simulated time [s] after which a replicate at δ = share · δ_max is undecided."""
         if isinstance(self.options.time_limit, str):  # "auto"
-            approach = self.options.start_gap / math.hypot(*self.drift)
+            if self.rate is not None:
+                offset = share * self.outer
+                approach = meetings.approach_time(self.meeting, self.rate, offset, self.far)
+            else:
+                approach = self.start_gap / math.hypot(*self.drift)
             return approach + LIMIT_TURNS * self.turn_time
         return self.options.time_limit
 
     def start(self, angles: Sequence[float], share: float) -> Work:
         """Work arrays of a replicate with these angles [rad] at δ = share · δ_max."""
+        if self.rate is not None:
+            return self.start_in_flow(angles, share)
         shapes = self.shapes
         largest = largest_displacement(
             self.options.delta_max, shapes[0], angles[0], shapes[1], angles[1]
         )
-        place = place_pair(shapes, angles, share * largest, self.options.start_gap)
+        place = place_pair(shapes, angles, share * largest, self.start_gap)
+        if isinstance(self.options.start_gap, str):
+            # Forces between the centres do not know how thin the outlines are.
+            clear = sum(shape.equivalent_radius for shape in shapes) + self.start_gap
+            x = float(place[1, 0])
+            place[1, 1] = max(place[1, 1], math.sqrt(max(clear * clear - x * x, 0.0)))
         velocity = np.zeros((2, 3))
         velocity[0, :2], velocity[1, :2] = self.settling[0][0], self.settling[1][0]
+        return work_of(self.scene, place, velocity)
+
+    def start_in_flow(self, angles: Sequence[float], share: float) -> Work:
+        """Work arrays where both go along with the flow, j on the way of share · (R_i + R_j)."""
+        assert self.rate is not None
+        x, y = meetings.start_in_flow(self.meeting, share * self.outer, self.far)
+        xx, xy, yx, yy = self.system.fluid.gradient
+        spin = 0.5 * (yx - xy)
+        place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
+        velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
         return work_of(self.scene, place, velocity)
 
     def begin(
@@ -149,25 +251,28 @@ class Encounter:
         """
         return Run(
             driver, self.scene, self.start(angles, share), integrator or self.system.integrator,
-            min(self.time_limit(), until), max_steps=max_steps, observed=self.observed(),
+            min(self.time_limit(share), until), max_steps=max_steps, observed=self.observed(),
             record=record,
         )  # fmt: skip
 
 
 def make_encounter(
-    config: Config, shapes: Sequence[Shape], zone: float, integrator: Integrator | None = None
-) -> Encounter:
+    config: Config, shapes: Sequence[Shape], zone: float, integrator: Integrator | None = None,
+    meeting: str = SETTLING,
+) -> Encounter:  # fmt: skip
     """The Encounter of two shapes under a config; ``zone`` is D_0 [m].
 
-    ``integrator``: instead of the config's, where a pilot has chosen it.
+    ``integrator``: instead of the config's, where a pilot has chosen it; ``meeting``: what brings
+    the two together.
     """
     bodies = [
         Body(shape, fixed=(config.scene.receiver == "fixed" and place == 0), **config.body_options)
         for place, shape in enumerate(shapes)
     ]
     method = integrator or config.integrator.method
-    system = System(bodies, config.forces, method, fluid=config.fluid)
-    return Encounter(system, config.scene, zone)
+    forces, fluid = meetings.circumstances(config.forces, config.fluid, meeting, config.scene.rate)
+    system = System(bodies, forces, method, fluid=fluid)
+    return Encounter(system, config.scene, zone, meeting)
 
 
 def replicate_system(

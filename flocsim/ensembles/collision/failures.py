@@ -12,7 +12,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
-from flocsim.ensembles.collision.start import draws, orientations
+from flocsim.ensembles.collision.start import orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
 
@@ -81,7 +81,7 @@ def run_safely(
     except MemoryError:
         raise
     except Exception as error:
-        angles = orientations(draws(study.config.seed, replicate))
+        angles = orientations(study.numbers(replicate))
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
         return failed_row("exception", angles), make_note(study, place, replicate, why)
     if row is None:

@@ -3,11 +3,13 @@
 (
     ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J, LOAD,
     COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION, BOND,
-    REST_SINCE, REST_X, REST_Y, REST_ANGLE, OBSERVED_SIZE,
-) = range(21)  # fmt: skip
-"""Columns of `observed`. Given: D_0 [m], escape gap [m], rest time [s], settling velocity of j
-relative to i [m/s], largest mobilities [s/kg], the largest load that settling can put on a bond
-[N]. Found: flags, centre distances [m], time [s], the kind of
+    REST_SINCE, REST_X, REST_Y, REST_ANGLE, IN_FLOW, FLOW_XX, FLOW_XY, FLOW_YX, FLOW_YY,
+    OBSERVED_SIZE,
+) = range(26)  # fmt: skip
+"""Columns of `observed`. Given: D_0 [m], escape gap [m], rest time [s], velocity of j relative to i
+in settling, or about that in a flow [m/s], largest mobilities [s/kg], the largest load that
+settling, or the flow, can put on a bond [N]; whether they meet in a flow alone, and its gradient
+[1/s]. Found: flags, centre distances [m], time [s], the kind of
 bond (bonds.py), and since when the doublet has been resting in which pose."""
 
 BODY_I, BODY_J = range(2)

@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
-from flocsim.ensembles.config.schema import Config, SceneConfig
+from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
 from flocsim.errors import ConfigError
 
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
@@ -28,10 +28,12 @@ Span = tuple[float, float]
 class Pairing(abc.ABC):
     """One collision type of a study: its ``name``, and ``radii`` (r_i, r_j) [m] that stand for it.
 
-    ``spans``: between which equivalent radii bodies i and j are.
+    ``spans``: between which equivalent radii bodies i and j are; ``meeting``: what brings them
+    together.
     """
 
     name: str
+    meeting: str
     radii: tuple[float, float]
     spans: tuple[Span, Span]
 
@@ -57,6 +59,7 @@ class TwoSizes(Pairing):
     name: str
     radii: tuple[float, float]
     pool: FlocPool
+    meeting: str = SETTLING
 
     @property
     def spans(self) -> tuple[Span, Span]:  # type: ignore[override]
@@ -91,6 +94,7 @@ class TwoClasses(Pairing):
     name: str
     first: SizeClass
     second: SizeClass
+    meeting: str = SETTLING
     radii: tuple[float, float] = attrs.field(init=False)
     spans: tuple[Span, Span] = attrs.field(init=False)
 
@@ -213,9 +217,12 @@ def pairings_of(
     scene = config.scene
     pool = pool or pool_of(config.shapes, flocs)
     if not scene.is_measured:
-        return tuple(TwoSizes(name, radii, pool) for name, radii in scene.given)
+        return tuple(
+            TwoSizes(name, radii, pool, scene.meeting_of(place))
+            for place, (name, radii) in enumerate(scene.given)
+        )
     classes = size_classes(scene, flocs)
     return tuple(
-        TwoClasses(name, classes[a], classes[b])
-        for name, (a, b) in zip(scene.names, scene.class_pairs, strict=True)
+        TwoClasses(name, classes[a], classes[b], scene.meeting_of(place))
+        for place, (name, (a, b)) in enumerate(zip(scene.names, scene.class_pairs, strict=True))
     )

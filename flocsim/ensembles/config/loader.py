@@ -5,6 +5,7 @@ from pathlib import Path
 
 import attrs
 
+from flocsim.ensembles.config.kernel_scene import KernelScene, kernel_problems
 from flocsim.ensembles.config.overrides import lay_over
 from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.presets import PRESETS
@@ -30,7 +31,8 @@ from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
-SCENES: dict[str, type] = {"binary": SceneConfig, "swarm": SwarmScene}
+SCENES: dict[str, type] = {"binary": SceneConfig, "swarm": SwarmScene, "kernel": KernelScene}
+PROBLEMS = {SceneConfig: contradictions, SwarmScene: swarm_problems, KernelScene: kernel_problems}
 """Kind of scene → class of the table [scene]."""
 
 
@@ -117,8 +119,7 @@ class Reader:
         forces = self.forces(table.get("forces", {}))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
         if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
-            problems = swarm_problems if scene is SwarmScene else contradictions
-            for place, text in problems(parts):
+            for place, text in PROBLEMS[scene](parts):
                 self.problems.note(place, text)
         return parts
 

@@ -7,6 +7,7 @@ import inspect
 import re
 
 from flocsim.ensembles.config import presets
+from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, STUDY_KEYS, TABLES, keys_of
 from flocsim.ensembles.config.swarm_scene import SwarmScene
@@ -74,7 +75,8 @@ def schema_page() -> str:
     tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
     for name, table_class in tables.items():
         parts += [f"## [{name}]\n", about(table_class, name), key_table(keys_of(table_class))]
-    parts.insert(place_of_shapes(parts), swarm_section())
+    for kind, scene in (("a swarm", SwarmScene), ("a kernel study", KernelScene)):
+        parts.insert(place_of_shapes(parts), scene_section(kind, scene))
     parts += [OWN_CLASSES, "## Presets\n", about(presets, ""), preset_table()]
     return "\n".join(parts)
 
@@ -83,10 +85,9 @@ def place_of_shapes(parts):
     return parts.index("## [shapes]\n")
 
 
-def swarm_section():
-    """The keys of [scene] where it is a swarm."""
-    keys = key_table(keys_of(SwarmScene))
-    return f"## [scene] of a swarm\n\n{about(SwarmScene, 'scene')}\n{keys}"
+def scene_section(kind, scene):
+    """The keys of [scene] where it is of another kind."""
+    return f"## [scene] of {kind}\n\n{about(scene, 'scene')}\n{key_table(keys_of(scene))}"
 
 
 def about(documented, name):

@@ -72,6 +72,25 @@ def of_measured(value: Any) -> Any:
     return attrs.Factory(lambda self: value if self.pairs == MEASURED else None, takes_self=True)
 
 
+SETTLING, SHEAR, EXTENSION = MEETINGS = ("settling", "shear", "extension")
+"""What brings two bodies together: their weight, or a flow u = (G y, 0) or u = (s x, −s y)."""
+
+
+def check_rate(meetings: Collection[str], rate: float | None) -> None:
+    """ConfigError where a flow has no rate, or a rate no flow."""
+    flows = [each for each in meetings if each != SETTLING]
+    if flows and rate is None:
+        raise ConfigError(
+            f'meeting = "{flows[0]}" needs rate, how fast the flow shears or stretches, as in '
+            'rate = "10 1/s"'
+        )
+    if rate is not None and not flows:
+        raise ConfigError(
+            'rate is that of a flow, but meeting is "settling": give meeting = "shear" or '
+            '"extension", or remove rate'
+        )
+
+
 @attrs.frozen
 class SceneConfig:
     """[scene]: who meets whom, and how the meeting begins and ends."""
@@ -79,7 +98,18 @@ class SceneConfig:
     kind: str = choice(
         "binary",
         default="binary",
-        help='encounters of two bodies; "swarm": many bodies in a box, with keys of its own below',
+        help='encounters of two bodies; "swarm": many bodies in a box, "kernel": rates of '
+        "encounters, with keys of their own below",
+    )
+    meeting: str = choice(
+        *MEETINGS,
+        default=SETTLING,
+        help="what brings the two together: settling, the faster from above; or a flow alone, "
+        "their weight left out: shear, u = (G y, 0), or extension, u = (s x, -s y), in which δ is "
+        "how near the centres would come to each other, as a share of R_i + R_j",
+    )
+    rate: float | None = quantity(
+        "1/s", above=0.0, default=None, help="G or s of a flow in which they meet"
     )
     pairs: tuple[tuple[float, float], ...] | str | None = read_by(
         word_or(
@@ -195,6 +225,12 @@ class SceneConfig:
     )
 
     def __attrs_post_init__(self):
+        check_rate(self.meetings, self.rate)
+        if self.meetings != (SETTLING,) and self.receiver == "fixed":
+            raise ConfigError(
+                'receiver = "fixed" goes with meeting = "settling": a body that is held in a flow '
+                "is met by others, and otherwise, than one that drifts with it"
+            )
         if not self.is_measured:
             for field in attrs.fields(type(self)):
                 given = getattr(self, field.name)
@@ -218,6 +254,15 @@ class SceneConfig:
         count = len(self.class_labels)
         if count > MOST_CLASSES:
             raise ConfigError(f"classes may be {MOST_CLASSES} at most, found {count}")
+
+    @property
+    def meetings(self) -> tuple[str, ...]:
+        """All that brings bodies together in this scene, of MEETINGS."""
+        return (self.meeting,)
+
+    def meeting_of(self, place: int) -> str:
+        """What brings the bodies of the collision type at a place of `names` together."""
+        return self.meeting
 
     @property
     def is_measured(self) -> bool:
@@ -627,6 +672,11 @@ class Config:
         return bool(self.scene.kind == "swarm")
 
     @property
+    def is_kernel(self) -> bool:
+        """Whether the scene is a KernelScene, and the study one of rates of encounters."""
+        return bool(self.scene.kind == "kernel")
+
+    @property
     def body_options(self) -> dict[str, Any]:
         """The bodies' weight as keyword arguments of flocsim.body.Body."""
         if self.bodies.density is None:
@@ -689,11 +739,18 @@ def excluded_by(table: str, given: Collection[str]) -> set[str]:
 def implied(table: Mapping[str, Any]) -> dict[str, Any]:
     """Values that follow from others of a config's nested dicts, where they are not given."""
     scene, shapes = (table.get(name) for name in ("scene", "shapes"))
+    found: dict[str, Any] = {}
+    if isinstance(scene, Mapping) and scene.get("kind") == "kernel":
+        found["replicates"] = KERNEL_REPLICATES
     if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
-        return {}
+        return found
     if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
-        return {}
-    return {"shapes": {"size": "own"}}
+        return found
+    return found | {"shapes": {"size": "own"}}
+
+
+KERNEL_REPLICATES = 4096
+"""Of every condition of a kernel study where nothing is said."""
 
 
 def contradictions(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -702,8 +759,22 @@ def contradictions(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], 
     ``parts``: the tables of a config by name.
     """
     yield from weight_contradictions(parts["bodies"], parts["fluid"])
+    yield from flow_contradictions(parts["scene"], parts["fluid"])
     if parts["scene"].is_measured:
         yield from measured_contradictions(parts["shapes"])
+
+
+def flow_contradictions(scene: SceneConfig, fluid: Fluid) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What of [fluid] does not go with bodies that meet in a flow of their own."""
+    if scene.meetings == (SETTLING,) and scene.kind == "binary":
+        return
+    text = (
+        "is another flow than that of scene.meeting, along which bodies come from afar; in a flow "
+        "that turns faster than it strains all ways are closed, and none do: leave it out"
+    )
+    for name in ("velocity", "gradient"):
+        if any(getattr(fluid, name)):
+            yield ("fluid", name), text
 
 
 def measured_contradictions(shapes: ShapesConfig) -> Iterator[tuple[tuple[str, ...], str]]:

@@ -22,6 +22,7 @@ import attrs
 
 from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.schema import METHODS, Config
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.pilot.ladder import (
     DECADES,
     REFERENCE,
@@ -395,7 +396,7 @@ def final_methods(config: Config) -> dict[str, Integrator]:
     """The methods that a study of the config has, a pilot run here where it is to choose them."""
     if not config.integrator.is_chosen:
         return first_methods(config)
-    return choose(Study(config, flocs_of(config), first_methods(config))).methods
+    return choose(study_of(config, flocs_of(config), first_methods(config))).methods
 
 
 def choice_lines(record: dict) -> list[str]:

@@ -18,7 +18,6 @@ import numpy as np
 from flocsim.ensembles.collision.checking import count_checks
 from flocsim.ensembles.collision.encounter import Encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILED
-from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
 from flocsim.ensembles.study import Study
@@ -130,13 +129,14 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
             setup = clock() - began
             began = clock()
         steps = study.config.integrator.max_steps
-        row = run_encounter(encounter, driver, angles, task.delta, steps) or {}
+        share = study.share_of(encounter, task.delta, task.replicate)
+        row = run_encounter(encounter, driver, angles, share, steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])
         first = clock() - began
         exact = study.exact[study.config.scene.names[task.condition]]
         if again and exact is not None:
             began = clock()
-            found = study.run_again(encounter, angles, task.delta, exact, None) or {}
+            found = study.run_again(encounter, angles, share, exact, None) or {}
             second = clock() - began
             flipped = (found["checked_outcome"], found["checked_inside"]) != (outcome, inside)
     except MemoryError:
@@ -169,7 +169,7 @@ def pairs_made(study: Study, ranks: int) -> float:
     """How many pairs of flocs the study makes ready, on all ranks together."""
     config = study.config
     count = expected_replicates(config.replicates, config.stop)
-    numbers = [draws(config.seed, k) for k in range(min(count, 1000))]
+    numbers = [study.numbers(k) for k in range(min(count, 1000))]
     total = 0
     for condition in range(len(config.scene.names)):
         for vertices in config.shapes.vertices:

@@ -88,6 +88,7 @@ def trial(study: Study, job: Job) -> Trial:
     try:
         encounter, angles = study.drawn(condition, vertices, replicate)
         driver = study.driver(encounter, job.integrator)
+        share = study.share_of(encounter, share, replicate)
         run = encounter.begin(
             driver, angles, share, job.max_steps, integrator=job.integrator
         )  # fmt: skip

@@ -169,7 +169,8 @@ def one_without(study, encounter, angles, drivers, run):
     began = time.process_time()
     try:
         driver = drivers[encounter.system.spheres_only]
-        row = run_encounter(encounter, driver, angles, run.task.delta, steps) or {}
+        share = study.share_of(encounter, run.task.delta, run.task.replicate)
+        row = run_encounter(encounter, driver, angles, share, steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])
     except MemoryError:
         raise

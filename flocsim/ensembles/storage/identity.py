@@ -19,6 +19,7 @@ import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.encounter import OBSERVER
+from flocsim.ensembles.config.schema import SETTLING
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import point_columns
@@ -27,7 +28,7 @@ from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
 
-VARIABLE = {"scene": {"types", "pairs", "delta"}, "shapes": {"vertices", "file", "own"}}
+VARIABLE = {"scene": {"types", "pairs", "delta", "sizes"}, "shapes": {"vertices", "file", "own"}}
 """Keys that choose rows, but change none."""
 
 PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
@@ -37,7 +38,7 @@ PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
     "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler",
     "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
-    "ensembles/collision", "ensembles/study.py",
+    "ensembles/collision", "ensembles/study.py", "ensembles/kernels",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
 makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py holds this
@@ -61,7 +62,7 @@ def identity_of(study: Study) -> dict:
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
         facts |= settings(f"forces.{name}", force)
-    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study)
+    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
     return json.loads(json.dumps(facts))
 
 
@@ -178,8 +179,18 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 def kernel_facts(study):
     """Fingerprints of the code that is compiled for spheres and for polygons, by every method."""
     config = study.config
-    _, pair = next(sphere_pairs(config, study.flocs))
-    facts = {}
+    meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
+    pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
+    return {
+        name: fact
+        for place in sorted(meetings.values())
+        for name, fact in facts_of_code(study, pairs[place]).items()
+    }
+
+
+def facts_of_code(study, pair):
+    """The same for what the types compile that meet as this pair of spheres does."""
+    config, facts = study.config, {}
     methods = {type(each): each for each in study.methods.values()}.values()
     wanted = [*kinds(config, pair.shapes)]
     several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
@@ -191,6 +202,8 @@ def kernel_facts(study):
             name = "polygons with holes, or of parts"
         if config.integrator.is_chosen:
             name += f" by {type(method).__name__}"
+        if pair.meeting != SETTLING:
+            name += f" in {pair.meeting}"
         laws = sorted(system.pieces.laws.items())
         codes = [fingerprint(advance, system.fillings(OBSERVER))]
         codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]

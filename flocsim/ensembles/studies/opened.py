@@ -61,7 +61,8 @@ class StudyResults:
 
     ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
     ``probabilities``, ``pooled`` and ``differences`` {name: array} its tables, ``replicates`` the
-    same of every single collision, read when asked for; ``run`` where it came from.
+    same of every single collision, read when asked for; ``kernel`` the rates of a kernel study,
+    None in others; ``run`` where it came from.
     """
 
     def __init__(self, results: Results, path: Path, folder: Path) -> None:
@@ -69,7 +70,7 @@ class StudyResults:
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
-        self.differences = results.differences
+        self.differences, self.kernel = results.differences, results.kernel
         self.studies: dict[int, Study] = {}
 
     @functools.cached_property

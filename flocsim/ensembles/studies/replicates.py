@@ -10,6 +10,7 @@ from flocsim.arrays import UNTIL
 from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -53,7 +54,8 @@ def one_count_study(
     config: Config, vertex_count: int, methods: dict[str, Integrator] | None = None
 ) -> Study:
     """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
-    return Study(with_one_count(config, vertex_count), methods=methods or final_methods(config))
+    one, methods = with_one_count(config, vertex_count), methods or final_methods(config)
+    return study_of(one, methods=methods)
 
 
 def recorded_methods(record: dict) -> dict[str, Integrator] | None:
@@ -72,10 +74,11 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     assert row is not None and record.run is not None and record.status is not None
     encounter, angles = study.drawn(*place[:2], int(replicate))
     driver, max_steps = study.driver(encounter), study.config.integrator.max_steps
+    share = study.share_of(encounter, place[2], int(replicate))
     system, run = encounter.system, record.run
 
     def fresh() -> Run:
-        return encounter.begin(driver, angles, place[2], max_steps)
+        return encounter.begin(driver, angles, share, max_steps)
 
     legs = ((run.steps, float(run.clock[UNTIL])),)
     origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)

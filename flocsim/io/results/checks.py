@@ -7,6 +7,7 @@ import numpy as np
 
 from flocsim.io.hdf5.expected import Column, hold_against
 from flocsim.io.hdf5.structure import Node
+from flocsim.io.results.kernel_group import expected_kernel
 from flocsim.io.results.schema import (
     AGGREGATED,
     AXES,
@@ -29,7 +30,7 @@ TYPE, VERTICES, DELTA = (Column(kind, (axis,)) for kind, axis in zip(
     ("text", "i8", "f8"), AXES, strict=True))  # fmt: skip
 SIZES = {name: Column(kind, ("type",)) for name, (kind, _, _) in RADII.items()}
 STUDY = {"type": TYPE, "vertices": VERTICES, "delta": DELTA}
-OPTIONAL = ("pooled", "differences", "flocs")
+OPTIONAL = ("pooled", "differences", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
 RUN_TYPES = ("text", "i8", "f8")
 FAILED = OUTCOMES.index("failed")
@@ -63,6 +64,7 @@ def check_structure(nodes: Mapping[str, Node]) -> None:
         | {"against": Column("text", (len(AXES),)), "event": Column("text", (len(EVENTS),))},
         "replicates": columns_of(REPLICATES, (*AXES, "replicate"))
         | STUDY | {"replicate": Column("i8", ("replicate",))},
+        "kernel": expected_kernel(),
         "flocs": {"floc": Column("text", ("floc",))},
         "run": run,
     }  # fmt: skip

@@ -6,6 +6,7 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``probabilities``  (type, vertices, delta[, class or bond]): counts, probabilities, bounds
 - ``pooled``         (type, vertices): probabilities over all displacements
 - ``differences``    (against, event, type, vertices, delta): between conditions, replicates paired
+- ``kernel``         (mechanism, vertices, i, j): rates of a kernel study (`kernel_group`)
 - ``replicates``     (type, vertices, delta, replicate): what became of every single collision
 - ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
 - ``run``            scalars: config text, versions, machine, wall times
@@ -34,6 +35,7 @@ from flocsim.io.results.checks import (
     check_structure,
     check_tables,
 )
+from flocsim.io.results.kernel_group import read_kernel
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
 from flocsim.io.results.row_file import ROWS, new_row_file
 from flocsim.io.results.schema import (
@@ -121,6 +123,7 @@ def results_in(file, replicates):
         differences=read_group(file, "differences", DIFFERENCES),
         count=len(rows["replicate"]),
         radii={name: table[name][()] for name in RADII},
+        kernel=read_kernel(file),
     )
     check_tables(results)
     if results.replicates is not None:

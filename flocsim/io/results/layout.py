@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.io.results.kernel_group import write_kernel
 from flocsim.io.results.schema import (
     AXES,
     COORDINATES,
@@ -108,6 +109,8 @@ def frame_of(results: Results) -> Frame:
             axes = ("against", "event", *AXES)
             more = {"against": list(AXES), "event": list(EVENTS)}
             write_group(file, "differences", results.differences, DIFFERENCES, axes, study | more)
+        if results.kernel is not None:
+            write_kernel(file, results.kernel)
         if results.flocs:
             write_coordinate(file.create_group("flocs"), "floc", list(results.flocs))
         frame.streams = reserve_replicates(file, study, results)

@@ -4,6 +4,7 @@ Write it anew with `python -m flocsim.io.results.page > docs/results.md`.
 """
 
 from flocsim.io.markdown import markdown_table
+from flocsim.io.results.kernel_group import KERNEL
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import (
     COORDINATES,
@@ -57,6 +58,14 @@ GROUPS = (
      "replicate has its own, the same at all N and δ; so has δ_max, which follows from the two "
      "outlines and angles.", REPLICATES),
 )  # fmt: skip
+
+KERNEL_TEXT = """\
+(mechanism, vertices, i, j): rates of a kernel study alone ([kernels.md](kernels.md)), the same for
+(i, j) and (j, i). `_low` and `_high` bound the 95 % interval of independent scrambles, `_numerical`
+is the 95 % bound of what numerics change. Beside it stand `r_eq` [m] along `i`, and the coordinates
+`mechanism`, `vertices`, `i` and `j`. In such a file `delta` is 1: every replicate has an offset of
+its own.
+"""
 
 EFFICIENCY = """\
 ## The efficiency over the displacements
@@ -129,6 +138,7 @@ def results_page() -> str:
     parts = [INTRODUCTION]
     for name, text, schema in GROUPS:
         parts += [f"## {name}\n", f"{text}\n", table(schema)]
+    parts += ["## kernel\n", KERNEL_TEXT, table(KERNEL)]
     return "\n".join(
         [*parts, NUMERICAL + EFFICIENCY + "\n" + RUN, "## Coordinates\n", coordinates()]
     )

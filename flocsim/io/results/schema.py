@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.io.results.kernel_group import Kernel
 
 OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
 """Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone;
@@ -203,7 +204,7 @@ class Results:
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
     event, type, vertices, delta), or nothing; ``radii`` {r_i, r_j: (type,)} [m] those of `RADII`,
-    NaN where they are not known.
+    NaN where they are not known; ``kernel`` the rates of a kernel study, None in others.
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
 
@@ -224,6 +225,7 @@ class Results:
             takes_self=True,
         )
     )
+    kernel: Kernel | None = None
 
     def __attrs_post_init__(self):
         shape = self.shape

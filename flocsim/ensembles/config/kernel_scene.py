@@ -1,0 +1,207 @@
+"""[scene] kind = "kernel": rates of encounters, of size classes by size classes."""
+
+import itertools
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import attrs
+
+from flocsim.ensembles.config.schema import (
+    KERNEL_REPLICATES,
+    LARGEST_LENGTH,
+    MEASURED,
+    MEETINGS,
+    MOST_CLASSES,
+    SETTLING,
+    SceneConfig,
+    contradictions,
+    micrometres,
+)
+from flocsim.ensembles.config.values import (
+    list_of,
+    number,
+    one_of,
+    read_by,
+    whole_field,
+)
+from flocsim.errors import ConfigError
+from flocsim.fields import choice, number_range, quantity, word_or_quantity
+
+MOST_SCRAMBLES = 64
+
+read_meeting = one_of(MEETINGS)
+read_meetings = list_of(read_meeting, "one of, or a list of, 'settling', 'shear', 'extension'")
+
+
+def read_meeting_or_list(value: Any) -> tuple[str, ...]:
+    """One mechanism or a list of them, as a tuple."""
+    return (read_meeting(value),) if isinstance(value, str) else read_meetings(value)
+
+
+def as_tuple(value: Any) -> tuple[str, ...]:
+    """One word as a tuple of it."""
+    return (value,) if isinstance(value, str) else tuple(value)
+
+
+def inherited(name: str) -> Any:
+    """A field of SceneConfig whose default follows from one that is defined anew before it."""
+    field = attrs.fields_dict(SceneConfig)[name]
+    return attrs.field(default=field.default, validator=field.validator, metadata=field.metadata)
+
+
+def fixed(value: Any) -> Any:
+    """A field of SceneConfig that is no key here."""
+    return attrs.field(init=False, default=value)
+
+
+@attrs.frozen
+class KernelScene(SceneConfig):
+    """With `kind = "kernel"`: what brings bodies of which sizes together, how their orientations
+    and offsets are sampled, and how their meetings begin and end."""
+
+    kind: str = choice("kernel", default="kernel", help="rates of encounters")
+    meeting: tuple[str, ...] = attrs.field(  # type: ignore[assignment]
+        default=(SETTLING,),
+        converter=as_tuple,
+        metadata={
+            "read": read_meeting_or_list,
+            "allowed": '"settling", "shear" or "extension", or a list of them',
+            "shown": '"settling"',
+            "help": "mechanisms that bring bodies together, each by itself: weight alone, or a "
+            "flow alone, u = (G y, 0) or u = (s x, -s y), without weight",
+        },
+    )
+    sizes: tuple[float, ...] | None = read_by(
+        list_of(
+            number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH)),
+            "a list of radii such as ['5 um', '10 um']",
+        ),
+        "a list of ascending radii, each above 0 and at most 0.01",
+        default=None,
+        unit="m",
+        help='equivalent radii of the size classes; without it, pairs = "measured"',
+    )
+    pairs: str | None = choice(
+        MEASURED,
+        default=None,
+        help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
+    )
+    weight: str | None = inherited("weight")
+    classes: int | tuple[float, ...] | None = inherited("classes")
+    types: None = fixed(None)
+    delta: tuple[float, ...] = fixed((1.0,))
+    delta_max: str = fixed("radius")
+    receiver: str = fixed("free")
+    start_gap: float | str = word_or_quantity(  # type: ignore[assignment]
+        "auto",
+        "m",
+        above=0.0,
+        at_most=LARGEST_LENGTH,
+        default="auto",
+        help="distance of the outlines at the start; auto: where what acts between them has become "
+        "`far`",
+    )
+    far: float = quantity(
+        "",
+        above=0.0,
+        at_most=0.1,
+        default=1e-3,
+        help="share of the speed at which they meet that the forces between them may make at an "
+        "automatic start",
+    )
+    scrambles: int = whole_field(
+        2,
+        MOST_SCRAMBLES,
+        default=8,
+        help="independent scrambles of the Sobol sequence among which the replicates are divided, "
+        "from whose scatter the intervals follow; replicates = scrambles times a power of 2",
+    )
+
+    def __attrs_post_init__(self):
+        if not set(self.meeting) <= set(MEETINGS):
+            raise ConfigError(f"meeting must be of {', '.join(MEETINGS)}")
+        if (self.sizes is None) == (self.pairs is None):
+            found = "neither" if self.sizes is None else "both"
+            raise ConfigError(
+                f'needs sizes, the radii of size classes, or pairs = "measured", found {found}'
+            )
+        if list(self.sizes or ()) != sorted(self.sizes or ()):
+            raise ConfigError("sizes must be ascending radii")
+        if len(self.sizes or ()) > MOST_CLASSES:
+            raise ConfigError(f"sizes may be {MOST_CLASSES} at most, found {len(self.sizes)}")
+        if self.sizes and len(self.sizes) == 1 and SETTLING in self.meeting:
+            raise ConfigError(
+                "bodies of one size settle alike and never meet: give several sizes, or a meeting "
+                "in shear or extension"
+            )
+        super().__attrs_post_init__()
+
+    @property
+    def meetings(self) -> tuple[str, ...]:
+        """The mechanisms."""
+        return self.meeting
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The names of the size classes, the smallest first."""
+        if self.sizes is None:
+            return self.class_labels
+        return tuple(f"{micrometres(each)}um" for each in self.sizes)
+
+    @property
+    def conditions(self) -> tuple[tuple[int, int, int], ...]:
+        """(place of the mechanism, of class i, of class j) of every collision type, in order.
+
+        Class i is not above class j. Bodies of one size do not meet by settling.
+        """
+        places = range(len(self.labels))
+        return tuple(
+            (place, i, j)
+            for place, meeting in enumerate(self.meeting)
+            for i, j in itertools.combinations_with_replacement(places, 2)
+            if i != j or meeting != SETTLING or self.is_measured
+        )
+
+    def meeting_of(self, place: int) -> str:
+        """The mechanism of the collision type at a place of `names`."""
+        return self.meeting[self.conditions[place][0]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name of every collision type: "settling:5um-10um"."""
+        labels = self.labels
+        return tuple(f"{self.meeting[m]}:{labels[i]}-{labels[j]}" for m, i, j in self.conditions)
+
+    @property
+    def given(self) -> tuple[tuple[str, tuple[float, float]], ...]:
+        """(name, (r_i, r_j) [m]) of every collision type of given sizes."""
+        if self.sizes is None:
+            return ()
+        pairs = [(self.sizes[i], self.sizes[j]) for _, i, j in self.conditions]
+        return tuple(zip(self.names, pairs, strict=True))
+
+    @property
+    def class_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Places of the two size classes of every collision type."""
+        return tuple((i, j) for _, i, j in self.conditions)
+
+    def only(self, places: Any) -> "KernelScene":
+        """The scene as it is: its classes stay together."""
+        return self
+
+
+def kernel_problems(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """(place, what is wrong) of what does not go together in a study of rates."""
+    yield from contradictions(parts)
+    scene, replicates = parts["scene"], parts.get("replicates", KERNEL_REPLICATES)
+    points, rest = divmod(replicates, scene.scrambles)
+    if rest or points < 1 or points & (points - 1):
+        least = scene.scrambles << (max(points, 1).bit_length() - 1)
+        text = (
+            f"must be scene.scrambles = {scene.scrambles} times a power of 2, as Sobol's points "
+            f"are even only so: found {replicates}, take {least} or {2 * least}"
+        )
+        yield ("replicates",), text
+    if parts["stop"] is not None and parts["stop"].half_width is not None:
+        text = "is for probabilities, and a study of rates runs all its points: "
+        yield ("stop", "half_width"), text + "give more replicates and --resume instead"

@@ -1,0 +1,323 @@
+"""From the points of a kernel study to capture widths, kernels and efficiencies.
+
+With χ_X(b) whether an encounter at an offset b comes to X (touched, inside, aggregated), ⟨⟩ the
+mean over orientations and flocs, and over both signs of b, as flocs are chiral:
+
+- settling at |Δw|: W_X = ⟨∫ χ_X db⟩, β₂ = ⟨|Δw| ∫ χ db⟩, β₃ = ⟨|Δw| π ∫ |b| χ db⟩;
+- shear of rate G: β₂ = G ⟨∫ |b| χ db⟩, β₃ = 2 G ⟨∫ b² χ db⟩;
+- extension of rate s: β₂ = 2 s ⟨∫ |b| χ db⟩, β₃ = 4 s ⟨∫ b² χ db⟩.
+
+In a flow the width is that of spheres which would capture as much: β₂ = G (W/2)² or 2 s (W/2)². β₃
+is a closure: it takes what the plane shows at |b| for what a ring of that radius would do, which is
+exact for spheres without forces, where β₃ is π R² |Δw|, 4/3 G R³ and 8/3 s R³, and an assumption
+for shapes (they lie in the plane) and for forces in a flow.
+
+Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all
+points agree, it is Wilson's at their number. What numerics do is bounded by the share of points
+that flip where run again (`estimates.numerical`), times the largest weight of a point.
+"""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.config.schema import SETTLING, SHEAR
+from flocsim.ensembles.kernels.sampling import as_draws, points_of
+from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.io.confidence import numerical_error, wilson
+from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
+from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
+
+BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
+UNKNOWN = [OUTCOMES.index(name) for name in ("undecided", "failed")]
+COLUMNS = ("outcome", "inside", "checked_outcome", "checked_inside", "floc_i", "floc_j")
+EDGE = 0.1
+"""Outermost share of the offsets that are there for attraction alone."""
+
+
+@attrs.frozen(eq=False)
+class Weighted:
+    """The points of a condition: ``width`` [m], ``plane`` [m²/s] and ``space`` [m³/s], what each
+    counts for where χ is 1; ``reference`` (2, n) the same of spheres' kernels in plane and space;
+    ``speed`` [m/s]; whether a point is at the ``edge``."""
+
+    width: np.ndarray
+    plane: np.ndarray
+    space: np.ndarray
+    reference: np.ndarray
+    speed: np.ndarray
+    edge: np.ndarray
+
+
+def weights_of(
+    encounter: Encounter, angles: np.ndarray, numbers: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """The fields of Weighted for points of one encounter; ``angles`` (2, n), ``numbers`` (n,)."""
+    low, high = bounds_of(encounter, angles[0], angles[1])
+    signed = offsets_of(encounter, angles[0], angles[1], numbers)
+    offset = np.abs(signed)
+    size = sum(shape.equivalent_radius for shape in encounter.shapes)
+    speed = math.hypot(*encounter.drift)
+    ones = np.ones(len(numbers))
+    if encounter.meeting == SETTLING:
+        width = high - low
+        plane, space = speed * width, speed * width * math.pi * offset
+        spheres = 2.0 * size * speed, math.pi * size * size * speed
+    else:
+        assert encounter.rate is not None
+        factor = encounter.rate * (1.0 if encounter.meeting == SHEAR else 2.0)
+        width = np.full(len(numbers), np.nan)
+        plane = factor * high * high
+        space = 2.0 * plane * offset
+        spheres = factor * size * size, 4.0 / 3.0 * factor * size**3
+    rim = EDGE * encounter.reach
+    edge = (encounter.reach > 0.0) & ((signed < low + rim) | (signed > high - rim))
+    return width, plane, space, np.outer(spheres, ones), speed * ones, edge
+
+
+def weighted(
+    study: KernelStudy, place: tuple[int, int], rows: dict[str, np.ndarray], points: np.ndarray
+) -> Weighted:
+    """The Weighted points of a condition: place of the collision type, N."""
+    condition, vertices = place
+    draws = np.array([as_draws(each) for each in points])
+    flocs = np.stack([rows["floc_i"], rows["floc_j"]], axis=1).astype(int)
+    for k in np.flatnonzero(flocs.min(axis=1) < 0).tolist():
+        # A sphere, or a replicate that has failed before it had its flocs.
+        flocs[k] = study.choose_flocs(condition, vertices, draws[k])
+    found: list[np.ndarray] = []
+    pairs, which = np.unique(flocs, axis=0, return_inverse=True)
+    for number in range(len(pairs)):
+        mine = np.flatnonzero(which.reshape(-1) == number)
+        encounter = study.encounter(condition, vertices, draws[mine[0]])
+        angles = np.array([encounter.orientations(each) for each in draws[mine]]).T
+        parts = weights_of(encounter, angles, draws[mine, 4])
+        if not found:
+            found = [np.zeros((*np.shape(part)[:-1], len(points)), part.dtype) for part in parts]
+        for all_of_them, part in zip(found, parts, strict=True):
+            all_of_them[..., mine] = part
+    return Weighted(*found)
+
+
+def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
+    """{c, inside, a: χ (n,)} of codes as in the results file."""
+    return {
+        "c": inside != NOT_APPLICABLE,
+        "inside": inside == 1,
+        "a": np.isin(outcome, BOUND),
+    }
+
+
+def student(scrambles: int) -> float:
+    """Half the width of a 95 % interval over the standard error of so many means."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(scrambles - 1, 0.975))
+
+
+def half_width(values: np.ndarray, point: float) -> float:
+    """Of the 95 % interval of the mean of what scrambles gave (S,), to which one point of a
+    scramble adds ``point``.
+
+    Even points in a simple set are as many in every scramble, up to one: their scatter is taken for
+    half a point at least.
+    """
+    scatter = max(float(values.std(ddof=1)), 0.5 * point)
+    return student(len(values)) * scatter / math.sqrt(len(values))
+
+
+def mean_of(
+    values: np.ndarray, agree: tuple[bool, float], point: float = 0.0
+) -> tuple[float, float, float]:
+    """(mean, low, high) of what scrambles gave (S,); ``agree``: whether all points agree, and how
+    much of the sampled mean that bounds; ``point``: see half_width."""
+    mean = float(values.mean())
+    half = half_width(values, 0.0 if agree[0] else point)
+    all_agree, unseen = agree
+    low, high = max(mean - half, 0.0), mean + half
+    if all_agree and mean == 0.0:
+        return mean, 0.0, unseen
+    return mean, min(low, mean * (1.0 - unseen)) if all_agree else low, high
+
+
+def ratio_of(
+    above: np.ndarray, below: np.ndarray, point: float = 0.0
+) -> tuple[float, float, float]:
+    """(ratio, low, high) of the means of two numbers that each scramble gave; ``point``: see
+    half_width, of the first."""
+    mean = float(below.mean())
+    if not mean > 0.0:
+        return math.nan, math.nan, math.nan
+    ratio = float(above.mean()) / mean
+    half = half_width(above - ratio * below, point) / mean
+    return ratio, max(ratio - half, 0.0), ratio + half
+
+
+def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, float]:
+    """(low, high) of an efficiency (value, low, high), at least Wilson's where all encounters that
+    touched, or none of them, aggregated."""
+    _, low, high = ends
+    if touched and bound in (0, touched):
+        least, most = (float(end) for end in wilson(bound, touched))
+        return min(low, least), max(high, most)
+    return low, high
+
+
+@attrs.define(eq=False)
+class Estimated:
+    """The numbers of one condition, but for what numerics do: ``values`` {name: number},
+    ``flipped`` {X: how many}, ``checked`` and ``trials``; ``largest`` {name: how much a point
+    that flips changes the estimate, over the share of those that do}."""
+
+    values: dict[str, float]
+    flipped: dict[str, int]
+    checked: int
+    trials: int
+    largest: dict[str, float]
+
+
+def flow_width(plane: float, factor: float) -> float:
+    """2 √(β₂/factor) [m]: the width of spheres that capture as much."""
+    return 2.0 * math.sqrt(max(plane, 0.0) / factor)
+
+
+def estimate(
+    points: Weighted, rows: dict[str, np.ndarray], meeting: str, rate: float | None, scrambles: int
+) -> Estimated:
+    """What the points of a condition come to."""
+    chi = became(rows["outcome"], rows["inside"])
+    n = len(points.plane)
+    checked = rows["checked_outcome"] != NOT_APPLICABLE
+    again = became(rows["checked_outcome"], rows["checked_inside"])
+    flipped = {name: int(np.sum(checked & (chi[name] != again[name]))) for name in WHAT}
+
+    def parts(values: np.ndarray) -> np.ndarray:
+        """The means of the scrambles, which replicates belong to in turn."""
+        return values.reshape(-1, scrambles).mean(axis=0)
+
+    values: dict[str, float] = {}
+    largest: dict[str, float] = {}
+    by_scramble: dict[str, np.ndarray] = {}
+    high_share = float(wilson(0, n)[1])
+    columns = {
+        "beta2_c": (points.plane, "c"), "beta2": (points.plane, "a"),
+        "beta3_c": (points.space, "c"), "beta3": (points.space, "a"),
+    } | {f"width_{name}": (points.width, name) for name in WHAT}  # fmt: skip
+    for name, (weight, what) in columns.items():
+        flow = name.startswith("width") and meeting != SETTLING
+        weight = points.plane if flow else weight
+        agrees = bool(chi[what].all() or not chi[what].any())
+        unseen = high_share * (1.0 if chi[what].any() else float(weight.mean()))
+        by_scramble[name] = parts(weight * chi[what])
+        point = float(weight.max()) * scrambles / n
+        ends = list(mean_of(by_scramble[name], (agrees, unseen), point))
+        most = float(weight.max())
+        if flow:
+            assert rate is not None
+            factor = rate * (1.0 if meeting == SHEAR else 2.0)
+            # As the width grows with the root of the rate, it changes by dK/(G W/2).
+            width = max(flow_width(ends[0], factor), flow_width(float(weight.mean()) / n, factor))
+            most *= 2.0 / (factor * width)
+            ends = [flow_width(each, factor) for each in ends]
+        values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
+        largest[name] = most
+    for name, (above, below) in {
+        "alpha": (by_scramble["beta2"], by_scramble["beta2_c"]),
+        "efficiency2": (by_scramble["beta2"], parts(points.reference[0])),
+        "efficiency3": (by_scramble["beta3"], parts(points.reference[1])),
+    }.items():
+        weight = points.space if name == "efficiency3" else points.plane
+        sure = name == "alpha" and np.array_equal(chi["a"], chi["c"])
+        point = 0.0 if sure else float(weight.max()) * scrambles / n
+        ends = list(ratio_of(above, below, point))
+        if name == "alpha":
+            ends[1:] = widened(ends, int(np.sum(chi["c"] & chi["a"])), int(np.sum(chi["c"])))
+        values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
+        largest[name] = float(weight.max() / below.mean()) if below.mean() > 0.0 else math.nan
+    unknown = np.isin(rows["outcome"], UNKNOWN)
+    caught = float(np.sum(points.plane * chi["a"]))
+    values |= {
+        "beta2_reference": float(points.reference[0].mean()),
+        "beta3_reference": float(points.reference[1].mean()),
+        "speed": float(points.speed.mean()),
+        "checked": float(checked.sum()),
+        "undecided": float(np.sum(points.plane * unknown) / np.sum(points.plane)),
+        "edge": float(np.sum(points.plane * chi["a"] * points.edge)) / caught if caught else 0.0,
+    }
+    for name, count in flipped.items():
+        values[f"flips_{name}"] = count / checked.sum() if checked.any() else math.nan
+    return Estimated(values, flipped, int(checked.sum()), n, largest)
+
+
+def of_what(name: str) -> Sequence[str]:
+    """Which χ an estimate follows from."""
+    if name == "alpha":
+        return ("a", "c")
+    if name.startswith("width_"):
+        return (name.removeprefix("width_"),)
+    return ("c",) if name.endswith("_c") else ("a",)
+
+
+def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> dict[tuple, dict]:
+    """{place: {name_numerical: bound}} of all conditions, by mechanism: axis 0 of the shape."""
+    bounds = {}
+    for what in WHAT:
+        counts = np.zeros((3, *shape))
+        for place, each in found.items():
+            counts[(slice(None), *place)] = each.flipped[what], each.checked, each.trials
+        bounds[what] = numerical_error(*counts)
+    told: dict[tuple, dict] = {}
+    for place, each in found.items():
+        told[place] = {}
+        for name in ESTIMATES:
+            shares = [float(bounds[what][place]) for what in of_what(name)]
+            # alpha = A/C changes by no more than (ΔA + α ΔC)/C, and α is at most 1.
+            told[place][f"{name}_numerical"] = sum(shares) * each.largest[name]
+    return told
+
+
+def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
+    """The Kernel of the first ``count`` replicates of each condition of a finished study."""
+    scene, vertices = study.scene, study.config.shapes.vertices
+    labels = scene.labels
+    shape = (len(scene.meeting), len(vertices), len(labels), len(labels))
+    points = points_of(study.config.seed, scene.scrambles, 0, count)
+    found: dict[tuple, Estimated] = {}
+    radii = np.full(len(labels), np.nan)
+    for place, (condition, n, _) in enumerate(study.places):
+        m, i, j = scene.conditions[condition]
+        known = store.known(place)
+        rows = {name: store.read(place, name, 0, count, known) for name in COLUMNS}
+        points_here = weighted(study, (condition, n), rows, points)
+        meeting = scene.meeting[m]
+        found[m, vertices.index(n), i, j] = estimate(
+            points_here, rows, meeting, scene.rate, scene.scrambles
+        )
+        if scene.sizes is None and i == j:
+            radii[i] = float(np.mean(study.pairings[condition].radii))
+    if scene.sizes is not None:
+        radii = np.array(scene.sizes)
+    numerical = numerical_parts(found, shape)
+    arrays = {name: np.full(shape, np.nan) for name in KERNEL}
+    fill_alike(arrays, scene.meeting, scene.sizes is not None)
+    for cell, each in found.items():
+        m, v, i, j = cell
+        for name, value in (each.values | numerical[cell]).items():
+            arrays[name][m, v, i, j] = arrays[name][m, v, j, i] = value
+    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays)
+
+
+def fill_alike(arrays: dict[str, np.ndarray], meetings: Sequence[str], given: bool) -> None:
+    """Bodies of one given size do not meet by settling: widths and rates are 0."""
+    if not given or SETTLING not in meetings:
+        return
+    m = meetings.index(SETTLING)
+    diagonal = np.arange(arrays["alpha"].shape[-1])
+    for name in KERNEL:
+        known = name.startswith(("width", "beta")) or name in ("speed", "checked")
+        if known:
+            arrays[name][m, :, diagonal, diagonal] = 0.0

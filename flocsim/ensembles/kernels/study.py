@@ -1,0 +1,96 @@
+"""KernelStudy: the replicates of a study of rates, and study_of, the Study of any config."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.flocs import Floc
+from flocsim.ensembles.config.kernel_scene import KernelScene
+from flocsim.ensembles.config.schema import SETTLING, Config
+from flocsim.ensembles.kernels.sampling import (
+    as_draws,
+    flow_offset,
+    point,
+    points_of,
+    settling_interval,
+)
+from flocsim.ensembles.study import Study, flocs_of
+from flocsim.integrators.base import Integrator
+
+LEAST_OFFSET = 1e-4
+"""In a flow, over the largest: what is nearer takes as long as this to come along, and the share of
+pairs that is, its square, is none."""
+
+SAMPLE = 16
+"""Points that stand for the sequence."""
+
+
+@attrs.define(eq=False)
+class KernelStudy(Study):
+    """Every replicate of a config whose scene is a KernelScene.
+
+    A replicate is a point of a scrambled Sobol sequence, the same in all conditions: orientations,
+    flocs, and the offset b of j's way from i's centre, which is share · (R_i + R_j).
+    """
+
+    @property
+    def scene(self) -> KernelScene:
+        """[scene] of the config."""
+        scene: Any = self.config.scene
+        return scene
+
+    def numbers(self, replicate: int) -> np.ndarray:
+        """The point of a replicate: two orientations, two choices of floc, the offset."""
+        return as_draws(point(self.config.seed, self.scene.scrambles, replicate))
+
+    def facts(self) -> dict[str, Any]:
+        """What rows follow from besides the config: the points themselves."""
+        first = points_of(self.config.seed, self.scene.scrambles, 0, SAMPLE * self.scene.scrambles)
+        return {"scene.points": [float(each) for each in first.sum(axis=0)]}
+
+    def share_of(self, encounter: Encounter, share: float, replicate: int) -> float:
+        """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
+        numbers = self.numbers(replicate)
+        angles = np.array(encounter.orientations(numbers))[:, None]
+        offsets = offsets_of(encounter, angles[0], angles[1], numbers[4:])
+        return float(offsets[0]) / encounter.outer
+
+
+def bounds_of(
+    encounter: Encounter, angles_i: np.ndarray, angles_j: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest offset [m] that is sampled, at many angles."""
+    shapes = encounter.shapes
+    if encounter.meeting == SETTLING:
+        least = 0.0
+        if "centre_force" in encounter.system.pieces.laws:
+            least = sum(shape.equivalent_radius for shape in shapes)
+        return settling_interval(shapes, angles_i, angles_j, encounter.reach, least)
+    largest = np.full(len(angles_i), encounter.outer + encounter.reach)
+    return -largest, largest
+
+
+def offsets_of(
+    encounter: Encounter, angles_i: np.ndarray, angles_j: np.ndarray, numbers: np.ndarray
+) -> np.ndarray:
+    """Offsets [m] at many angles and uniform numbers."""
+    low, high = bounds_of(encounter, angles_i, angles_j)
+    if encounter.meeting == SETTLING:
+        return low + numbers * (high - low)
+    offsets = flow_offset(numbers, float(high[0]))
+    least = LEAST_OFFSET * float(high[0])
+    return np.where(np.abs(offsets) < least, np.copysign(least, offsets), offsets)
+
+
+def study_of(
+    config: Config, flocs: Sequence[Floc] | None = None,
+    methods: dict[str, Integrator] | None = None,
+) -> Study:  # fmt: skip
+    """The Study of a config of binary collisions or of rates; ``flocs`` are grown or read, and
+    ``methods`` the config's, unless given."""
+    made = KernelStudy if config.is_kernel else Study
+    given: dict[str, Any] = {} if methods is None else {"methods": methods}
+    return made(config, flocs=flocs_of(config) if flocs is None else list(flocs), **given)

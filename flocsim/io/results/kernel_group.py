@@ -1,0 +1,177 @@
+"""Group `kernel` of a results file: rates of encounters by mechanism, N and two size classes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.hdf5.expected import Column as Expected
+from flocsim.io.labelled import Column, Labelled
+from flocsim.io.results.groups import write_labelled
+
+GROUP = "kernel"
+AXES = ("mechanism", "vertices", "i", "j")
+
+WHAT = {"c": "that touch", "inside": "that touch inside the zone", "a": "that aggregate"}
+"""Encounters by what becomes of them."""
+
+WIDTHS = {
+    f"width_{name}": ("f8", "m", f"capture width of encounters {words}")
+    for name, words in WHAT.items()
+}
+RATES = {
+    "beta2_c": ("f8", "m2 s-1", "kernel of encounters that touch, in the plane"),
+    "beta2": ("f8", "m2 s-1", "kernel of encounters that aggregate, in the plane"),
+    "beta3_c": ("f8", "m3 s-1", "kernel of encounters that touch, closed for three dimensions"),
+    "beta3": ("f8", "m3 s-1", "kernel of encounters that aggregate, closed for three dimensions"),
+}
+EFFICIENCIES = {
+    "alpha": (
+        "f8",
+        "1",
+        "efficiency: encounters that aggregate, of those that touch, in the plane",
+    ),
+    "efficiency2": ("f8", "1", "beta2 over beta2_reference"),
+    "efficiency3": ("f8", "1", "beta3 over beta3_reference"),
+}
+ESTIMATES = WIDTHS | RATES | EFFICIENCIES
+BOUNDS = {
+    "": "",
+    "_low": ", lower 95 % bound",
+    "_high": ", upper 95 % bound",
+    "_numerical": ", by how much numerics change it: 95 % bound",
+}
+FLIPS = {
+    f"flips_{name}": ("f8", "1", f"share of points run again that flip: encounters {words} or not")
+    for name, words in WHAT.items()
+}
+BESIDES = {
+    "beta2_reference": ("f8", "m2 s-1", "rectilinear kernel of the equivalent spheres, in a plane"),
+    "beta3_reference": ("f8", "m3 s-1", "rectilinear kernel of the equivalent spheres"),
+    "speed": ("f8", "m s-1", "at which the pair settles against each other; in a flow rate times "
+              "r_i + r_j"),
+    "checked": ("f8", "1", "points that were run again at a tighter tolerance"),
+    "undecided": ("f8", "1", "share of the sampled flux whose encounters are undecided or failed"),
+    "edge": ("f8", "1", "share of what aggregates that came in the outermost tenth of the offsets "
+             "that were sampled for attraction; where not 0, the width may be cut off"),
+}  # fmt: skip
+KERNEL = {
+    name + suffix: (kind, unit, text + bound)
+    for name, (kind, unit, text) in ESTIMATES.items()
+    for suffix, bound in BOUNDS.items()
+} | FLIPS | BESIDES  # fmt: skip
+"""{name: (type, units, long name)} of arrays (mechanism, vertices, i, j)."""
+
+SCALES = {
+    "mechanism": ("text", "1", "what brings the bodies together"),
+    "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
+    "i": ("text", "1", "size class of one body"),
+    "j": ("text", "1", "size class of the other body"),
+}
+RADIUS = {"r_eq": ("f8", "m", "equivalent radius of the size class; of measured flocs the median")}
+SMALLEST = -1e-9
+"""Rounding below 0."""
+
+
+@attrs.frozen(eq=False)
+class Kernel:
+    """The group: ``mechanisms``, ``vertices`` and the ``labels`` of its size classes, of ``radii``
+    [m]; ``arrays`` {name: (mechanism, vertices, i, j)} as in KERNEL, symmetric in i and j.
+
+    NaN where a pair was not run: bodies of one size do not meet by settling, and all of theirs is
+    0 but efficiencies, which are not known.
+    """
+
+    mechanisms: tuple[str, ...]
+    vertices: np.ndarray
+    labels: tuple[str, ...]
+    radii: np.ndarray
+    arrays: dict[str, np.ndarray]
+
+    def __attrs_post_init__(self):
+        shape = (len(self.mechanisms), len(self.vertices), len(self.labels), len(self.labels))
+        if set(self.arrays) != set(KERNEL):
+            strange = ", ".join(sorted(set(self.arrays) ^ set(KERNEL)))
+            raise UsageError(f"kernel must hold the schema's arrays; differing: {strange}")
+        for name, array in self.arrays.items():
+            if array.shape != shape:
+                raise UsageError(f"kernel/{name} has shape {array.shape}, expected {shape}")
+
+    def labelled(self) -> Labelled:
+        """The arrays with their axes."""
+        columns = {
+            name: Column(AXES, self.arrays[name], about_of(about)) for name, about in KERNEL.items()
+        }
+        labels = np.array(self.labels, dtype=object)
+        values = (
+            np.array(self.mechanisms, dtype=object),
+            np.asarray(self.vertices),
+            labels,
+            labels,
+        )
+        axes = {
+            axis: Column((axis,), each, about_of(SCALES[axis]))
+            for axis, each in zip(AXES, values, strict=True)
+        }
+        axes["r_eq"] = Column(("i",), np.asarray(self.radii), about_of(RADIUS["r_eq"]))
+        return Labelled(axes, columns)
+
+    def place_of(
+        self, mechanism: str | None = None, vertices: int | None = None
+    ) -> tuple[int, int]:
+        """Places of a mechanism and of N, by default the first and the last one."""
+        mechanism = self.mechanisms[0] if mechanism is None else mechanism
+        vertices = int(self.vertices[-1]) if vertices is None else vertices
+        for what, value, known in (
+            ("mechanism", mechanism, list(self.mechanisms)),
+            ("vertices", vertices, [int(each) for each in self.vertices]),
+        ):
+            if value not in known:
+                raise UsageError(
+                    f"{what} must be one of {', '.join(map(str, known))}, found {value}"
+                )
+        return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
+
+
+def about_of(schema: tuple[str, str, str]) -> dict[str, str]:
+    """Units and meaning as attributes."""
+    return {"units": schema[1], "long_name": schema[2]}
+
+
+def write_kernel(file: Any, kernel: Kernel) -> None:
+    """Write the group into an open file."""
+    write_labelled(file.create_group(GROUP), kernel.labelled())
+
+
+def expected_kernel() -> dict[str, Expected]:
+    """What the group must hold."""
+    return (
+        {name: Expected(kind, AXES) for name, (kind, _, _) in KERNEL.items()}
+        | {axis: Expected(SCALES[axis][0], (axis,)) for axis in AXES}
+        | {"r_eq": Expected("f8", ("i",))}
+    )
+
+
+def read_kernel(file: Any) -> Kernel | None:
+    """The group of an open file, None where it has none; ValueError for values that cannot be."""
+    if GROUP not in file:
+        return None
+    group = file[GROUP]
+    labels = [tuple(group[axis].asstr()[()]) for axis in ("i", "j")]
+    if labels[0] != labels[1]:
+        raise ValueError("kernel/i and kernel/j name other classes")
+    arrays = {name: group[name][()] for name in KERNEL}
+    check_kernel(arrays)
+    return Kernel(
+        tuple(group["mechanism"].asstr()[()]), group["vertices"][()], labels[0],
+        group["r_eq"][()], arrays,
+    )  # fmt: skip
+
+
+def check_kernel(arrays: Mapping[str, np.ndarray]) -> None:
+    """ValueError for values that no study can have given."""
+    for name, values in arrays.items():
+        if np.any(values < SMALLEST) or np.any(np.isinf(values)):
+            raise ValueError(f"there are impossible values in kernel/{name}")

@@ -1,0 +1,112 @@
+"""Rates of a kernel study as text: a long table, and square matrices for population balances.
+
+An efficiency is that of a kernel: what it multiplies is named in every matrix. REFERENCES are the
+kernels of two models:
+
+- "spheres": settling π (r_i + r_j)² |w_i − w_j|, shear 4/3 G (r_i + r_j)³, extension
+  8/3 s (r_i + r_j)³: rectilinear, of the equivalent spheres, at the speeds of the study;
+- "flocmod": as FLOCMOD has them (Verney et al. 2011, Cont. Shelf Res. 31, S64; its code in MARS,
+  ROMS/COAWST and fm_flocmod): in shear the same, 1/6 G (D_i + D_j)³; in settling
+  π/4 (D_i + D_j)² g/µ |Δρ_i D_i² − Δρ_j D_j²|, which lacks the 1/18 of Stokes's law and so is 18
+  times the rectilinear one: what it is multiplied by is 1/18 of the above.
+"""
+
+import csv
+import io
+import math
+
+import numpy as np
+
+from flocsim.errors import UsageError
+from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, Kernel
+
+REFERENCES = {
+    "settling": {
+        "spheres": (1.0, "pi (r_i + r_j)^2 |w_i - w_j|, rectilinear, of the equivalent spheres"),
+        "flocmod": (
+            1.0 / 18.0,
+            "FLOCMOD's pi/4 (D_i + D_j)^2 g/mu |drho_i D_i^2 - drho_j D_j^2|, which lacks Stokes's "
+            "1/18 (its drho D^2 being those of the bodies here)",
+        ),
+    },
+    "shear": {
+        "spheres": (1.0, "4/3 G (r_i + r_j)^3, rectilinear, of the equivalent spheres"),
+        "flocmod": (1.0, "FLOCMOD's 1/6 G (D_i + D_j)^3"),
+    },
+    "extension": {
+        "spheres": (1.0, "8/3 s (r_i + r_j)^3, rectilinear, of the equivalent spheres"),
+    },
+}
+"""{mechanism: {model: (factor on the efficiency over the rectilinear kernel, words)}}."""
+
+MODELS = ("spheres", "flocmod")
+QUANTITIES = ("efficiency", *ESTIMATES)
+"""What a matrix can hold: an efficiency is that of a model's kernel in three dimensions."""
+
+
+def number(value: float) -> str:
+    """A number with all its digits; nothing where it is not known."""
+    return "" if math.isnan(value) else repr(float(value))
+
+
+def kernel_csv(kernel: Kernel) -> str:
+    """All estimates of all pairs, a row for each mechanism, N, i ≤ j."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    units = {name: about[1].replace(" ", ".") for name, about in KERNEL.items()}
+    names = [f"{name} [{unit}]" for name, unit in units.items()]
+    writer.writerow(["mechanism", "vertices", "i", "j", "r_i [m]", "r_j [m]", *names])
+    for m, v, i, j in np.ndindex(*kernel.arrays["alpha"].shape):
+        if i > j:
+            continue
+        values = [number(float(kernel.arrays[name][m, v, i, j])) for name in KERNEL]
+        sizes = [number(float(kernel.radii[place])) for place in (i, j)]
+        labels = [kernel.mechanisms[m], int(kernel.vertices[v]), kernel.labels[i], kernel.labels[j]]
+        writer.writerow([*labels, *sizes, *values])
+    return text.getvalue()
+
+
+def efficiency_for(kernel: Kernel, mechanism: str, vertices: int, model: str) -> np.ndarray:
+    """What a model's kernel of a mechanism is to be multiplied by (i, j); UsageError for a model
+    that has none. 0 for bodies of one size that do not meet."""
+    known = REFERENCES.get(mechanism, {})
+    if model not in known:
+        raise UsageError(
+            f"{model} has no kernel for {mechanism}: choose of {', '.join(known)}, or another "
+            "mechanism"
+        )
+    m, v = kernel.place_of(mechanism, vertices)
+    values = kernel.arrays["efficiency3"][m, v] * known[model][0]
+    return np.where(kernel.arrays["beta3_reference"][m, v] == 0.0, 0.0, values)
+
+
+def kernel_matrix(
+    kernel: Kernel, mechanism: str, vertices: int, quantity: str = "efficiency",
+    model: str = "spheres",
+) -> str:  # fmt: skip
+    """A square matrix as CSV, radii [m] in its first row and column, behind lines that start with #
+    and say what it holds and what it multiplies."""
+    m, v = kernel.place_of(mechanism, vertices)
+    if quantity == "efficiency":
+        values = efficiency_for(kernel, mechanism, vertices, model)
+        what = [
+            f"efficiency in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
+            "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
+        ]
+    elif quantity in ESTIMATES:
+        values = kernel.arrays[quantity][m, v]
+        what = [f"{quantity} [{KERNEL[quantity][1]}] in {mechanism}: {KERNEL[quantity][2]}"]
+    else:
+        raise UsageError(f"a matrix holds one of {', '.join(QUANTITIES)}, found {quantity}")
+    lines = [
+        *what,
+        f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",
+        "without hydrodynamic interaction: an upper bound",
+    ]
+    text = io.StringIO()
+    text.writelines(f"# {line}\n" for line in lines)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["r_eq [m]", *(number(each) for each in kernel.radii)])
+    for radius, row in zip(kernel.radii, values, strict=True):
+        writer.writerow([number(radius), *(number(each) for each in row)])
+    return text.getvalue()

@@ -1,0 +1,95 @@
+"""`flocsim kernel`, end to end: run, resume, ranks, info, figures, tables."""
+
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.io.results.file import read_results, same_data
+from tests.helpers.kernel_study import kernel_text
+
+SHEAR = {
+    "meeting": '["settling", "shear"]',
+    "scene": 'rate = "10 1/s"',
+    "more": "[forces]\nvan_der_waals = false\ndouble_layer = false",
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "kernel.toml").write_text(kernel_text(**SHEAR), "utf-8")
+    return tmp_path
+
+
+def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
+    assert main(["kernel", "kernel.toml"]) == 0
+    told = capsys.readouterr().out
+    assert "settling, N = 1" in told and "shear, N = 1" in told
+    assert "upper bounds" in told and "no hydrodynamic interaction" in told
+    assert "60.00" in told, "the width 2R of 10 and 20 um"
+    assert main(["info", "kernel.h5"]) == 0
+    assert "upper bounds" in capsys.readouterr().out
+    assert main(["plot", "kernel.h5"]) == 0
+    assert main(["export", "csv", "kernel.h5"]) == 0
+    assert main(["export", "matrix", "kernel.h5", "--model", "flocmod"]) == 0
+    printed = capsys.readouterr().out.split()
+    assert printed == [
+        "kernel-kernels.png", "kernel-efficiency.png", "kernel.csv",
+        "kernel-settling-N1-efficiency-flocmod.csv", "kernel-shear-N1-efficiency-flocmod.csv",
+    ]  # fmt: skip
+    assert all((folder / name).stat().st_size > 200 for name in printed)
+    kernel = flocsim.open("kernel.h5").kernel
+    assert kernel.arrays["width_c"][0, 0, 0, 1] == pytest.approx(6e-5, abs=0.0)
+
+
+def test_more_points_extend_a_study_as_if_run_at_once(folder):
+    assert main(["kernel", "kernel.toml", "--quiet"]) == 0
+    assert main(["kernel", "kernel.toml", "--quiet", "--replicates", "64", "--resume"]) == 0
+    assert main(["kernel", "kernel.toml", "--quiet", "--replicates", "64", "-o", "b.h5"]) == 0
+    assert not same_data("kernel.h5", "b.h5"), "nothing differs"
+    assert read_results("b.h5").count == 64
+
+
+def test_the_number_of_processes_changes_nothing(folder):
+    assert main(["ensemble", "kernel.toml", "--quiet"]) == 0
+    assert main(["kernel", "kernel.toml", "--quiet", "--jobs", "2", "-o", "b.h5"]) == 0
+    assert not same_data("kernel.h5", "b.h5"), "nothing differs"
+
+
+def test_another_scramble_is_another_study(folder, capsys):
+    assert main(["kernel", "kernel.toml", "--quiet"]) == 0
+    words = ["kernel", "kernel.toml", "--quiet", "--resume", "--set", "scene.scrambles=8"]
+    assert main(words) == 2
+    assert "scene.scrambles" in capsys.readouterr().err
+
+
+def test_what_is_no_kernel_study_is_refused(folder, capsys):
+    (folder / "two.toml").write_text('preset = "si"\nreplicates = 1\n', "utf-8")
+    assert main(["kernel", "two.toml"]) == 2
+    assert 'kind = "kernel"' in capsys.readouterr().err
+    assert main(["kernel", "kernel.toml", "--replicates", "30"]) == 2
+    assert "times a power of 2" in capsys.readouterr().err
+
+
+def test_a_file_without_rates_has_no_tables(folder, capsys):
+    text = 'preset = "si"\nreplicates = 1\n[scene]\ntypes = ["I"]\ndelta = [0.0]\n'
+    (folder / "two.toml").write_text(text + "[shapes]\nvertices = [1]\n", "utf-8")
+    assert main(["ensemble", "two.toml", "--quiet"]) == 0
+    assert main(["export", "csv", "two.h5"]) == 2
+    assert "two.h5 is of no kernel study" in capsys.readouterr().err
+
+
+def test_a_dry_run_says_what_would_be_run(folder, capsys):
+    assert main(["kernel", "kernel.toml", "--dry-run", "--no-pilot"]) == 0
+    assert "shear:10um-20um" in capsys.readouterr().out
+
+
+def test_a_replicate_can_be_looked_at(folder, capsys):
+    assert main(["kernel", "kernel.toml", "--quiet"]) == 0
+    words = ["trajectory", "kernel.toml", "--scene", "shear:10um-20um,1,1", "--replicate", "3"]
+    assert main([*words, "-o", "a.png"]) == 0
+    row = read_results("kernel.h5").replicates["outcome"][2, 0, 0, 3]
+    told = capsys.readouterr().out
+    assert ("missed" in told) == (row == 4)
+    assert np.isfinite(read_results("kernel.h5").kernel.arrays["beta3"]).all()

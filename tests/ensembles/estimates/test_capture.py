@@ -1,0 +1,153 @@
+"""From points to capture widths and kernels: rows that are made up, and runs of spheres."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flocsim.ensembles.estimates.capture import (
+    estimate,
+    flow_width,
+    kernel_of,
+    mean_of,
+    ratio_of,
+    weighted,
+    widened,
+)
+from flocsim.ensembles.kernels.sampling import points_of
+from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.runner import run
+from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from tests.helpers.kernel_study import kernel_config
+
+BARE = "[forces]\nvan_der_waals = false\ndouble_layer = false"
+
+
+def made_up(study, place, catches, flips=()):
+    """(Weighted, rows) of a condition in which a pair is caught where ``catches(b/R)``."""
+    count = study.config.replicates
+    points = points_of(study.config.seed, study.scene.scrambles, 0, count)
+    rows = {name: np.full(count, -1) for name in ("floc_i", "floc_j")}
+    encounter = study.encounter(place, 1, study.numbers(0))
+    shares = np.array([study.share_of(encounter, 1.0, k) for k in range(count)])
+    caught = catches(shares)
+    rows["outcome"] = np.where(caught, 0, OUTCOMES.index("missed"))
+    rows["inside"] = np.where(caught, 1, NOT_APPLICABLE)
+    rows["checked_outcome"] = np.full(count, NOT_APPLICABLE)
+    rows["checked_inside"] = np.full(count, NOT_APPLICABLE)
+    checked = np.arange(0, count, 8)
+    for name in ("outcome", "inside"):
+        rows[f"checked_{name}"][checked] = rows[name][checked]
+    for k in flips:
+        rows["checked_outcome"][k] = OUTCOMES.index("missed")
+        rows["checked_inside"][k] = NOT_APPLICABLE
+    return weighted(study, (place, 1), rows, points), rows
+
+
+CASES = [("settling", 1.0), ("shear", 10.0), ("extension", 10.0)]
+
+
+@pytest.mark.parametrize(("meeting", "rate"), CASES)
+def test_spheres_have_the_rectilinear_kernels(tmp_path, meeting, rate):
+    scene = "" if meeting == "settling" else f"rate = {rate}"
+    config = kernel_config(tmp_path, meeting=f'"{meeting}"', scene=scene, replicates=4096)
+    study = study_of(config)
+    place = config.scene.names.index(f"{meeting}:10um-20um")
+    points, rows = made_up(study, place, lambda share: np.abs(share) <= 1.0)
+    found = estimate(points, rows, meeting, config.scene.rate, 4).values
+    size = 3e-5
+    speed = math.hypot(*study.encounter(place, 1, study.numbers(0)).drift)
+    plane = {"settling": 2.0 * size * speed, "shear": rate * size**2,
+             "extension": 2.0 * rate * size**2}[meeting]  # fmt: skip
+    space = {"settling": math.pi * size**2 * speed, "shear": 4.0 / 3.0 * rate * size**3,
+             "extension": 8.0 / 3.0 * rate * size**3}[meeting]  # fmt: skip
+    assert found["beta2_reference"] == pytest.approx(plane, rel=1e-12, abs=0.0)
+    assert found["beta3_reference"] == pytest.approx(space, rel=1e-12, abs=0.0)
+    for name, exact in (("beta2", plane), ("beta3", space), ("width_a", 2.0 * size)):
+        assert found[name] == pytest.approx(exact, rel=5e-3, abs=0.0), name
+        slack = 1e-3 * exact
+        assert found[f"{name}_low"] - slack <= exact <= found[f"{name}_high"] + slack, name
+    assert found["alpha"] == 1.0 and found["alpha_low"] < 1.0
+    assert found["efficiency3"] == pytest.approx(1.0, rel=5e-3)
+    assert found["undecided"] == 0.0
+
+
+def test_both_signs_count_by_themselves(tmp_path):
+    config = kernel_config(tmp_path, replicates=4096)
+    points, rows = made_up(study_of(config), 0, lambda b: (b > 0.2) & (b < 0.5))
+    found = estimate(points, rows, "settling", None, 4).values
+    assert found["width_a"] == pytest.approx(0.3 * 3e-5, rel=0.01)
+
+
+def test_flips_are_counted_and_bound_the_change(tmp_path):
+    config = kernel_config(tmp_path, replicates=512)
+    points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9)
+    caught = np.flatnonzero((rows["outcome"] == 0) & (rows["checked_outcome"] == 0))[:2]
+    points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9, flips=caught)
+    found = estimate(points, rows, "settling", None, 4)
+    assert found.flipped == {"c": 2, "inside": 2, "a": 2}
+    assert found.values["flips_a"] == pytest.approx(2 / 64)
+    assert found.largest["width_a"] == pytest.approx(points.width.max())
+
+
+def test_intervals_are_students_of_the_scrambles():
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    mean, low, high = mean_of(values, (False, 0.0))
+    half = 3.18244630528371 * values.std(ddof=1) / 2.0
+    assert (mean, high) == pytest.approx((2.5, 2.5 + half))
+    assert low == pytest.approx(2.5 - half)
+    # Four scrambles that agree up to a point do not know the mean to better than that.
+    assert mean_of(np.ones(4), (False, 0.0), 0.1)[2] == pytest.approx(1.0 + 1.591223 * 0.05)
+    assert mean_of(np.zeros(4), (True, 0.3)) == (0.0, 0.0, 0.3)
+    assert mean_of(np.ones(4), (True, 0.3)) == (1.0, 0.7, 1.0)
+    assert ratio_of(values, 2.0 * values) == pytest.approx((0.5, 0.5, 0.5))
+    assert np.isnan(ratio_of(values, 0.0 * values)).all()
+    low, high = widened((1.0, 1.0, 1.0), 100, 100)
+    assert 0.95 < low < 1.0 == high
+    assert flow_width(4.0, 1.0) == 4.0
+
+
+def test_intervals_cover_what_they_say(tmp_path):
+    covered = []
+    for seed in range(60):
+        config = kernel_config(tmp_path, replicates=256)
+        study = study_of(config)
+        object.__setattr__(study.config, "seed", seed)
+        points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.77)
+        found = estimate(points, rows, "settling", None, 4).values
+        covered.append(found["width_a_low"] <= 2 * 0.77 * 3e-5 <= found["width_a_high"])
+    # 60 trials of 0.95 are below 0.88 once in a hundred times.
+    assert np.mean(covered) >= 0.88
+
+
+def test_a_study_ends_with_its_kernel(tmp_path):
+    config = kernel_config(
+        tmp_path, meeting='["settling", "shear"]', scene='rate = "10 1/s"', more=BARE
+    )
+    results = run(config)
+    kernel = results.kernel
+    assert kernel.mechanisms == ("settling", "shear") and kernel.labels == ("10um", "20um")
+    arrays = kernel.arrays
+    # Without attraction nothing is sampled beyond where spheres touch.
+    assert arrays["width_c"][0, 0, 0, 1] == pytest.approx(6e-5, rel=1e-9, abs=0.0)
+    assert arrays["width_c"][0, 0, 0, 0] == 0.0 and np.isnan(arrays["alpha"][0, 0, 0, 0])
+    assert arrays["width_c"][1, 0, 1, 1] == pytest.approx(8e-5, rel=1e-9, abs=0.0)
+    assert np.array_equal(arrays["beta2"], np.swapaxes(arrays["beta2"], 2, 3), equal_nan=True)
+    assert np.all(arrays["checked"][1] > 0)
+
+
+def test_rates_follow_from_rows_however_they_were_run(tmp_path):
+    study = study_of(kernel_config(tmp_path, more=BARE))
+    results = run(study.config)
+    rows = {name: values[0, 0, 0] for name, values in results.replicates.items()}
+
+    class Store:
+        def known(self, place):
+            return None
+
+        def read(self, place, name, first, stop, known):
+            return rows[name][first:stop]
+
+    again = kernel_of(study, Store(), 32)
+    for name, values in results.kernel.arrays.items():
+        assert np.array_equal(values, again.arrays[name], equal_nan=True), name

@@ -1,0 +1,105 @@
+"""Points and intervals of offsets of kernel studies."""
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from flocsim.ensembles.collision.start import largest_displacement, place_pair
+from flocsim.ensembles.kernels.sampling import (
+    ANGLE_I,
+    OFFSET,
+    as_draws,
+    flow_offset,
+    point,
+    points_of,
+    settling_interval,
+)
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+
+HOOK = SpheroPolygon(
+    1e-6 * np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 5.0], [7.0, 5.0], [7.0, 2.0], [0.0, 3.0]]), 1e-6
+)
+STAR = SpheroPolygon(
+    1e-6 * np.array([[6.0, 0.0], [1.0, 1.5], [-3.0, 5.0], [-1.5, 0.0], [-4.0, -4.0], [1.0, -1.0]]),
+    5e-7,
+)  # fmt: skip
+
+
+def test_points_do_not_change_with_their_number():
+    first = points_of(5, 4, 0, 40)
+    assert np.array_equal(first, points_of(5, 4, 0, 4000)[:40])
+    assert np.array_equal(first[17], point(5, 4, 17))
+    assert first.min() >= 0.0 and first.max() < 1.0
+
+
+def test_scrambles_are_dealt_in_turn_and_differ():
+    found = points_of(1, 2, 0, 64)
+    for scramble in range(2):
+        mine = found[scramble::2]
+        # Sobol: each of 32 equal parts of every dimension has one of 32 points.
+        for dimension in range(mine.shape[1]):
+            assert sorted((32 * mine[:, dimension]).astype(int)) == list(range(32))
+    assert not np.any(found[::2] == found[1::2])
+    assert not np.any(found == points_of(2, 2, 0, 64))
+
+
+def test_draws_have_the_offset_last():
+    found = point(1, 2, 3)
+    assert as_draws(found)[0] == found[ANGLE_I]
+    assert as_draws(found)[4] == found[OFFSET]
+
+
+def test_offsets_in_a_flow_are_as_frequent_as_the_flow_brings_them():
+    numbers = (np.arange(4000) + 0.5) / 4000
+    offsets = flow_offset(numbers, 2.0)
+    assert np.mean(offsets) == pytest.approx(0.0, abs=1e-12)
+    # p(b) ∝ |b|: ⟨b²⟩ = b_max²/2, and a quarter within half of it.
+    assert np.mean(offsets**2) == pytest.approx(2.0, rel=1e-3)
+    assert np.mean(np.abs(offsets) < 1.0) == pytest.approx(0.25, abs=1e-3)
+
+
+def hull_perimeter(shape):
+    """Of the convex hull of a swept outline: that of the core's hull, and a circle."""
+    return ConvexHull(shape.vertices).area + 2.0 * np.pi * shape.radius
+
+
+def test_the_mean_interval_is_cauchys():
+    turns = 2.0 * np.pi * np.arange(4096) / 4096
+    low, high = settling_interval((HOOK, STAR), turns, turns[::-1], 0.0, 0.0)
+    expected = (hull_perimeter(HOOK) + hull_perimeter(STAR)) / np.pi
+    assert np.mean(high - low) == pytest.approx(expected, rel=1e-6, abs=0.0)
+
+
+def test_cauchy_holds_for_the_points_within_the_interval_of_their_scrambles():
+    points = points_of(1, 8, 0, 2048)
+    turns = 2.0 * np.pi * points[:, 1:3]
+    low, high = settling_interval((HOOK, STAR), turns[:, 0], turns[:, 1], 0.0, 0.0)
+    means = (high - low).reshape(-1, 8).mean(axis=0)
+    half = 2.365 * means.std(ddof=1) / np.sqrt(8)
+    expected = (hull_perimeter(HOOK) + hull_perimeter(STAR)) / np.pi
+    assert abs(means.mean() - expected) <= half + 1e-4 * expected
+
+
+@pytest.mark.parametrize("angles", [(0.3, 2.0), (4.0, 5.5), (1.0, 0.1)])
+def test_outlines_touch_exactly_within_the_interval(angles):
+    shapes = (HOOK, STAR)
+    low, high = settling_interval(shapes, np.array([angles[0]]), np.array([angles[1]]), 0.0, 0.0)
+    assert high[0] == pytest.approx(
+        largest_displacement("projected", HOOK, angles[0], STAR, angles[1]), rel=1e-12, abs=0.0
+    )
+    clear = sum(shape.bounding_radius for shape in shapes)
+    gap = 1e-9
+    for end in (low[0], high[0]):
+        inner, outer = 0.999 * end, 1.001 * end
+        assert place_pair(shapes, angles, inner, gap)[1, 1] < clear
+        # Beyond it j passes, and is put where it is clear.
+        assert place_pair(shapes, angles, outer, gap)[1, 1] == pytest.approx(clear + gap)
+
+
+def test_reach_and_centre_forces_widen_the_interval():
+    spheres, turn = (Sphere(1e-5), Sphere(2e-5)), np.zeros(1)
+    low, high = settling_interval(spheres, turn, turn, 2e-6, 4e-5)
+    assert (low[0], high[0]) == pytest.approx((-4.2e-5, 4.2e-5))
+    low, high = settling_interval(spheres, turn, turn, 2e-6, 0.0)
+    assert (low[0], high[0]) == pytest.approx((-3.2e-5, 3.2e-5))

@@ -1,0 +1,108 @@
+"""Group `kernel` of a results file: written, read, refused, and as tables."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from flocsim.errors import UsageError
+from flocsim.io.results.kernel_group import KERNEL, Kernel, check_kernel
+from flocsim.io.results.kernel_tables import efficiency_for, kernel_csv, kernel_matrix
+
+
+def some_kernel():
+    """Two mechanisms, two N, two classes; bodies of one size do not settle onto each other."""
+    shape = (2, 2, 2, 2)
+    arrays = {name: np.arange(1.0, 17.0).reshape(shape) * (k + 1) for k, name in enumerate(KERNEL)}
+    for values in arrays.values():
+        values[...] = 0.5 * (values + np.swapaxes(values, 2, 3))
+    diagonal = np.arange(2)
+    arrays["beta3_reference"][0, :, diagonal, diagonal] = 0.0
+    arrays["efficiency3"][0, :, diagonal, diagonal] = np.nan
+    return Kernel(
+        ("settling", "shear"), np.array([1, 32]), ("5um", "10um"), np.array([5e-6, 1e-5]), arrays
+    )
+
+
+def test_arrays_have_axes_units_and_meanings():
+    labelled = some_kernel().labelled()
+    assert labelled.columns["alpha"].axes == ("mechanism", "vertices", "i", "j")
+    assert labelled.columns["beta3"].about["units"] == "m3 s-1"
+    assert labelled.axes["r_eq"].values.tolist() == [5e-6, 1e-5]
+    assert all(column.about["long_name"] for column in labelled.columns.values())
+
+
+def test_it_opens_as_a_dataset():
+    pytest.importorskip("xarray")
+    data = some_kernel().labelled().to_xarray()
+    assert float(data.alpha.sel(mechanism="shear", vertices=32, i="5um", j="5um")) > 0.0
+
+
+def test_arrays_that_are_missing_or_misshapen_are_refused():
+    kernel = some_kernel()
+    with pytest.raises(UsageError, match="differing: alpha"):
+        Kernel(kernel.mechanisms, kernel.vertices, kernel.labels, kernel.radii,
+               {k: v for k, v in kernel.arrays.items() if k != "alpha"})  # fmt: skip
+    with pytest.raises(UsageError, match="kernel/alpha has shape"):
+        Kernel(kernel.mechanisms, kernel.vertices, kernel.labels, kernel.radii,
+               kernel.arrays | {"alpha": np.zeros(3)})  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", [-1.0, np.inf])
+def test_impossible_values_are_refused(wrong):
+    arrays = some_kernel().arrays
+    arrays["beta3"][0, 0, 0, 0] = wrong
+    with pytest.raises(ValueError, match="kernel/beta3"):
+        check_kernel(arrays)
+
+
+def test_a_table_has_a_row_for_every_pair():
+    rows = list(csv.reader(kernel_csv(some_kernel()).splitlines()))
+    assert len(rows) == 1 + 2 * 2 * 3
+    first = dict(zip(rows[0], rows[1], strict=True))
+    assert (first["mechanism"], first["vertices"], first["i"]) == ("settling", "1", "5um")
+    assert float(first["r_i [m]"]) == 5e-6
+    assert first["efficiency3 [1]"] == "", "nothing is known"
+
+
+def test_a_matrix_names_what_it_multiplies():
+    lines = kernel_matrix(some_kernel(), "shear", 32).splitlines()
+    told = [line for line in lines if line.startswith("#")]
+    assert "4/3 G (r_i + r_j)^3" in told[0] and "upper bound" in told[-1]
+    rows = list(csv.reader(lines[len(told) :]))
+    assert [float(each) for each in rows[0][1:]] == [5e-6, 1e-5]
+    values = np.array([[float(each) for each in row[1:]] for row in rows[1:]])
+    assert np.array_equal(values, some_kernel().arrays["efficiency3"][1, 1])
+
+
+def test_flocmods_settling_kernel_lacks_an_eighteenth():
+    kernel = some_kernel()
+    plain = efficiency_for(kernel, "settling", 32, "spheres")
+    flocmod = efficiency_for(kernel, "settling", 32, "flocmod")
+    assert flocmod == pytest.approx(plain / 18.0)
+    assert plain[0, 0] == 0.0, "bodies of one size do not meet"
+    assert np.array_equal(
+        efficiency_for(kernel, "shear", 1, "spheres"), efficiency_for(kernel, "shear", 1, "flocmod")
+    )
+    assert "1/18" in kernel_matrix(kernel, "settling", 1, model="flocmod")
+
+
+def test_flocmods_kernels_are_these():
+    # Its shear (D_i + D_j)³/6 is 4/3 R³; its settling π/4 (D_i + D_j)² g/µ |Δ(Δρ D²)| is 18 times
+    # π R² |Δw|, w = g Δρ D²/(18 µ).
+    r_i, r_j, density, g, viscosity = 4e-6, 9e-6, 300.0, 9.81, 1e-3
+    size = r_i + r_j
+    assert (2.0 * size) ** 3 / 6.0 == pytest.approx(4.0 / 3.0 * size**3, rel=1e-12, abs=0.0)
+    speed = g * density * 4.0 * (r_j**2 - r_i**2) / (18.0 * viscosity)
+    theirs = np.pi / 4.0 * (2.0 * size) ** 2 * g / viscosity * density * 4.0 * (r_j**2 - r_i**2)
+    assert theirs == pytest.approx(18.0 * np.pi * size**2 * speed, rel=1e-12, abs=0.0)
+
+
+def test_what_a_matrix_cannot_hold_is_refused():
+    kernel = some_kernel()
+    with pytest.raises(UsageError, match="mechanism must be one of settling, shear"):
+        kernel_matrix(kernel, "extension", 1, "alpha")
+    with pytest.raises(UsageError, match="vertices must be one of 1, 32"):
+        kernel_matrix(kernel, "shear", 4)
+    with pytest.raises(UsageError, match="a matrix holds one of"):
+        kernel_matrix(kernel, "shear", 1, "steps")
