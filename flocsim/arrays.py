@@ -8,8 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-MASS, BUOYANT_MASS, INERTIA, FREE, EQUIVALENT_RADIUS, BOUNDING_RADIUS, RADIUS = range(7)
-"""Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one."""
+(
+    MASS, BUOYANT_MASS, INERTIA, FREE, EQUIVALENT_RADIUS, BOUNDING_RADIUS, RADIUS,
+    ELONGATION, LONG_AXIS,
+) = range(9)  # fmt: skip
+"""Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one; the last two are
+a shape's elongation and the angle of its long axis [rad]."""
 
 X, Y, ANGLE, VX, VY, SPIN, MOTION_COLUMNS = range(7)
 """Columns of ``Work.motion``: place [m], counter-clockwise angle [rad] and their rates."""
@@ -154,7 +158,11 @@ gone by."""
 
 
 class BodyView(NamedTuple):
-    """One body, as a BodyForce kernel sees it. SI units; angle and spin counter-clockwise."""
+    """One body, as a BodyForce kernel sees it. SI units; angle and spin counter-clockwise.
+
+    ``elongation`` is B = (M₁ − M₂)/(M₁ + M₂) of the shape's principal second moments of area, and
+    ``angle + long_axis`` the angle of its long axis.
+    """
 
     time: float
     x: float
@@ -167,6 +175,8 @@ class BodyView(NamedTuple):
     buoyant_mass: float
     inertia: float
     radius: float
+    elongation: float
+    long_axis: float
 
 
 class PairView(NamedTuple):
@@ -205,7 +215,7 @@ class ContactView(NamedTuple):
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
-    ``bodies`` (n, 7): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
+    ``bodies`` (n, 9): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
     flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws; ``surface_reach``
     and ``centre_reach``: the gaps up to which such forces act [m], −1 where there are none;
     ``smoothing``: see flocsim.forces.smoothing; ``box``: periods along x and y [m], inf where

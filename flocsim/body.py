@@ -173,6 +173,8 @@ def scene_of(
         [shape.equivalent_radius for shape in shapes],
         [shape.bounding_radius for shape in shapes],
         [shape.radius for shape in shapes],
+        [shape.elongation for shape in shapes],
+        [shape.long_axis for shape in shapes],
     )
     return Scene(
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),

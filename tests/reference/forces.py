@@ -6,6 +6,8 @@ from itertools import combinations
 import numpy as np
 
 from tests.reference.contacts import contacts, measure, pairs_of
+from tests.reference.outline import second_moments
+from tests.reference.shapes import rotation
 
 VACUUM_PERMITTIVITY = 8.854e-12
 
@@ -75,6 +77,7 @@ class Drag:
     rotational: bool = True
     flow: np.ndarray = field(default_factory=lambda: np.zeros(2))
     gradient: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    strain: bool = False
 
     def loads(self, scene):
         total = np.zeros((len(scene.bodies), 3))
@@ -84,8 +87,21 @@ class Drag:
             fluid = self.flow + self.gradient @ position[:2]
             total[k, :2] = -6 * np.pi * self.viscosity * r * (velocity[:2] - fluid)
             if self.rotational:
-                total[k, 2] = -8 * np.pi * self.viscosity * r**3 * (velocity[2] - turning)
+                spin = turning + (self.jeffery(body, position[2]) if self.strain else 0.0)
+                total[k, 2] = -8 * np.pi * self.viscosity * r**3 * (velocity[2] - spin)
         return total
+
+    def jeffery(self, body, angle):
+        """Spin that the strain adds [rad/s]: B p × (E p) along the long axis p.
+
+        With the tensor T = M₂ + (M₁ − M₂) p pᵀ of the area's second moments that is twice the
+        antisymmetric part of T E over the trace of T.
+        """
+        tensor = second_moments(body.vertices, body.radius)
+        moments = rotation(angle) @ tensor @ rotation(angle).T
+        strain = (self.gradient + self.gradient.T) / 2
+        product = moments @ strain
+        return (product[0, 1] - product[1, 0]) / np.trace(moments)
 
 
 SHARP = (1e-12, 0.0, 0.0)

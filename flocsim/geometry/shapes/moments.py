@@ -200,8 +200,17 @@ def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarra
 
     ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
     """
+    return all_moments(vertices, radius)[:3]
+
+
+def all_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarray, float, np.ndarray]:
+    """The same, and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+
+    With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
+    (M₁ − M₂)(cos 2ψ, sin 2ψ).
+    """
     if len(vertices) == 1:
-        return np.pi * radius**2, vertices[0].copy(), 0.5 * np.pi * radius**4
+        return np.pi * radius**2, vertices[0].copy(), 0.5 * np.pi * radius**4, np.zeros(2)
     origin = vertices.mean(axis=0)
     core = vertices - origin
     points, tangents, weights = joined(chord_nodes(core, radius), arc_nodes(core, radius))
@@ -210,4 +219,6 @@ def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarra
     area = 0.5 * np.sum(x * dy - y * dx)
     centroid = np.array([np.sum(x**2 * dy), -np.sum(y**2 * dx)]) / (2.0 * area)
     polar = np.sum(x**3 * dy - y**3 * dx) / 3.0
-    return area, centroid + origin, polar - area * (centroid @ centroid)
+    stretch = np.array([np.sum(x**3 * dy + y**3 * dx) / 3.0, np.sum(x**2 * y * dy)])
+    stretch -= area * np.array([centroid[0] ** 2 - centroid[1] ** 2, 2.0 * np.prod(centroid)])
+    return area, centroid + origin, polar - area * (centroid @ centroid), stretch
