@@ -5,6 +5,7 @@ from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
+from flocsim.forces.lubrication import Lubrication
 from flocsim.forces.van_der_waals import VanDerWaals
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "DoubleLayer",
     "Force",
     "Gravity",
+    "Lubrication",
     "PairForce",
     "StokesDrag",
     "SurfaceForce",

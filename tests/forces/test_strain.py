@@ -19,8 +19,8 @@ FLOW = Fluid(viscosity=1e-3, gradient=(0.0, SHEAR, 0.0, 0.0))
 DRAG = StokesDrag(strain=True)
 
 
-def ellipse(a, b, corners=400):
-    """A polygon with the area and the moments of an ellipse, but for 2 (π/corners)²/3 of them."""
+def ellipse(a, b, corners=40):
+    """A regular polygon stretched, whose moments are to each other as those of the ellipse."""
     turn = np.linspace(0.0, 2.0 * math.pi, corners, endpoint=False)
     return SpheroPolygon(np.column_stack([a * np.cos(turn), b * np.sin(turn)]), 1e-4 * b)
 

@@ -150,8 +150,8 @@ class PairLaw:
             apply(total, scene, i, j, radii)
         return total
 
-    def within_reach(self, d, reduced_radius):
-        """The repulsion [N] at a gap, zero beyond the reach."""
+    def within_reach(self, d, reduced_radius, rate=0.0):
+        """The repulsion [N] at a gap and its rate of change, zero beyond the reach."""
         return self.repulsion(d, reduced_radius) if d < self.reach else 0.0
 
     def along_centres(self, total, scene, i, j, radii):
@@ -169,10 +169,11 @@ class PairLaw:
         measures = np.array([measure_of(gap, self.smoothing) for gap in gaps])
         weights = np.exp(measures.min() - measures)
         gap = gap_of(measures.min() - np.log(weights.sum()), self.smoothing)
-        repulsion = self.within_reach(gap, reduced(*radii))
+        lengths = np.array([length_at(each, self.smoothing) for each in gaps])
+        shares = length_at(gap, self.smoothing) / lengths * weights / weights.sum()
+        repulsion = self.within_reach(gap, reduced(*radii), shares @ every.normal_velocity)
         for k in np.flatnonzero(weights):
-            share = length_at(gap, self.smoothing) / length_at(gaps[k], self.smoothing)
-            force = repulsion * share * weights[k] / weights.sum() * every.normal[k]
+            force = repulsion * shares[k] * every.normal[k]
             vertex_body, _, edge_body, _ = every.pair[k]
             add_force(total, scene, vertex_body, force, every.point[k])
             add_force(total, scene, edge_body, -force, every.point[k])
@@ -212,6 +213,22 @@ class DoubleLayer(PairLaw):
         contact_value = 4 * np.pi * permittivity * self.potential**2 / self.debye_length
         decay = np.exp(-max(d, 0.0) / self.debye_length)
         return contact_value * reduced_radius * decay
+
+
+@dataclass(frozen=True)
+class Lubrication(PairLaw):
+    """−6πγ r*² ḣ/h at the outlines, h no less than `h_min`, faded out from half the reach on."""
+
+    viscosity: float
+    h_min: float = 1e-9
+    reach: float = 1e-5
+    gap: str = "surface"
+    smoothing: tuple = SHARP
+
+    def within_reach(self, d, reduced_radius, rate=0.0):
+        left = np.clip((self.reach - d) / (self.reach / 2), 0.0, 1.0)
+        film = 6 * np.pi * self.viscosity * reduced_radius**2 / max(d, self.h_min)
+        return -film * rate * (3 * left**2 - 2 * left**3)
 
 
 @dataclass(frozen=True)
