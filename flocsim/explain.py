@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.arrays import ContactView, PairView
 from flocsim.compiler.reads import reached
 from flocsim.forces.base import BodyForce, ContactForce, PairForce
 from flocsim.forces.check import (
@@ -28,6 +28,7 @@ from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.plausibility.doubts import doubts_of
 from flocsim.plausibility.reynolds import all_settled, settled
+from flocsim.plausibility.settling import lone_view
 
 PLACES = {"x", "y", "angle", "time"}
 SPEEDS = {"vx", "vy", "spin"}
@@ -116,6 +117,7 @@ def about(system, force, implicit):
         place = "along the line of centres" if centres else "between the outlines"
         parts = [f"{place}, {reach_words(system, force)}"]
         derivative = pair_derivative(system, force)
+    parts += force.remarks(system.fluid)
     return [*parts, derivative] if implicit else parts
 
 
@@ -362,10 +364,9 @@ def body_scales(system):
         return []
     relaxation, settling = [], []
     for body in free:
-        radius, weight = body.shape.equivalent_radius, body.buoyant_mass(system.fluid)
-        at_rest = BodyView(
-            0.0, *body.position, body.angle, 0.0, 0.0, 0.0, body.mass, weight, body.inertia, radius
-        )
+        radius = body.shape.equivalent_radius
+        at_rest = lone_view(body, system.fluid, 0.0, 0.0)
+        at_rest = at_rest._replace(x=body.position[0], y=body.position[1])
         resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
         alone = settled(system, body)
         settling.append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)

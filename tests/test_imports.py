@@ -22,7 +22,7 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
-    ["swarms"],
+    ["brownian", "swarms"],
     ["system"],
     ["trajectories"],
     ["io"],
@@ -54,6 +54,7 @@ INNER_ROWS = {
         ["contacts", "islands", "neighbours", "placement", "walls"],
         ["arrays", "methods"],
     ],
+    "brownian": [["meeting"], ["splitting"]],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
@@ -64,6 +65,7 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
+        ["strength"],
         ["cli", "studies"],
         ["dry_run", "runner", "report", "unfinished", "suspension"],
         ["parallel"],
@@ -105,6 +107,7 @@ HEAVYWEIGHTS = {
         "io/results/layout.py",
         "io/results/groups.py",
         "io/results/swarm_file.py",
+        "io/results/strength_file.py",
         "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",

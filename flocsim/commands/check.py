@@ -251,7 +251,7 @@ class Checker:
         """Run a Case and its reference at a tolerance [m], to the time at which both are there."""
         try:
             scene = Scene.of(self.study(case.stiffness), case)
-            kind = case.stiffness, scene.encounter.system.spheres_only, type(case.method)
+            kind = case.stiffness, scene.encounter.system.family, type(case.method)
             if kind not in self.warm:  # compiled, or loaded, before it is timed
                 scene.run(case.method)
                 self.warm.add(kind)

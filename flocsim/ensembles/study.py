@@ -72,7 +72,7 @@ class Study:
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
-    drivers: dict[tuple[bool, type], Callable] = attrs.field(init=False, factory=dict)
+    drivers: dict[tuple[str, type], Callable] = attrs.field(init=False, factory=dict)
     exact: dict[str, Integrator | None] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -159,7 +159,7 @@ class Study:
         """The Encounter and the two angles [rad] that a replicate's random numbers give."""
         numbers = self.numbers(replicate)
         encounter = self.encounter(condition, vertices, numbers)
-        return encounter, encounter.orientations(numbers)
+        return encounter.keyed(self.config.seed, replicate), encounter.orientations(numbers)
 
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
@@ -168,7 +168,7 @@ class Study:
         """
         system = encounter.system
         method = method or system.integrator
-        kind = system.spheres_only, type(method)
+        kind = system.family, type(method)
         if kind not in self.drivers:
             made = attrs.evolve(system, integrator=method)
             self.drivers[kind] = made.compose(observer=OBSERVER)
@@ -195,9 +195,8 @@ class Study:
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
         numbers = self.numbers(replicate)
-        encounter = self.encounter(condition, vertices, numbers)
+        encounter, angles = self.drawn(condition, vertices, replicate)
         driver = self.driver(encounter)
-        angles = encounter.orientations(numbers)
         share = self.share_of(encounter, share, replicate)
         max_steps = self.config.integrator.max_steps
         row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)

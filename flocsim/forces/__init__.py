@@ -5,6 +5,8 @@ from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
+from flocsim.forces.lubrication import Lubrication
+from flocsim.forces.thermal import Thermal
 from flocsim.forces.van_der_waals import VanDerWaals
 
 __all__ = [
@@ -15,8 +17,10 @@ __all__ = [
     "DoubleLayer",
     "Force",
     "Gravity",
+    "Lubrication",
     "PairForce",
     "StokesDrag",
     "SurfaceForce",
+    "Thermal",
     "VanDerWaals",
 ]

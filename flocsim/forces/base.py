@@ -29,6 +29,10 @@ class Force:
         """The kernel to use in this fluid; a subclass may have a cheaper one for some fluids."""
         return self.kernel
 
+    def remarks(self, fluid: Fluid) -> list[str]:
+        """What System.explain() says of it in this fluid besides, in a few words each."""
+        return []
+
     @property
     def absent(self) -> str:
         """Why a scene can leave this force out ("" where it cannot), e.g. a zero strength."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.body import Fluid
+from flocsim.errors import RangeError
 from flocsim.fields import choice, flag
 from flocsim.forces.base import BodyForce
 
@@ -20,6 +21,20 @@ def flow_at(flow, x, y):
     """(u_x, u_y, Ω) of the flow (u_x, u_y, g_xx, g_xy, g_yx, g_yy) at a place."""
     u_x, u_y, g_xx, g_xy, g_yx, g_yy = flow
     return u_x + g_xx * x + g_xy * y, u_y + g_yx * x + g_yy * y, 0.5 * (g_yx - g_xy)
+
+
+def strain_of(flow):
+    """(E_xx, E_xy) [1/s] of the flow: its rate of strain, without what makes it swell."""
+    _, _, g_xx, g_xy, g_yx, g_yy = flow
+    return 0.5 * (g_xx - g_yy), 0.5 * (g_xy + g_yx)
+
+
+def strained_spin(body, flow):
+    """B (−E_xx sin 2ψ + E_xy cos 2ψ) [rad/s]: how much faster than Ω a body with its long axis at
+    the angle ψ turns freely in the flow."""
+    e_xx, e_xy = strain_of(flow)
+    twice = 2.0 * (body.angle + body.long_axis)
+    return body.elongation * (e_xy * math.cos(twice) - e_xx * math.sin(twice))
 
 
 def reynolds_number(speed: float, radius: float, viscosity: float, density: float) -> float:
@@ -39,9 +54,17 @@ class StokesDrag(BodyForce):
     ``law`` "stokes": f = 1, for Reynolds numbers up to about 1. "schiller_naumann":
     f = 1 + 0.15 Re^0.687 for Re up to 800, with Re = 2 r_eq ρ_f |v − u|/γ of the equivalent sphere
     (its diameter and its own speed against the flow); the torque stays Stokes's. Viscosity γ,
-    density ρ_f and the background flow u, Ω are the fluid's.  Sources: Tang et al. (2014), eq. 4;
-    Schiller and Naumann (1933), as in Clift, Grace and Weber (1978), Table 5.2. The rotational drag
-    of a sphere is an addition, without it nothing would stop a spin.
+    density ρ_f and the background flow u, Ω are the fluid's.
+
+    ``strain``: the flow turns a long body by its strain E, too, with the torque
+    −8πγ r_eq³ [ω − Ω − B(−E_xx sin 2ψ + E_xy cos 2ψ)], ψ being the angle of the long axis and
+    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area. An ellipse with the half axes
+    a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
+    simple shear G; another shape is taken for the ellipse of its moments.
+
+    Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
+    (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
+    an addition, without it nothing would stop a spin.
     """
 
     rotational: bool = flag(default=True, help="drag torque on spinning bodies")
@@ -52,16 +75,37 @@ class StokesDrag(BodyForce):
         help="schiller_naumann: times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re up to 800",
     )
 
+    strain: bool = flag(
+        default=False, help="a flow's strain turns long bodies, too: Jeffery's orbits"
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if self.strain and not self.rotational:
+            raise RangeError(
+                "strain must be false where rotational is: it is a part of the drag torque"
+            )
+
     @property
     def serves_up_to(self) -> float:
         """The Reynolds number up to which the law holds."""
         return STOKES_UP_TO if self.law == "stokes" else SCHILLER_NAUMANN_UP_TO
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """Still water needs no flow, and no derivative by the place."""
-        if self.law == "stokes":
-            return self.kernel if any(fluid.flow) else self.still
-        return self.inertial if any(fluid.flow) else self.inertial_still
+        """Still water needs no flow, and no derivative by the place; a flow without strain, none by
+        the angle."""
+        stokes = self.law == "stokes"
+        if not any(fluid.flow):
+            return self.still if stokes else self.inertial_still
+        if self.strain and any(strain_of(fluid.flow)):
+            return self.strained if stokes else self.inertial_strained
+        return self.kernel if stokes else self.inertial
+
+    def remarks(self, fluid: Fluid) -> list[str]:
+        """Whether the flow's strain turns bodies."""
+        if not self.strain:
+            return []
+        strained = any(strain_of(fluid.flow))
+        return ["long bodies turned by strain" if strained else "no strain in this flow: left out"]
 
     @staticmethod
     def kernel(body, viscosity, flow, rotational):
@@ -70,6 +114,15 @@ class StokesDrag(BodyForce):
         translation = 6.0 * math.pi * viscosity * body.radius
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         spin = body.spin - turning
+        return -translation * (body.vx - u), -translation * (body.vy - v), -rotation * spin
+
+    @staticmethod
+    def strained(body, viscosity, flow):
+        """The same, with the torque of the flow's strain on the shape."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        translation = 6.0 * math.pi * viscosity * body.radius
+        rotation = 8.0 * math.pi * viscosity * body.radius**3
+        spin = body.spin - turning - strained_spin(body, flow)
         return -translation * (body.vx - u), -translation * (body.vy - v), -rotation * spin
 
     @staticmethod
@@ -88,6 +141,17 @@ class StokesDrag(BodyForce):
         translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         return -translation * vx, -translation * vy, -rotation * (body.spin - turning)
+
+    @staticmethod
+    def inertial_strained(body, viscosity, density, flow):
+        """The same, with the torque of the flow's strain on the shape."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        vx, vy = body.vx - u, body.vy - v
+        reynolds = reynolds_number(math.hypot(vx, vy), body.radius, viscosity, density)
+        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
+        rotation = 8.0 * math.pi * viscosity * body.radius**3
+        spin = body.spin - turning - strained_spin(body, flow)
+        return -translation * vx, -translation * vy, -rotation * spin
 
     @staticmethod
     def inertial_still(body, viscosity, density, rotational):

@@ -28,10 +28,10 @@ def no_force(view, parameters):
 
 def lone_view(body, fluid, vx, vy):
     """The BodyView of a body at the origin, without spin."""
-    radius = body.shape.equivalent_radius
+    shape = body.shape
     return BodyView(
         0.0, 0.0, 0.0, body.angle, vx, vy, 0.0, body.mass, body.buoyant_mass(fluid), body.inertia,
-        radius,
+        shape.equivalent_radius, shape.elongation, shape.long_axis,
     )  # fmt: skip
 
 

@@ -203,8 +203,8 @@ def remade(plain, fixed, density=None, surface_density=SURFACE_DENSITY):
 def drag_pair(fluid, rotational):
     """Drag in the fluid's flow."""
     gradient = np.array(fluid.gradient).reshape(2, 2)
-    law = plain_forces.Drag(VISCOSITY, rotational, np.array(fluid.velocity), gradient)
-    return StokesDrag(rotational), law
+    law = plain_forces.Drag(VISCOSITY, rotational, np.array(fluid.velocity), gradient, rotational)
+    return StokesDrag(rotational, strain=rotational), law
 
 
 def contact_pair(rng):

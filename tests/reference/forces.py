@@ -6,6 +6,8 @@ from itertools import combinations
 import numpy as np
 
 from tests.reference.contacts import contacts, measure, pairs_of
+from tests.reference.outline import second_moments
+from tests.reference.shapes import rotation
 
 VACUUM_PERMITTIVITY = 8.854e-12
 
@@ -75,6 +77,7 @@ class Drag:
     rotational: bool = True
     flow: np.ndarray = field(default_factory=lambda: np.zeros(2))
     gradient: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    strain: bool = False
 
     def loads(self, scene):
         total = np.zeros((len(scene.bodies), 3))
@@ -84,8 +87,21 @@ class Drag:
             fluid = self.flow + self.gradient @ position[:2]
             total[k, :2] = -6 * np.pi * self.viscosity * r * (velocity[:2] - fluid)
             if self.rotational:
-                total[k, 2] = -8 * np.pi * self.viscosity * r**3 * (velocity[2] - turning)
+                spin = turning + (self.jeffery(body, position[2]) if self.strain else 0.0)
+                total[k, 2] = -8 * np.pi * self.viscosity * r**3 * (velocity[2] - spin)
         return total
+
+    def jeffery(self, body, angle):
+        """Spin that the strain adds [rad/s]: B p × (E p) along the long axis p.
+
+        With the tensor T = M₂ + (M₁ − M₂) p pᵀ of the area's second moments that is twice the
+        antisymmetric part of T E over the trace of T.
+        """
+        tensor = second_moments(body.vertices, body.radius)
+        moments = rotation(angle) @ tensor @ rotation(angle).T
+        strain = (self.gradient + self.gradient.T) / 2
+        product = moments @ strain
+        return (product[0, 1] - product[1, 0]) / np.trace(moments)
 
 
 SHARP = (1e-12, 0.0, 0.0)
@@ -134,8 +150,8 @@ class PairLaw:
             apply(total, scene, i, j, radii)
         return total
 
-    def within_reach(self, d, reduced_radius):
-        """The repulsion [N] at a gap, zero beyond the reach."""
+    def within_reach(self, d, reduced_radius, rate=0.0):
+        """The repulsion [N] at a gap and its rate of change, zero beyond the reach."""
         return self.repulsion(d, reduced_radius) if d < self.reach else 0.0
 
     def along_centres(self, total, scene, i, j, radii):
@@ -153,10 +169,11 @@ class PairLaw:
         measures = np.array([measure_of(gap, self.smoothing) for gap in gaps])
         weights = np.exp(measures.min() - measures)
         gap = gap_of(measures.min() - np.log(weights.sum()), self.smoothing)
-        repulsion = self.within_reach(gap, reduced(*radii))
+        lengths = np.array([length_at(each, self.smoothing) for each in gaps])
+        shares = length_at(gap, self.smoothing) / lengths * weights / weights.sum()
+        repulsion = self.within_reach(gap, reduced(*radii), shares @ every.normal_velocity)
         for k in np.flatnonzero(weights):
-            share = length_at(gap, self.smoothing) / length_at(gaps[k], self.smoothing)
-            force = repulsion * share * weights[k] / weights.sum() * every.normal[k]
+            force = repulsion * shares[k] * every.normal[k]
             vertex_body, _, edge_body, _ = every.pair[k]
             add_force(total, scene, vertex_body, force, every.point[k])
             add_force(total, scene, edge_body, -force, every.point[k])
@@ -196,6 +213,22 @@ class DoubleLayer(PairLaw):
         contact_value = 4 * np.pi * permittivity * self.potential**2 / self.debye_length
         decay = np.exp(-max(d, 0.0) / self.debye_length)
         return contact_value * reduced_radius * decay
+
+
+@dataclass(frozen=True)
+class Lubrication(PairLaw):
+    """−6πγ r*² ḣ/h at the outlines, h no less than `h_min`, faded out from half the reach on."""
+
+    viscosity: float
+    h_min: float = 1e-9
+    reach: float = 1e-5
+    gap: str = "surface"
+    smoothing: tuple = SHARP
+
+    def within_reach(self, d, reduced_radius, rate=0.0):
+        left = np.clip((self.reach - d) / (self.reach / 2), 0.0, 1.0)
+        film = 6 * np.pi * self.viscosity * reduced_radius**2 / max(d, self.h_min)
+        return -film * rate * (3 * left**2 - 2 * left**3)
 
 
 @dataclass(frozen=True)

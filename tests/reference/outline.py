@@ -34,6 +34,22 @@ def area_centroid_inertia(vertices, radius):
     return area, origin + centroid, second_moment - area * (centroid @ centroid)
 
 
+def second_moments(vertices, radius):
+    """∫ρρᵀ dA (2, 2) [m⁴] about the origin, to which the centroid has been moved before.
+
+    Green's theorem again: ∫x² = ⅓∮x³ dy, ∫y² = −⅓∮y³ dx, ∫xy = ½∮x² y dy.
+    """
+    total = np.zeros((2, 2))
+    for piece in visible_pieces(np.array(vertices, dtype=float).reshape(-1, 2), radius):
+        start, end = piece.span
+        parameter = start + (end - start) * (GAUSS_NODES + 1) / 2
+        (x, y), (dx, dy) = piece.point(parameter), piece.derivative(parameter)
+        mixed = x**2 * y * dy / 2
+        integrands = np.array([[x**3 * dy / 3, mixed], [mixed, -(y**3) * dx / 3]])
+        total += integrands @ GAUSS_WEIGHTS * (end - start) / 2
+    return total
+
+
 def green_integrals(piece):
     """∮ over one piece: (A, A x̄, A ȳ, J₀), by 16-point Gauss quadrature on arcs up to 90°."""
     start, end = piece.span

@@ -98,19 +98,25 @@ def relative_speeds(scene, work, nx, ny):
     return abs(ux * nx + uy * ny), shear + abs(v[NOW, BODY_J, SPIN] - spin) * size
 
 
+def at_rest(scene, view):
+    """The PairView without motion: what resists an opening, as lubrication, holds nothing."""
+    return pair_view(scene, view.time, BODY_J, BODY_I, view.gap, 0.0, view.centre_distance)
+
+
 def centre_attraction(scene, work, time):
-    """Attraction between the centres [N], 0 without such forces."""
+    """Attraction between the centres [N] at rest, 0 without such forces."""
     if not has(scene, CENTRE_FORCE):
         return 0.0
-    return -centre_force(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I))
+    return -centre_force(scene, at_rest(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I)))
 
 
 def surface_attraction(scene, work, time):
-    """Attraction at the outlines [N], 0 without surface forces."""
+    """Attraction at the outlines [N] at rest, 0 without surface forces."""
     if scene.surface_reach <= 0.0 or work.tally[CANDIDATES] == 0:
         return 0.0
     flag_near(scene, work, NOW, 0.0)
-    return -surface_force(scene, surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES]))
+    view = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES])
+    return -surface_force(scene, at_rest(scene, view))
 
 
 def arms_hold(work, attraction, load, nx, ny, distance):

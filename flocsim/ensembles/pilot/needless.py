@@ -133,7 +133,7 @@ def tried_without(
 ) -> Finding:
     """Run replicates without a part until it matters, or the time [s] is up."""
     made: dict[int, Encounter] = {}
-    drivers: dict[bool, Callable] = {}
+    drivers: dict[str, Callable] = {}
     changed, count, spent, before, whole = 0, 0, 0.0, 0.0, 0.0
     for run in runs:
         go_on()
@@ -156,7 +156,7 @@ def tried_without(
 
 def compiled(study, encounter, angles, drivers, run):
     """Compile the driver of a scene where there is none yet: no part of what is timed."""
-    kind = encounter.system.spheres_only
+    kind = encounter.system.family
     if kind not in drivers:
         drivers[kind] = study.driver(encounter, encounter.system.integrator)
         one_without(study, encounter, angles, drivers, run)
@@ -168,7 +168,7 @@ def one_without(study, encounter, angles, drivers, run):
     _ = encounter.scene
     began = time.process_time()
     try:
-        driver = drivers[encounter.system.spheres_only]
+        driver = drivers[encounter.system.family]
         share = study.share_of(encounter, run.task.delta, run.task.replicate)
         row = run_encounter(encounter, driver, angles, share, steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])

@@ -197,9 +197,7 @@ def facts_of_code(study, pair):
     wanted += [(each, each) for each in several[:1]]
     for shapes, method in product(wanted, methods):
         system = placed_system(config, attrs.evolve(pair.system, integrator=method), shapes)
-        name = "spheres" if system.spheres_only else "polygons"
-        if shapes[0].is_compound:
-            name = "polygons with holes, or of parts"
+        name = system.family
         if config.integrator.is_chosen:
             name += f" by {type(method).__name__}"
         if pair.meeting != SETTLING:

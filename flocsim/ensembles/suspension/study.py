@@ -185,6 +185,7 @@ class SwarmStudy:
         swarm = Swarm(
             bodies, forces, self.config.integrator.method, fluid,
             box=self.periods((width, height)), all_pairs=self.scene.all_pairs,
+            seed=(self.config.seed, replicate),
         )  # fmt: skip
         return swarm, drawn, (width, height)
 

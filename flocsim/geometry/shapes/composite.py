@@ -9,7 +9,7 @@ import numpy as np
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.moments import union_moments
+from flocsim.geometry.shapes.moments import all_moments
 from flocsim.geometry.shapes.outline import simplicity_fault
 from flocsim.geometry.shapes.parts import (
     Part,
@@ -26,6 +26,7 @@ from flocsim.geometry.shapes.shape import (
     read_only,
     read_points,
     require_distinct,
+    stretched,
 )
 
 TOUCHING = 1e-6
@@ -111,7 +112,7 @@ def swept_parts(parts: Sequence[Part]) -> Swept:
     points = np.concatenate([part.points for part in parts])
     # As in swept_by.
     extent = float(np.ptp(points, axis=0).max() + max(part.radius for part in parts))
-    area, centroid, moment = union_moments(scaled_parts(parts, 1.0 / extent))
+    area, centroid, moment, stretch = all_moments(scaled_parts(parts, 1.0 / extent))
     centroid = centroid * extent
     around = tuple(
         Part(tuple(read_only(ring - centroid) for ring in part.rings), part.radius)
@@ -119,7 +120,8 @@ def swept_parts(parts: Sequence[Part]) -> Swept:
     )
     vertices = read_only(points - centroid)
     return Swept(
-        vertices, centroid, float(area * extent**2), float(moment * extent**4), around
+        vertices, centroid, float(area * extent**2), float(moment * extent**4),
+        *stretched(stretch, moment), around,
     )  # fmt: skip
 
 

@@ -328,15 +328,24 @@ def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarra
 
     ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
     """
-    return union_moments((Part((vertices,), radius),))
+    return all_moments((Part((vertices,), radius),))[:3]
 
 
 def union_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float]:
     """The same of all that some parts cover together: outer rings counter-clockwise, those of holes
     clockwise."""
+    return all_moments(parts)[:3]
+
+
+def all_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float, np.ndarray]:
+    """The same, and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+
+    With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
+    (M₁ − M₂)(cos 2ψ, sin 2ψ).
+    """
     if len(parts) == len(parts[0].rings) == len(parts[0].rings[0]) == 1:
         radius, [ring] = parts[0].radius, parts[0].rings
-        return np.pi * radius**2, ring[0].copy(), 0.5 * np.pi * radius**4
+        return np.pi * radius**2, ring[0].copy(), 0.5 * np.pi * radius**4, np.zeros(2)
     origin = np.concatenate([ring for part in parts for ring in part.rings]).mean(axis=0)
     placed = [Part(tuple(ring - origin for ring in part.rings), part.radius) for part in parts]
     found = pieces_of(placed)
@@ -346,4 +355,6 @@ def union_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float]:
     area = 0.5 * np.sum(x * dy - y * dx)
     centroid = np.array([np.sum(x**2 * dy), -np.sum(y**2 * dx)]) / (2.0 * area)
     polar = np.sum(x**3 * dy - y**3 * dx) / 3.0
-    return area, centroid + origin, polar - area * (centroid @ centroid)
+    stretch = np.array([np.sum(x**3 * dy + y**3 * dx) / 3.0, np.sum(x**2 * y * dy)])
+    stretch -= area * np.array([centroid[0] ** 2 - centroid[1] ** 2, 2.0 * np.prod(centroid)])
+    return area, centroid + origin, polar - area * (centroid @ centroid), stretch

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike
 from flocsim.errors import RangeError, ShapeError
 from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.moments import swept_moments
+from flocsim.geometry.shapes.moments import all_moments
 from flocsim.geometry.shapes.outline import require_simple, swept_rings
 from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
+
+ROUND = 1e-12
+"""Shapes whose principal moments differ by less than this share of their sum have no long axis."""
 
 TOO_CLOSE = 1e-12
 """Core points nearer than this share of the core's extent count as repeated."""
@@ -23,6 +26,7 @@ class Swept(NamedTuple):
 
     Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
     centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
+    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments; the angle of the long axis [rad];
     ``parts``, around the centroid as well, where there is more than one ring.
     """
 
@@ -30,6 +34,8 @@ class Swept(NamedTuple):
     centroid: np.ndarray
     area: float
     second_moment: float
+    elongation: float
+    long_axis: float
     parts: Parts = ()
 
 
@@ -98,6 +104,20 @@ class Shape:
         return self.swept.second_moment
 
     @property
+    def elongation(self) -> float:
+        """B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area M₁ ≥ M₂ [-].
+
+        0 for a sphere, (a² − b²)/(a² + b²) for an ellipse with the half axes a ≥ b.
+        """
+        return self.swept.elongation
+
+    @property
+    def long_axis(self) -> float:
+        """Angle of the axis of the largest extent (of M₁) in the shape's frame, in (−π/2, π/2]
+        [rad]; 0 where no axis is longer."""
+        return self.swept.long_axis
+
+    @property
     def equivalent_radius(self) -> float:
         """r_eq = √(A/π) [m]."""
         return float(np.sqrt(self.area / np.pi))
@@ -145,10 +165,20 @@ def swept_by(core: np.ndarray, radius: float) -> Swept:
             core = np.roll(core[::-1], 1, axis=0)
     # A unit-sized copy keeps fourth powers of micrometres far from underflow.
     extent = np.ptp(core, axis=0).max() + radius
-    area, centroid, moment = swept_moments(core / extent, radius / extent)
+    unit = Part((core / extent,), radius / extent)
+    area, centroid, moment, stretch = all_moments((unit,))
     centroid = centroid * extent
     vertices = read_only(core - centroid)
-    return Swept(vertices, centroid, float(area * extent**2), float(moment * extent**4))
+    size = float(area * extent**2), float(moment * extent**4)
+    return Swept(vertices, centroid, *size, *stretched(stretch, moment))
+
+
+def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:
+    """(elongation, long axis) of how an area is stretched (2,) and its polar second moment."""
+    elongation = float(np.hypot(*stretch)) / moment
+    if elongation <= ROUND:
+        return 0.0, 0.0
+    return elongation, 0.5 * float(np.arctan2(stretch[1], stretch[0]))
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

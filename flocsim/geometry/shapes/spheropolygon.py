@@ -76,6 +76,8 @@ def scaled_outline(shape: Shape, factor: float) -> Shape:
         shape.centroid * factor,
         shape.area * factor**2,
         shape.second_moment * factor**4,
+        shape.elongation,
+        shape.long_axis,
         scaled_parts(shape.swept.parts, factor),
     )
     if shape.is_compound:

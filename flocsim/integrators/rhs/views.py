@@ -9,12 +9,15 @@ from flocsim.arrays import (
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
+    ELONGATION,
     EQUIVALENT_RADIUS,
     FREE,
     FX,
     FY,
     GAP,
     INERTIA,
+    KICK_X,
+    LONG_AXIS,
     MASS,
     NORMAL_X,
     NORMAL_Y,
@@ -44,7 +47,8 @@ def body_view(scene, work, time, state, body):
         motion[state, body, X], motion[state, body, Y], motion[state, body, ANGLE],
         motion[state, body, VX], motion[state, body, VY], motion[state, body, SPIN],
         known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
-        known[body, EQUIVALENT_RADIUS],
+        known[body, EQUIVALENT_RADIUS], known[body, ELONGATION], known[body, LONG_AXIS],
+        work.bodies[body, KICK_X], work.bodies[body, KICK_X + 1], work.bodies[body, KICK_X + 2],
     )  # fmt: skip
 
 

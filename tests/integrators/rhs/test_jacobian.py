@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from flocsim import Body
+from flocsim import Body, forces
 from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST_STAGE, NOW, STIFFNESS
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
@@ -145,9 +145,9 @@ def test_damping_of_every_force_alone(seed, name):
 def own_scene():
     """Every kind of a user's own force, without derivatives of its own, at work at once."""
     left, right = head_on(0.05, -2e-7)
-    forces = [Trap(0.02, 1e-13), Spring(5e-3, -2e-6), Lubrication(), Hertz(1e4, 20.0, 2.0)]
+    own = [Trap(0.02, 1e-13), Spring(5e-3, -2e-6), Lubrication(), Hertz(1e4, 20.0, 2.0)]
     ragged = Body(star(), (3e-6, 13e-6), 0.4, (0.0, -0.05), 300.0, surface_density=2.0)
-    return PolygonSystem([left, right, ragged], forces)
+    return PolygonSystem([left, right, ragged], own)
 
 
 @pytest.mark.parametrize(
@@ -155,6 +155,13 @@ def own_scene():
 )
 def test_forces_of_a_user_are_differenced(which, moving, size):
     assert Differences(own_scene(), moving=moving).miss(which, size) < 2e-3
+
+
+def test_damping_of_lubrication_is_that_of_the_gaps_rate():
+    left, right = head_on(0.05, -2e-7)
+    ragged = Body(star(), (3e-6, 13e-6), 0.4, (0.0, -0.05), 300.0, surface_density=2.0)
+    system = PolygonSystem([left, right, ragged], [forces.Lubrication(h_min=3e-7)])
+    assert Differences(system).miss(DAMPING, 1e-6) < 1e-5
 
 
 def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
