@@ -66,7 +66,7 @@ from flocsim.laws import contact_force
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
 
-OF_VECTOR = 12.0
+OF_VECTOR = 13.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
 LEAST = 0.006
