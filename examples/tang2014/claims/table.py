@@ -4,8 +4,8 @@ from flocsim.io.markdown import markdown_table
 
 
 def number_text(value):
-    """Three digits; "-" for what is not there."""
-    return "-" if value != value else f"{value:.3g}"
+    """Three digits, no zero below 0; "-" for what is not there."""
+    return "-" if value != value else f"{value + 0.0:.3g}"
 
 
 def interval_text(part):
