@@ -23,6 +23,8 @@ def test_a_swarm_is_a_scene_of_its_own(tmp_path):
         ("area_fraction", "needs area_fraction or box, found neither"),
         ({"scene": {"box": ["1 mm", "1 mm"]}}, "needs area_fraction or box, found both"),
         ({"scene": {"floor": True}}, 'a floor needs periodic = "x" or "none"'),
+        ({"scene": {"leaving": "remove"}}, 'leaving = "remove" needs periodic = "x" or "none"'),
+        ({"scene": {"leaving": "fly", "periodic": "x"}}, "leaving"),
         ({"scene": {"min_radius": "6 um"}}, "is not between min_radius and max_radius"),
         ({"scene": {"every": "1 s"}}, "every = 1 s is longer than duration = 0.3 s"),
         ({"scene": {"classes": ["2 um", "1 um"]}}, "classes must be ascending radii"),

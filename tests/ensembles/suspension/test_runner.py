@@ -53,6 +53,13 @@ def test_what_is_written_agrees_with_itself(finished):
             assert np.bincount(labels).max() == counts["largest"][k, t]
     fell = moments["position"][:, -1, :, 1] - moments["position"][:, 0, :, 1]
     assert fell.max() < 0.0
+    bonds = results.groups["bonds"]
+    kinds = ("touching", "certificate", "hook", "rest")
+    for k, t, place in np.ndindex(2, 4, 4):
+        rows = (bonds["bond_replicate"] == k) & (bonds["bond_time"] == t)
+        found = int(np.sum(rows & (bonds["bond_kind"] == place)))
+        assert found == counts[f"bonds_{kinds[place]}"][k, t]
+    assert len(bonds["bond_kind"]) > 0
     assert results.groups["ends"]["finished"].tolist() == [1, 1]
     assert json.loads(results.run["identity"])["seed"] == 4
 
@@ -80,6 +87,31 @@ def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
     assert np.array(motions[0]).tobytes() == np.array(motions[1]).tobytes()
     efforts = [parts[-1].facts for parts in (whole, rest)]
     assert efforts[0] == efforts[1]
+
+
+@pytest.mark.parametrize("leaving", ["remove", "reenter"])
+def test_what_leaves_is_told_and_resumed(tmp_path, leaving):
+    """A box without a floor: the same snapshots from any state on, what left counted once."""
+    config = swarm_config(tmp_path, {"scene": {"periodic": "x", "leaving": leaving}})
+    whole, ended = run_parts(config)
+    assert ended
+    moments = [part for part in whole if part.of == "moment"]
+    facts = moments[-1].facts
+    gone = int(np.sum(moments[-1].arrays["cluster"] == -2))
+    if leaving == "remove":
+        assert facts["removed"] == gone > 0 and facts["reentered"] == 0
+        assert facts["clusters"] <= 12 - gone
+    else:
+        assert facts["reentered"] > 0 and facts["removed"] == gone == 0
+        highest = max(part.arrays["motion"][:, 1].max() for part in moments[1:])
+        assert highest > moments[0].arrays["motion"][:, 1].max()
+    first, ended = run_parts(config, halts={8})
+    assert not ended
+    state = part_of_encoded(first[-1])
+    rest, _ = run_parts(config, left=Left(state.facts["moments"], state.arrays))
+    both = [part for part in [*first, *rest] if part.of == "moment"]
+    for one, other in zip(moments, both, strict=True):
+        assert one.encoded() == other.encoded()
 
 
 def part_of_encoded(part):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
+from flocsim.ensembles.suspension.runner import check_room
 from flocsim.ensembles.suspension.study import SPHERE, SwarmStudy, lognormal
 from flocsim.errors import ConfigError, UsageError
 from tests.helpers.small_study import write_star_library
@@ -96,3 +97,57 @@ def test_what_finds_no_place_is_said(tmp_path):
     crowded = study(tmp_path, {"scene": {"area_fraction": 0.8, "number": 60}})
     with pytest.raises(UsageError, match="ask for a smaller fraction"):
         crowded.swarm(0)
+
+
+def test_every_replicate_is_placed_before_the_first_runs(tmp_path):
+    """Of a box given by its sides, where one replicate has drawn too much for it; on any rank."""
+    sides = {"box": ["85 um", "85 um"], "spread": 0.6, "number": 12}
+    found = study(tmp_path, {"scene": sides, "replicates": 30}, without("area_fraction"))
+    drawn = [found.draw(found.generator(replicate)).shapes for replicate in range(30)]
+    least = np.array([6.0 * max(shape.radius for shape in shapes) for shapes in drawn])
+    faults = np.flatnonzero(least > 85e-6)
+    assert len(faults) and faults[0] > 0, "else this shows nothing"
+    swarm, _, _ = found.swarm(0)
+    for size in (1, 3):
+        known = [seen for rank in range(size) for seen in [Told(rank, size)]]
+        for comm in known[1:]:
+            check_room(found, swarm, comm)
+        known[0].others = [comm.given for comm in known[1:]]
+        with pytest.raises(UsageError, match=f"swarm {faults[0]} of 30"):
+            check_room(found, swarm, known[0])
+
+
+def without(key):
+    """The text of the small study without a key."""
+    return "\n".join(line for line in SWARM.splitlines() if not line.startswith(key))
+
+
+class Told:
+    """A communicator of ranks that are asked one after another, rank 0 the last."""
+
+    def __init__(self, rank, size):
+        self.rank, self.size, self.others, self.given = rank, size, [], None
+
+    def gather(self, value):
+        self.given = value
+        return [value, *self.others] if self.rank == 0 else None
+
+
+def test_bodies_begin_at_the_flow_of_their_places(tmp_path):
+    shear = {"scene": {"periodic": "x"}, "fluid": {"gradient": [0.0, 3.0, 0.0, 0.0]}}
+    sheared, _, _ = study(tmp_path, shear).swarm(0)
+    still, _, _ = study(tmp_path, {"scene": {"periodic": "x"}}).swarm(0)
+    for one, other in zip(sheared.bodies, still.bodies, strict=True):
+        assert one.velocity[0] == pytest.approx(3.0 * one.position[1], rel=1e-9)
+        assert one.velocity[1] == pytest.approx(other.velocity[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("periodic", "gradient", "axis"),
+    [("xy", [0.0, 1.0, 0.0, 0.0], "y"), ("xy", [0.0, 0.0, 1.0, 0.0], "x"),
+     ("x", [1.0, 0.0, 0.0, -1.0], "x")],
+)  # fmt: skip
+def test_flows_that_do_not_repeat_themselves_say_the_way_out(tmp_path, periodic, gradient, axis):
+    changes = {"scene": {"periodic": periodic}, "fluid": {"gradient": gradient}}
+    with pytest.raises(UsageError, match=f"changes along {axis}.*shear flow u_x = g y"):
+        study(tmp_path, changes).swarm(0)
