@@ -9,7 +9,9 @@ import pytest
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.identity import PACKAGE, physics_digest, physics_files
 
-ENTRIES = ("ensembles/study.py", "ensembles/collision/encounter.py")
+ENTRIES = (
+    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/kernels/study.py",
+)  # fmt: skip
 """From these files a replicate reaches all that it runs."""
 
 NOT_PHYSICS = {
@@ -27,6 +29,9 @@ NOT_PHYSICS = {
     "io/trajectory.py": "writes motions",
     "io/plots/": "draws",
     "io/exchange/": "writes motions for other programs",
+    "io/results/kernel_group.py": "rates, which follow from rows",
+    "io/results/groups.py": "how rates are stored",
+    "io/labelled.py": "how rates are named",
     "io/outputs.py": "what may be written to",
     "io/own_mark.py": "what may be written to",
     "limits.py": "what the system allows; a row is what comes without an error",
