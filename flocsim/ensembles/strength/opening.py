@@ -104,7 +104,7 @@ class Watch:
         if not math.isnan(self.angle):
             self.turned += math.remainder(angle - self.angle, 2.0 * math.pi)
         self.angle = angle
-        self.opened = gap_of(self.bodies, state.position) > self.wide
+        self.opened = bool(gap_of(self.bodies, state.position) > self.wide)
         return self.opened or (self.turns and abs(self.turned) > TURN)
 
 
