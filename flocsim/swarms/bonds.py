@@ -15,7 +15,7 @@ on a wall does not settle: there the load is all the weight.
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
 import attrs
 import numpy as np
@@ -45,9 +45,6 @@ from flocsim.laws import CENTRE_FORCE, centre_force, compiled_calls, has, surfac
 from flocsim.plausibility.settling import least_mobility, terminal_motion
 from flocsim.swarms.clusters import placed_together
 from flocsim.swarms.contacts import Neighbours
-
-if TYPE_CHECKING:
-    from flocsim.swarms.swarm import Swarm
 
 TOUCHING, CERTIFICATE, HOOK, REST = range(4)
 KINDS = ("touching", "certificate", "hook", "rest")
@@ -114,9 +111,9 @@ class Bonds:
 
 
 class BondGauge:
-    """Tells the kinds of bonds of a swarm's bodies, wherever they are."""
+    """Tells the kinds of bonds of the bodies of a ``swarm`` (flocsim.Swarm), wherever they are."""
 
-    def __init__(self, swarm: "Swarm") -> None:
+    def __init__(self, swarm: Any) -> None:
         self.bodies = swarm.bodies
         self.scene = swarm.system.scene()._replace(box=swarm.box)
         self.pulls = compose(measure_pulls, {**compiled_calls(), **swarm.fillings()})
@@ -227,7 +224,7 @@ class BondGauge:
         return np.hypot(*(turns[0] - turns[1]).T) + np.abs(rolled) * self.sizes(held.pairs)
 
 
-def alone(swarm: "Swarm") -> tuple[np.ndarray, np.ndarray]:
+def alone(swarm: Any) -> tuple[np.ndarray, np.ndarray]:
     """(velocity (n, 2) [m/s], resistance (n,) [kg/s]) at which every body settles alone; nothing
     where no drag lets it."""
     known: dict[tuple, tuple[np.ndarray, float]] = {}
