@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from flocsim.ensembles.studies.study import Study
     from flocsim.ensembles.studies.sweep import SweepResults, sweep
     from flocsim.ensembles.studies.sweep import open_any as open
+    from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon

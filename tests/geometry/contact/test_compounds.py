@@ -167,8 +167,8 @@ def test_contacts_of_parts_are_seen():
     beads_there = beads()
     at = beads_there.parts[1].points[0]
     touching = np.array([[0.0, 0.0, 0.0], [at[0], at[1] - 2.5 + 1e-3, 0.0]])
-    found = np.unique(placed_contacts([beads_there, Sphere(0.5)], touching), axis=0)
-    assert len(found) == 1
+    found = placed_contacts([beads_there, Sphere(0.5)], touching)
+    assert len(found) > 0 and np.ptp(found, axis=0).max() < 1e-12  # once from either side
     assert found[0] == pytest.approx([at[0], at[1] - 2.0], abs=2e-3)
 
 
