@@ -10,10 +10,10 @@ import numpy as np
 
 (
     MASS, BUOYANT_MASS, INERTIA, FREE, EQUIVALENT_RADIUS, BOUNDING_RADIUS, RADIUS,
-    ELONGATION, LONG_AXIS,
-) = range(9)  # fmt: skip
-"""Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one; the last two are
-a shape's elongation and the angle of its long axis [rad]."""
+    ELONGATION, LONG_AXIS, IDENTITY,
+) = range(10)  # fmt: skip
+"""Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one; then a shape's
+elongation and the angle of its long axis [rad]; the number that a body's random forces go by."""
 
 X, Y, ANGLE, VX, VY, SPIN, MOTION_COLUMNS = range(7)
 """Columns of ``Work.motion``: place [m], counter-clockwise angle [rad] and their rates."""
@@ -56,14 +56,15 @@ along the tangent; displacements and such offsets that are set aside while the l
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    SHORTENED, LEADER_FORCE, LEADER_RATE, FRAMES,
-) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21  # fmt: skip
+    SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X, FRAMES,
+) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21, 22, 23, 26  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
 of velocity [m/s]; what all steps' errors, and those of switches, have led to; of the
 first body of a cluster: the share to which the carried error is shortened, the sums of forces, and
-of masses times accelerations (x, y); its frames at the stages of an implicit step."""
+of masses times accelerations (x, y); of body 0, where the present kick begins and how long it is,
+in the shortest kicks; the noise in it (x, y, angle); its frames at an implicit step's stages."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
@@ -161,7 +162,8 @@ class BodyView(NamedTuple):
     """One body, as a BodyForce kernel sees it. SI units; angle and spin counter-clockwise.
 
     ``elongation`` is B = (M₁ − M₂)/(M₁ + M₂) of the shape's principal second moments of area, and
-    ``angle + long_axis`` the angle of its long axis.
+    ``angle + long_axis`` the angle of its long axis; ``kick_x``, ``kick_y`` and ``kick_turn``
+    [1/√s] are means of white noise over the present kick, 0 where a scene has no random forces.
     """
 
     time: float
@@ -177,6 +179,9 @@ class BodyView(NamedTuple):
     radius: float
     elongation: float
     long_axis: float
+    kick_x: float = 0.0
+    kick_y: float = 0.0
+    kick_turn: float = 0.0
 
 
 class PairView(NamedTuple):
@@ -215,11 +220,12 @@ class ContactView(NamedTuple):
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers.
 
-    ``bodies`` (n, 9): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
+    ``bodies`` (n, 10): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
     flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws; ``surface_reach``
     and ``centre_reach``: the gaps up to which such forces act [m], −1 where there are none;
     ``smoothing``: see flocsim.forces.smoothing; ``box``: periods along x and y [m], inf where
-    nothing repeats.
+    nothing repeats; ``kicks`` and ``key``: how long random forces stay the same, and what they
+    are drawn by, see flocsim.integrators.loop.kicks.
     """
 
     bodies: np.ndarray
@@ -233,6 +239,8 @@ class Scene(NamedTuple):
     smoothing: tuple[float, float, float]
     events: int
     box: tuple[float, float]
+    kicks: tuple[float, float, float, float]
+    key: tuple[int, int]
 
 
 class Elimination(NamedTuple):
@@ -269,7 +277,7 @@ class Work(NamedTuple):
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
     ``slip`` (21, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
-    ``bodies`` (n, 36): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    ``bodies`` (n, 41): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
     ``jacobian`` (2, 2 n + 2 pairs, 3, 3): blocks of DAMPING and STIFFNESS, see rhs.blocks.
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.

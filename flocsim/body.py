@@ -25,6 +25,10 @@ NO_BOX = (math.inf, math.inf)
 """``Scene.box`` where nothing repeats."""
 
 
+NO_KICKS = (0.0, 0.0, 0.0, 0.0)
+"""``Scene.kicks`` of a scene without random forces."""
+
+
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
     """``length`` finite numbers, or texts such as "5 um", as a tuple of floats; UsageError for
     anything else."""
@@ -161,6 +165,8 @@ def scene_of(
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
     box: tuple[float, float] = NO_BOX,
+    kicks: tuple[float, float, float, float] = NO_KICKS,
+    key: tuple[int, int] = (0, 0),
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
     (flocsim.forces.codegen.Pieces); without, a scene that has no laws."""
@@ -175,6 +181,7 @@ def scene_of(
         [shape.radius for shape in shapes],
         [shape.elongation for shape in shapes],
         [shape.long_axis for shape in shapes],
+        list(range(len(bodies))),
     )
     return Scene(
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
@@ -186,4 +193,6 @@ def scene_of(
         smoothing=smoothing,
         events=int(events),
         box=box,
+        kicks=kicks,
+        key=key,
     )

@@ -3,6 +3,9 @@
 VACUUM_PERMITTIVITY = 8.854e-12
 """ε0 [F/m], rounded as the paper prints it (below eq. 6), so that its numbers come out."""
 
+BOLTZMANN = 1.380649e-23
+"""k_B [J/K], exact by definition."""
+
 STANDARD_GRAVITY = 9.81
 """g [m/s²], the value that MODEL's reference settling speeds were computed with."""
 

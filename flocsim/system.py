@@ -12,6 +12,7 @@ import numpy as np
 from flocsim.arrays import (
     ERROR,
     EVALUATIONS,
+    KICK_SPAN,
     NOW,
     RADIUS,
     REBUILDS,
@@ -30,6 +31,7 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.smoothing import smoothing_of
+from flocsim.forces.thermal import key_of, kicks_of
 from flocsim.geometry.contact import spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
@@ -92,6 +94,14 @@ def check_limits(until: float, max_steps: int) -> None:
         raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
 
 
+def read_seed(value: Any) -> tuple[int, ...]:
+    """A whole number from 0, or some of them, as a tuple; UsageError for anything else."""
+    numbers = (value,) if is_whole(value) else as_tuple(value, "seed")
+    if not numbers or not all(is_whole(each) and each >= 0 for each in numbers):
+        raise UsageError(f"seed must be a whole number from 0, or some of them, found {value!r}")
+    return tuple(int(each) for each in numbers)
+
+
 def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -> None:
     if not isinstance(value, Integrator):
         raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
@@ -101,7 +111,8 @@ def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -
 class System:
     """Bodies in a fluid, the forces on them, and the method that moves them.
 
-    Parameters: ``bodies``, Body objects; ``forces``, Force objects; ``integrator``; ``fluid``.
+    Parameters: ``bodies``, Body objects; ``forces``, Force objects; ``integrator``; ``fluid``;
+    ``seed``, a whole number from 0 or some of them (seed, replicate), by which random forces go.
 
     >>> from flocsim.forces import Gravity, StokesDrag
     >>> body = Body(Sphere(5e-6), density=2650.0)
@@ -113,6 +124,7 @@ class System:
     forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
     integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
     fluid: Fluid = attrs.field(factory=Fluid, validator=check_fluid)
+    seed: tuple[int, ...] = attrs.field(default=0, converter=read_seed, kw_only=True)
     pieces: Pieces = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
@@ -141,6 +153,7 @@ class System:
             surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach, 
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
+            kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:
@@ -259,6 +272,8 @@ class System:
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
+        if (run.scene.kicks, run.scene.key) != (scene.kicks, scene.key):
+            run.work.bodies[0, KICK_SPAN] = 0.0  # no kick has begun
         run.work.tally[REBUILDS] = 0
         run.work.tally[EVALUATIONS] = 0
         run.clock[TIME] = start.t[-1]

@@ -22,7 +22,7 @@ ROWS = [
     ["ensemble"],
     ["flocsim"],
     ["ensembles"],
-    ["swarms"],
+    ["brownian", "swarms"],
     ["system"],
     ["trajectories"],
     ["io"],
@@ -53,6 +53,7 @@ INNER_ROWS = {
         ["contacts", "islands", "neighbours", "placement", "walls"],
         ["arrays"],
     ],
+    "brownian": [["meeting"], ["splitting"]],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

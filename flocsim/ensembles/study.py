@@ -144,7 +144,8 @@ class Study:
     ) -> tuple[Encounter, tuple[float, float]]:
         """The Encounter and the two angles [rad] that a replicate's random numbers give."""
         numbers = draws(self.config.seed, replicate)
-        return self.encounter(condition, vertices, numbers), orientations(numbers)
+        encounter = self.encounter(condition, vertices, numbers)
+        return encounter.keyed(self.config.seed, replicate), orientations(numbers)
 
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
@@ -180,9 +181,8 @@ class Study:
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
         numbers = draws(self.config.seed, replicate)
-        encounter = self.encounter(condition, vertices, numbers)
+        encounter, angles = self.drawn(condition, vertices, replicate)
         driver = self.driver(encounter)
-        angles = orientations(numbers)
         max_steps = self.config.integrator.max_steps
         row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)
         if row is None:

@@ -4,6 +4,8 @@ import functools
 import re
 from decimal import Decimal, localcontext
 
+from flocsim.constants import BOLTZMANN
+
 KINDS = {
     "m": ("a length", "16.41 um"),
     "s": ("a time", "5 s"),
@@ -20,6 +22,7 @@ KINDS = {
     "rad/s": ("an angular velocity", "1 rad/s"),
     "N": ("a force", "1 pN"),
     "N m": ("a torque", "1e-18 N m"),
+    "K": ("a temperature", "298.15 K"),
     "1/m": ("a reciprocal length", "1.02 1/um"),
 }
 """What a quantity of a unit is called, and how one is written."""
@@ -40,9 +43,6 @@ PIXELS = ("px", "pixel", "dot", "pel", "picture_element", "css_pixel")
 
 LONGEST = 100
 """Letters of a number and its unit."""
-
-BOLTZMANN = Decimal("1.380649e-23")
-"""k [J/K], exact by definition."""
 
 # Far more digits than a float has, so that the only rounding is the last one.
 DIGITS = 60
@@ -104,7 +104,7 @@ def parse_unit(text):
         match = THERMAL.match(text, place)
         if match and match[2] is None:
             raise ValueError("kT needs its temperature, as in 'kT@298.15K'")
-        thermal = Decimal(match[2]) * BOLTZMANN if match else Decimal(1)
+        thermal = Decimal(match[2]) * Decimal(str(BOLTZMANN)) if match else Decimal(1)
         match = match or UNIT_FACTOR.match(text, place)
         if not match or not (thermal != 1 or match[2].isidentifier()) or not thermal > 0:
             raise ValueError(f"{text[place:].strip()!r} is no unit")
@@ -122,9 +122,13 @@ def unit_of(name):
     if name in PIXELS:
         raise ValueError(f"{name!r} is no unit of length: a pixel has the size that a picture has")
     try:
-        return registry().Unit(name)
+        unit = registry().Unit(name)
+        shifted = registry().Quantity(Decimal(0), unit).to_base_units().magnitude != 0
     except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"unknown unit {name!r}") from error
+    if shifted:
+        raise ValueError(f"{name!r} does not count from zero: give kelvins")
+    return unit
 
 
 def exponent_of(decimal, over, under):

@@ -6,6 +6,7 @@ from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.lubrication import Lubrication
+from flocsim.forces.thermal import Thermal
 from flocsim.forces.van_der_waals import VanDerWaals
 
 __all__ = [
@@ -20,5 +21,6 @@ __all__ = [
     "PairForce",
     "StokesDrag",
     "SurfaceForce",
+    "Thermal",
     "VanDerWaals",
 ]

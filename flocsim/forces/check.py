@@ -22,8 +22,42 @@ from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.forces.kernel_code import made_by, wrong_return
 
 SAMPLE_BODIES = (
-    BodyView(1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.6, 0.3),
-    BodyView(0.0, -2e-6, 3e-6, -0.5, -1e-4, 2e-4, -3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.0, 0.0),
+    BodyView(
+        1e-3,
+        2e-6,
+        -3e-6,
+        0.5,
+        1e-4,
+        -2e-4,
+        3.0,
+        2e-10,
+        1e-10,
+        2e-21,
+        5e-6,
+        0.6,
+        0.3,
+        10.0,
+        -20.0,
+        30.0,
+    ),
+    BodyView(
+        0.0,
+        -2e-6,
+        3e-6,
+        -0.5,
+        -1e-4,
+        2e-4,
+        -3.0,
+        2e-10,
+        1e-10,
+        2e-21,
+        5e-6,
+        0.0,
+        0.0,
+        -10.0,
+        20.0,
+        -30.0,
+    ),
 )
 SAMPLE_CONTACTS = tuple(
     ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6)

@@ -21,7 +21,7 @@ def changed_body(view, axis, by):
         view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
         view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
         view.mass, view.buoyant_mass, view.inertia, view.radius,
-        view.elongation, view.long_axis,
+        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
     )  # fmt: skip
 
 

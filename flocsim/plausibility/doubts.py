@@ -10,7 +10,10 @@ from flocsim.body import Body
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import ContactForce
 from flocsim.forces.contact import Contact
+from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
+from flocsim.forces.lubrication import Lubrication
+from flocsim.forces.thermal import Thermal
 from flocsim.plausibility.ranges import RADIUS, ROUNDING, unusual
 from flocsim.plausibility.reynolds import all_settled, beyond_the_law
 
@@ -55,6 +58,7 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     lines += [
         about_weight(first.fluid, bodies, forces, names.buoyancy),
         beyond_the_law(settled, forces),
+        about_kicks(forces),
         about_contacts(max(len(system.bodies) for system in systems), forces, names.drop),
     ]
     return [line for line in dict.fromkeys(lines) if line]
@@ -86,6 +90,32 @@ def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cur
         f"{fluid.density:g} kg/m^3 (Clift, Grace and Weber 1978, Bubbles, Drops and Particles, "
         f"ch. 5): give {cure}"
     )
+
+
+def about_kicks(forces: dict[str, Any]) -> str:
+    """A line where random forces are not balanced by the resistance that belongs to them."""
+    for name, thermal in forces.items():
+        if not isinstance(thermal, Thermal):
+            continue
+        drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
+        if not drags:
+            return (
+                f"{name} kicks the bodies without end, but no StokesDrag takes its energy up: they "
+                "are no longer at its temperature: add the drag"
+            )
+        if thermal.rotational != drags[0].rotational:
+            return (
+                f"{name} and the drag do not agree about rotation, so that spins are not at the "
+                "temperature: give both the same rotational"
+            )
+        for other, each in forces.items():
+            if isinstance(each, Lubrication):
+                return (
+                    f"{other} resists the motion that {name} makes and is not kicked in turn: near "
+                    "contact bodies move as if it were colder; leave one of them out, or read "
+                    "rates of meeting as lower bounds"
+                )
+    return ""
 
 
 def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:

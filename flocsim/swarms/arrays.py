@@ -34,7 +34,7 @@ to go, and from when; how far it may stray from it, and how far it has [m]."""
 class Swarm(NamedTuple):
     """n bodies at a common time.
 
-    ``bodies`` (n, 9), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
+    ``bodies`` (n, 10), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
     ``carried`` (n, 6), ``errors`` (n, 4), ``steps`` (n,): the state, the vector of its error, what
     the errors of steps and switches have led to, the size of the next step [s].  ``wander`` (n,):
     how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),

@@ -13,11 +13,13 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
+from flocsim.forces.thermal import kicks_of
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.geometry.contact.separation import PERIODIC
 from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.contacts import Gauge
@@ -26,7 +28,7 @@ from flocsim.swarms.neighbours import find_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.trajectory import SwarmTrajectory
-from flocsim.system import System, check_bodies, check_forces
+from flocsim.system import System, check_bodies, check_forces, read_seed
 
 LEAST_BOX = 3.0
 """A box that repeats itself is so many times as wide as the largest body at least: two bodies must
@@ -60,7 +62,7 @@ class Swarm:
     """Many bodies in a fluid, moved as islands of those that act on each other.
 
     Parameters: as for a System; ``box``, (width, height) [m] of a space that repeats itself along x
-    and y, None for an axis along which it does not.
+    and y, None for an axis along which it does not; ``seed``, as for a System.
 
     Each island has its own steps, its own lists and its own switches, from one common time to the
     next, and pair forces end at their reach. UsageError for forces without a reach among more than
@@ -74,15 +76,21 @@ class Swarm:
     fluid: Fluid = attrs.field(factory=Fluid)
     box: tuple[float, float] = attrs.field(default=None, converter=read_box, kw_only=True)
     all_pairs: bool = attrs.field(default=False, kw_only=True)
+    seed: tuple[int, ...] = attrs.field(default=0, converter=read_seed, kw_only=True)
     system: System = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        system = System(self.bodies, self.forces, self.integrator, self.fluid)
+        system = System(self.bodies, self.forces, self.integrator, self.fluid, seed=self.seed)
         object.__setattr__(self, "system", system)
         if all(body.fixed for body in self.bodies):
             raise UsageError("a Swarm needs at least one body that moves")
         self.check_reach()
         self.check_box()
+        if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
+            raise UsageError(
+                "a swarm takes kicks of one length, the same in all of its islands: give "
+                'Thermal(kick="1 ms"), or some other time, and leave finest out'
+            )
 
     def __repr__(self) -> str:
         return repr(self.system).replace("System", "Swarm")

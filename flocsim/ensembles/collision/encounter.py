@@ -1,5 +1,6 @@
 """The binary collision scene: one replicate from its random numbers to its outcome."""
 
+import copy
 import functools
 import math
 from collections.abc import Callable, Sequence
@@ -16,8 +17,10 @@ from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.schema import Config, SceneConfig
 from flocsim.errors import UsageError
+from flocsim.forces.thermal import key_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.loop.kicks import KICK
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 from flocsim.plausibility.settling import (
     largest_mobility,
@@ -68,6 +71,15 @@ class Encounter:
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
         return self.system.scene()
+
+    def keyed(self, *numbers: int) -> "Encounter":
+        """The same for a replicate whose random forces go by these numbers (seed, replicate)."""
+        if not self.scene.kicks[KICK] > 0.0:
+            return self
+        other = copy.copy(self)
+        object.__setattr__(other, "system", attrs.evolve(self.system, seed=numbers))
+        other.__dict__["scene"] = self.scene._replace(key=key_of(*numbers))
+        return other
 
     @property
     def shapes(self) -> tuple[Shape, ...]:

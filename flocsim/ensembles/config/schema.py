@@ -42,7 +42,15 @@ from flocsim.ensembles.config.values import (
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
-from flocsim.forces import Contact, DoubleLayer, Gravity, Lubrication, StokesDrag, VanDerWaals
+from flocsim.forces import (
+    Contact,
+    DoubleLayer,
+    Gravity,
+    Lubrication,
+    StokesDrag,
+    Thermal,
+    VanDerWaals,
+)
 from flocsim.forces.base import Force
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
@@ -660,6 +668,7 @@ FORCES: dict[str, type] = {
     "double_layer": DoubleLayer,
     "contact": Contact,
     "lubrication": Lubrication,
+    "thermal": Thermal,
 }
 """Name of the table [forces.NAME] → class, in the order of Config.forces."""
 

@@ -172,7 +172,7 @@ class SwarmStudy:
                                                                    strict=True))  # fmt: skip
         swarm = Swarm(
             bodies, forces, self.config.integrator.method, fluid, box=box,
-            all_pairs=self.scene.all_pairs,
+            all_pairs=self.scene.all_pairs, seed=(self.config.seed, replicate),
         )  # fmt: skip
         return swarm, drawn, (width, height)
 

@@ -38,6 +38,7 @@ from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
 from flocsim.integrators.events.modes import SAME, set_modes
+from flocsim.integrators.loop.kicks import meet_kick, renew_kicks
 from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
 from flocsim.integrators.rhs.friction import hold_slides
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
@@ -83,6 +84,7 @@ def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
     clock[TIME] += step
+    meet_kick(scene, work, clock)
     counts[STEPS] += 1
     if clock[TOLERANCE] < math.inf:
         carry_errors(scene, work, clock, step)
@@ -179,6 +181,7 @@ def advance(scene, work, observed, clock, counts, record):
             return status
         if lists and trials == 0 and not keep_lists(scene, work):
             return NO_ROOM
+        renew_kicks(scene, work, clock)
         step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
         if scene.surface_reach > 0.0:
             flag_near(scene, work, NOW, step)

@@ -26,6 +26,7 @@ from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolutions_of
 from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
 from flocsim.integrators.events.resolution import touch_resolution
+from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.views import normal_rate
 
 SAFETY = 0.9
@@ -110,7 +111,7 @@ def choose_step(scene, work, clock, lists):
         step = min(step, time_within(scene, work, 0.5))
         if clock[TOLERANCE] < math.inf:
             step = imminent_switch(scene, work, clock, step)
-    left = clock[UNTIL] - clock[TIME]
+    left = min(clock[UNTIL], kick_end(scene, work)) - clock[TIME]
     # Two even steps at the end instead of a long one and a sliver.
     if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
         return 0.5 * left

@@ -16,6 +16,7 @@ from flocsim.arrays import (
     FY,
     GAP,
     INERTIA,
+    KICK_X,
     LONG_AXIS,
     MASS,
     NORMAL_X,
@@ -47,6 +48,7 @@ def body_view(scene, work, time, state, body):
         motion[state, body, VX], motion[state, body, VY], motion[state, body, SPIN],
         known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
         known[body, EQUIVALENT_RADIUS], known[body, ELONGATION], known[body, LONG_AXIS],
+        work.bodies[body, KICK_X], work.bodies[body, KICK_X + 1], work.bodies[body, KICK_X + 2],
     )  # fmt: skip
 
 

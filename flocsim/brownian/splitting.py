@@ -1,0 +1,147 @@
+"""Two spheres that diffuse against each other in their interaction: touch or escape, as integrals.
+
+The probability P(r) to come to the centre distance R = r_i + r_j before the distance b solves
+P'' + ((d − 1)/r − V'/k_B T) P' = 0 in d dimensions, so that
+
+    P(r) = ∫_r^b e^(V/k_B T) s^(1−d) ds / ∫_R^b e^(V/k_B T) s^(1−d) ds.
+
+Source: Gardiner (2009), Stochastic Methods, section 5.5.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from flocsim.arrays import PairView
+from flocsim.body import Fluid
+from flocsim.constants import BOLTZMANN
+from flocsim.errors import UsageError
+from flocsim.fields import in_unit, is_number
+from flocsim.forces.base import Force
+from flocsim.forces.codegen import laws_of
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+LEAST_GAP, PANELS_A_DECADE = 1e-13, 40
+"""[m] End of the first panel, and panels of quadrature for a factor of ten in the gap."""
+
+FAR = 1e3
+"""Distance, in r_i + r_j, up to which W is integrated as it stands; beyond, V counts as none."""
+
+
+def antiderivatives() -> np.ndarray:
+    """Matrix (12, 12) from values at the nodes to integrals from −1 up to each node."""
+    powers = np.vander(NODES, increasing=True)
+    rising = NODES[:, None] ** np.arange(1, 13) - (-1.0) ** np.arange(1, 13)
+    return (rising / np.arange(1, 13)) @ np.linalg.inv(powers)
+
+
+def length(name: str, value: float | str) -> float:
+    """A length above zero [m]; UsageError for anything else."""
+    number = in_unit(value, "m", name)
+    if not is_number(number) or not number > 0.0:
+        raise UsageError(f"{name} must be a length above 0 m, found {value!r}")
+    return float(number)
+
+
+def repulsion(
+    forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid
+) -> Callable[[np.ndarray], np.ndarray]:
+    """A function of gaps (k,) [m] that gives the force between two spheres at rest [N]."""
+    pieces = laws_of(forces, fluid)
+    laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
+    r_i, r_j = radii
+    reduced = r_i * r_j / (r_i + r_j)
+
+    def found(gaps):
+        views = [
+            PairView(0.0, g, 0.0, g + r_i + r_j, r_i, r_j, reduced, 1.0) for g in gaps.tolist()
+        ]
+        return np.array([sum(law(view, pieces.parameters) for law in laws) for view in views])
+
+    return found
+
+
+class Profile:
+    """V/k_B T of two spheres on panels of their gap, from touching to ``far`` [m]; V(far) = 0."""
+
+    def __init__(
+        self, forces: Sequence[Force], radii: tuple[float, float], temperature: float,
+        fluid: Fluid, far: float, marks: Sequence[float] = (),
+    ) -> None:  # fmt: skip
+        decades = math.log10(max(far, 10.0 * LEAST_GAP) / LEAST_GAP)
+        ends = np.geomspace(LEAST_GAP, far, max(2, round(PANELS_A_DECADE * decades)))
+        # Where a law has a kink a panel ends.
+        kinks = [getattr(force, "d_min", far) for force in forces]
+        reaches = [getattr(force, "reach", far) for force in forces]
+        kept = [each for each in (*kinks, *reaches, *marks) if 0.0 < each < far]
+        self.ends = np.unique(np.concatenate([[0.0], ends, kept]))
+        self.half = 0.5 * np.diff(self.ends)[:, None]
+        self.gaps = self.ends[:-1, None] + self.half * (NODES + 1.0)
+        self.total = sum(radii)
+        force = repulsion(forces, radii, fluid)(self.gaps.ravel()).reshape(self.gaps.shape)
+        force = force / (BOLTZMANN * temperature)
+        within = self.half * (force @ antiderivatives().T)
+        whole = (self.half * force) @ WEIGHTS
+        behind = np.concatenate([np.cumsum(whole[::-1])[::-1], [0.0]])
+        self.potential = behind[:-1, None] - within
+
+    def integral(self, begin: float, end: float, dimensions: int) -> float:
+        """∫ e^(V/k_B T) s^(1−d) ds between two gaps that are ends of panels [m^(2−d)]."""
+        rows = (self.ends[:-1] >= begin) & (self.ends[1:] <= end)
+        distance = self.gaps[rows] + self.total
+        inner = np.exp(self.potential[rows]) * distance ** (1.0 - dimensions)
+        return float(np.sum((self.half[rows] * inner) @ WEIGHTS))
+
+
+def splitting_probability(
+    forces: Sequence[Force], radii: tuple[float, float], release: float | str,
+    escape: float | str, *, temperature: float = 298.15, dimensions: int = 2,
+    fluid: Fluid | None = None,
+) -> float:  # fmt: skip
+    """Probability that two spheres touch before their centres are ``escape`` apart [m].
+
+    ``forces``: those between them (others are of no matter); ``radii`` (r_i, r_j) [m];
+    ``release``: their centres' distance at first [m]; ``dimensions`` 2, as in a System, or 3.
+    UsageError unless r_i + r_j ≤ release ≤ escape.
+    """
+    r_i, r_j = (length("radii", each) for each in radii)
+    near, far = length("release", release), length("escape", escape)
+    check_conditions(temperature, dimensions)
+    touch = r_i + r_j
+    if not touch <= near <= far or not touch < far:
+        raise UsageError(
+            f"release must lie between r_i + r_j = {touch:g} m and escape = {far:g} m, found "
+            f"{near:g} m"
+        )
+    begin, end = near - touch, far - touch
+    profile = Profile(forces, (r_i, r_j), temperature, fluid or Fluid(), end, [begin])
+    outside = profile.integral(begin, end, dimensions)
+    return outside / profile.integral(0.0, end, dimensions)
+
+
+def stability_ratio(
+    forces: Sequence[Force], radii: tuple[float, float], *, temperature: float = 298.15,
+    fluid: Fluid | None = None,
+) -> float:  # fmt: skip
+    """W: by how much the interaction of two spheres slows down their coagulation by diffusion.
+
+    W = R ∫_R^∞ e^(V/k_B T) s⁻² ds with R = r_i + r_j, 1 without forces; the rate is 4π D R n/W for
+    a relative diffusion D.  Source: Fuchs (1934), as in Russel, Saville and Schowalter (1989),
+    Colloidal Dispersions, section 8.4.
+    """
+    r_i, r_j = (length("radii", each) for each in radii)
+    check_conditions(temperature, 3)
+    touch = r_i + r_j
+    end = FAR * touch
+    profile = Profile(forces, (r_i, r_j), temperature, fluid or Fluid(), end)
+    return touch * (profile.integral(0.0, end, 3) + 1.0 / (touch + end))
+
+
+def check_conditions(temperature: float, dimensions: int) -> None:
+    """UsageError for no temperature, or no space, to diffuse in."""
+    if not is_number(temperature) or not temperature > 0.0:
+        raise UsageError(f"temperature must be above 0 K, found {temperature!r}")
+    if dimensions not in (2, 3):
+        raise UsageError(f"dimensions must be 2 or 3, found {dimensions!r}")

@@ -1,0 +1,134 @@
+"""Thermal motion: the kicks of the fluid's molecules, which Stokes's drag balances."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.body import Body, Fluid
+from flocsim.constants import BOLTZMANN, MINIMUM_GAP
+from flocsim.errors import UsageError
+from flocsim.fields import flag, quantity, word_or_quantity
+from flocsim.forces.base import BodyForce, Force
+
+FAR_SHARE = 0.1
+"""Share of the smallest radius by which a kick of automatic length moves two bodies against each
+other while they are far apart."""
+
+MOST_HALVINGS = 40
+"""More would take a kick below what a double can tell of the time."""
+
+
+@attrs.frozen
+class Thermal(BodyForce):
+    """Random force √(2 k_B T ζ/τ) ξ_k, constant over each kick [kτ, (k + 1)τ), and torque alike.
+
+    ζ = 6πγ r_eq, 8πγ r_eq³ for the torque, as in Stokes's drag, which has to be there, too; each ξ
+    is a standard normal number for each body, kick and coordinate. A free body diffuses
+    with D = k_B T/ζ at any τ; its velocity where kicks end has
+    ⟨v²⟩ = (k_B T/m) tanh(x/2)/(x/2), x = ζτ/m.
+
+    Parameters: ``temperature`` T [K]; ``kick`` τ [s], "auto": as long as it takes two bodies to
+    diffuse a tenth of the smaller radius against each other; ``finest`` [m]: where bodies are
+    near each other kicks are halved (a Brownian bridge) until one moves them by no more than a
+    quarter of the gap, or by ``finest``; "auto": 1 nm where the kick is automatic, and no halving
+    where it is given. ``rotational``: the torque, to be switched off with that of the drag.
+
+    The numbers follow from the seed, the replicate, the body and the kick alone.
+
+    Source: Ermak and McCammon (1978), J. Chem. Phys. 69, 1352, without hydrodynamic interaction.
+    """
+
+    temperature: float = quantity("K", at_least=0.0, default=298.15)
+    kick: float | str = word_or_quantity(
+        "auto", "s", above=0.0, default="auto", help="how long a random force stays the same"
+    )
+    finest: float | str = word_or_quantity(
+        "auto", "m", above=0.0, default="auto",
+        help="kicks are halved near contact down to this way",
+    )  # fmt: skip
+    rotational: bool = flag(default=True, help="random torque, too")
+
+    @property
+    def absent(self) -> str:
+        return "temperature is zero" if self.temperature == 0.0 else ""
+
+    @property
+    def energy(self) -> float:
+        """k_B T [J]."""
+        return BOLTZMANN * self.temperature
+
+    def diffusion(self, fluid: Fluid, radius: float) -> float:
+        """D = k_B T/(6πγ r) of a sphere [m²/s]."""
+        return self.energy / (6.0 * math.pi * fluid.viscosity * radius)
+
+    def rotational_diffusion(self, fluid: Fluid, radius: float) -> float:
+        """D_r = k_B T/(8πγ r³) of a sphere [1/s]."""
+        return self.energy / (8.0 * math.pi * fluid.viscosity * radius**3)
+
+    @property
+    def least_way(self) -> float:
+        """The way in a kick below which none is halved [m]; inf where none is at all."""
+        if isinstance(self.finest, str):
+            return MINIMUM_GAP if isinstance(self.kick, str) else math.inf
+        return self.finest
+
+    def remarks(self, fluid: Fluid) -> list[str]:
+        """How long kicks are."""
+        length = (
+            f"as long as diffusion by {FAR_SHARE:g} of the smallest radius takes"
+            if isinstance(self.kick, str)
+            else f"of {self.kick:.3g} s"
+        )
+        least = self.least_way
+        near = "" if least == math.inf else f", halved near contact down to ways of {least:.3g} m"
+        return [f"steps end at kicks {length}{near}"]
+
+    @staticmethod
+    def kernel(body, viscosity, energy, rotational):
+        """√(2 k_B T ζ) times the mean of white noise over the present kick."""
+        radius = body.radius
+        force = math.sqrt(12.0 * math.pi * viscosity * radius * energy)
+        torque = math.sqrt(16.0 * math.pi * viscosity * radius**3 * energy) * rotational
+        return force * body.kick_x, force * body.kick_y, torque * body.kick_turn
+
+
+def kicks_of(
+    forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid
+) -> tuple[float, float, float, float]:
+    """Scene.kicks of these forces on these bodies; zeros without random forces.
+
+    UsageError for more than one of them.
+    """
+    found = [force for force in forces if isinstance(force, Thermal) and not force.absent]
+    radii = sorted(body.shape.equivalent_radius for body in bodies if not body.fixed)
+    if not found or not radii:
+        return 0.0, 0.0, 0.0, 0.0
+    if len(found) > 1:
+        raise UsageError("a scene has one temperature: give one Thermal force")
+    thermal = found[0]
+    spread = 2.0 * sum(thermal.diffusion(fluid, radius) for radius in radii[:2])
+    kick: Any = thermal.kick
+    if kick == "auto":
+        kick = (FAR_SHARE * radii[0]) ** 2 / spread
+    least, halvings = thermal.least_way, 0
+    pairs = any(not isinstance(force, BodyForce) and not force.absent for force in forces)
+    if pairs and len(bodies) > 1 and spread * kick > least**2:
+        halvings = min(math.ceil(math.log2(spread * kick / least**2)), MOST_HALVINGS)
+    return float(kick), float(halvings), float(spread), least if halvings else 0.0
+
+
+def key_of(*numbers: int) -> tuple[int, int]:
+    """Scene.key of a seed and of what it is spawned by, whole numbers from 0: two words of 32 bits.
+
+    As the start of a replicate's own numbers, and apart from it.
+    """
+    stream = np.random.SeedSequence(numbers[0], spawn_key=(*numbers[1:], KICKS))
+    first, second = stream.generate_state(2).tolist()
+    return first, second
+
+
+KICKS = 0x7E4D
+"""Keeps kicks apart from what else is drawn with a seed and a replicate."""

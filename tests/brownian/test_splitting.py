@@ -1,0 +1,106 @@
+"""Probabilities to touch before escaping, and stability ratios, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from flocsim.brownian.splitting import splitting_probability, stability_ratio
+from flocsim.errors import UsageError
+from flocsim.forces import Contact, DoubleLayer, Gravity, VanDerWaals
+
+KT = 1.380649e-23 * 298.15
+SMALL = (1e-7, 1e-7)
+
+
+def colloid(gap="equivalent_spheres"):
+    return [VanDerWaals(1e-20, 1e-9, gap), DoubleLayer(14e-3, 3.04e-9, gap=gap)]
+
+
+@pytest.mark.parametrize(("release", "escape"), [(2.0, 4.0), (1.0, 4.0), (1.5, 20.0), (4.0, 4.0)])
+def test_without_forces_it_is_a_logarithm_or_a_reciprocal(release, escape):
+    radii = (0.5, 0.5)
+    flat = splitting_probability([], radii, release, escape)
+    assert flat == pytest.approx(math.log(escape / release) / math.log(escape), abs=1e-9)
+    round_ = splitting_probability([], radii, release, escape, dimensions=3)
+    assert round_ == pytest.approx((1 / release - 1 / escape) / (1.0 - 1 / escape), abs=1e-9)
+
+
+def test_released_at_twice_the_distance_of_four_it_is_even():
+    assert splitting_probability([], (0.5, 0.5), 2.0, 4.0) == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("gap", ["equivalent_spheres", "surface"])
+def test_a_colloid_of_100_nm(gap):
+    found = splitting_probability(colloid(gap), SMALL, "300 nm", "600 nm")
+    assert found == pytest.approx(0.7021, abs=5e-5)
+
+
+def potential(h):
+    """V/k_B T of that colloid by hand: attraction flat below 1 nm, repulsion exponential."""
+    reduced, kappa = 0.5e-7, 1.0 / 3.04e-9
+    strength = 4.0 * math.pi * 8.854e-12 * 78.5 * 14e-3**2
+    pulled = 1e-20 * reduced / 6.0
+    attraction = -pulled / h if h > 1e-9 else -pulled * (1e9 + (1e-9 - h) * 1e18)
+    return (attraction + strength * reduced * math.exp(-kappa * h)) / KT
+
+
+def test_it_is_the_integral_over_the_potential():
+    def integral(begin, end):
+        return quad(lambda h: math.exp(potential(h)) / (2e-7 + h), begin, end,
+                    points=[min(1.0001e-9, end)] if begin < 1e-9 else None, epsrel=1e-10,
+                    limit=500)[0]  # fmt: skip
+
+    inner = integral(0.0, 2e-8) + integral(2e-8, 1e-7)
+    outer = integral(1e-7, 4e-7)
+    found = splitting_probability(colloid(), SMALL, 3e-7, 6e-7)
+    assert found == pytest.approx(outer / (inner + outer), rel=2e-4)
+
+
+def test_forces_that_are_none_between_bodies_do_not_matter():
+    more = [*colloid(), Gravity(), Contact()]
+    assert splitting_probability(more, SMALL, 3e-7, 6e-7) == splitting_probability(
+        colloid(), SMALL, 3e-7, 6e-7
+    )
+
+
+def test_stability_ratio():
+    assert stability_ratio([], SMALL) == pytest.approx(1.0, abs=1e-9)
+    assert stability_ratio([VanDerWaals(1e-20)], SMALL) < 1.0
+    barrier = [VanDerWaals(1e-20), DoubleLayer(40e-3, 3.04e-9)]
+    assert stability_ratio(barrier, SMALL) > 1e3
+    # Fuchs: R ∫ e^V/s² ds, by hand, for repulsion alone.
+    alone = [DoubleLayer(14e-3, 3.04e-9)]
+    strength = 4.0 * math.pi * 8.854e-12 * 78.5 * 14e-3**2 * 0.5e-7 / KT
+
+    def slowed(h):
+        return math.expm1(strength * math.exp(-h / 3.04e-9)) / (2e-7 + h) ** 2
+
+    inner = quad(slowed, 0.0, 1e-7, epsrel=1e-10)[0]
+    assert stability_ratio(alone, SMALL) == pytest.approx(1.0 + 2e-7 * inner, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"release": 1e-7}, "release must lie between"),
+        ({"release": 7e-7}, "release must lie between"),
+        ({"escape": math.inf}, "escape must be a length"),
+        ({"temperature": 0.0}, "temperature must be above 0 K"),
+        ({"dimensions": 4}, "dimensions must be 2 or 3"),
+        ({"radii": (1e-7, -1e-7)}, "radii must be a length"),
+    ],
+)
+def test_bad_input_is_refused(changed, words):
+    given = {"forces": [], "radii": SMALL, "release": 3e-7, "escape": 6e-7} | changed
+    with pytest.raises(UsageError, match=words):
+        splitting_probability(**given)
+
+
+def test_colder_bodies_meet_less_often_across_a_barrier():
+    barrier = [DoubleLayer(30e-3, 3.04e-9)]
+    found = [
+        splitting_probability(barrier, SMALL, 3e-7, 6e-7, temperature=t) for t in (250, 300, 350)
+    ]
+    assert np.all(np.diff(found) > 0.0)
