@@ -26,6 +26,7 @@ from flocsim.commands import (
     plot,
     report,
     shapes,
+    strength,
     sweep,
     trajectory,
     work_precision,
@@ -35,7 +36,7 @@ from flocsim.errors import FileError, FlocsimError
 
 COMMANDS = (
     init, fit, shapes, check, ensemble, sweep, trajectory, plot, report, export, compare,
-    work_precision, info,
+    strength, work_precision, info,
 )  # fmt: skip
 
 

@@ -64,6 +64,7 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
+        ["strength"],
         ["cli", "studies"],
         ["dry_run", "runner", "report", "unfinished", "suspension"],
         ["parallel"],
@@ -104,6 +105,7 @@ HEAVYWEIGHTS = {
         "io/results/layout.py",
         "io/results/groups.py",
         "io/results/swarm_file.py",
+        "io/results/strength_file.py",
         "io/results/sweep_file.py",
         "io/shapes/library.py",
         "io/trajectory.py",

@@ -8,6 +8,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
+from flocsim.io.plots.strength import STRENGTH_FIGURES
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.plots.swarm import SWARM_FIGURES, write_swarm_animation
 from flocsim.io.plots.sweep import SWEEP_FIGURES
@@ -22,6 +23,8 @@ Of a trajectory file (flocsim trajectory --save, Trajectory.save):
 {motion}
 Of the joined file of flocsim sweep:
 {sweep}
+Of a file of flocsim strength:
+{strength}
 Of a swarm study:
 {swarm}
 Of a study that still runs, its figures so far are drawn, marked as unfinished.
@@ -64,6 +67,7 @@ def add_parser(subparsers: Any) -> None:
             motion=listed(MOTION_FIGURES),
             sweep=listed(SWEEP_FIGURES),
             swarm=listed(SWARM_FIGURES),
+            strength=listed(STRENGTH_FIGURES),
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -133,7 +137,7 @@ def read_content(path):
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
     from flocsim.io import trajectory
     from flocsim.io.opening import kind_of
-    from flocsim.io.results import swarm_file, sweep_file
+    from flocsim.io.results import strength_file, swarm_file, sweep_file
     from flocsim.io.results.file import read_results
     from flocsim.io.results.layout import FORMAT
     from flocsim.io.shapes.library import is_library, read_library
@@ -147,6 +151,8 @@ def read_content(path):
         return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
     if kind == sweep_file.FORMAT:
         return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
+    if kind == strength_file.FORMAT:
+        return strength_file.read_strengths(path), STRENGTH_FIGURES, ""
     if kind == swarm_file.FORMAT:
         found = swarm_file.read_swarm(path)
         many = len(found.scales["class"]) > 1
@@ -160,7 +166,8 @@ def read_content(path):
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES)
+    known = (*POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES,
+             *STRENGTH_FIGURES)  # fmt: skip
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

@@ -1,7 +1,7 @@
 """`flocsim work-precision cfg.toml`: flips against CPU time of a study, for every tolerance.
 
-With `--replicate 17`, error against run time of one collision (`flocsim.commands.ladder` is the
-other).
+With `--replicate 17`, error against run time of one collision (the other is
+`flocsim.commands.precision.ladder`).
 """
 
 from argparse import Namespace
@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.commands import ladder
+from flocsim.commands.precision import ladder
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.config.loader import load_config

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.commands import ladder
+from flocsim.commands.precision import ladder
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.pilot.ladder import Job
 from flocsim.ensembles.pilot.sample import sample_of

@@ -1,0 +1,1 @@
+"""What `flocsim work-precision` is made of: the whole ladder of both methods."""

@@ -1,0 +1,4 @@
+"""How strong bonds are: at what rate a flow opens the doublets that a study has found bound.
+
+`opening` runs one doublet at rising rates; `survey` all doublets of a results file.
+"""

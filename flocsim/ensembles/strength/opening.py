@@ -1,0 +1,197 @@
+"""The rate at which a flow opens a doublet, by runs at rising rates from where it is bound."""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from flocsim.arrays import PairView
+from flocsim.body import Body, Fluid
+from flocsim.constants import MINIMUM_GAP
+from flocsim.errors import PlausibilityWarning
+from flocsim.forces.base import Force
+from flocsim.forces.codegen import laws_of
+from flocsim.forces.gravity import Gravity
+from flocsim.forces.thermal import Thermal
+from flocsim.geometry.contact.overlap import distance_between
+from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.overdamped import Overdamped
+from flocsim.system import System
+from flocsim.trajectories.trajectory import State, Trajectory
+
+FLOWS: dict[str, tuple[tuple[float, float, float, float], float]] = {
+    "shear": ((0.0, 1.0, 0.0, 0.0), 0.0),
+    "extension": ((0.5, 0.0, 0.0, -0.5), 0.25 * math.pi),
+}
+"""Gradients of flows of unit rate G: u = (G y, 0), and u = (G x, −G y)/2, which pulls as hard; and
+the angle [rad] from the flow's x to the line of centres at first. In shear that begins by pressing
+the bodies together, and in extension the doublet turns into the pull."""
+
+OPEN = 0.1
+"""A doublet is open once its outlines are this share of the smaller equivalent radius apart."""
+
+TURN = 1.05 * math.pi
+"""By so much a doublet in shear has turned when it has met the flow from every side: half a turn is
+the same flow again."""
+
+LONGEST = 60.0
+"""Strain G t after which a doublet that has not opened is taken to hold."""
+
+LEAST, MOST = -12, 8
+"""The ladder of rates: from 2^LEAST to 2^MOST times the rate that would open two spheres."""
+
+TOLERANCE = 1e-11
+"""[m] of the runs: far below the gap at which attraction gives way."""
+
+OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(4)
+"""What was found: see io.results.strength_file.STATUS."""
+
+
+@attrs.frozen
+class Opening:
+    """Between which rates a doublet opens: it ``holds`` at one and ``opens`` at the next [1/s].
+
+    NaN where there is none; ``status``: a code of STATUS; ``runs`` made.
+    """
+
+    holds: float
+    opens: float
+    status: int
+    runs: int
+
+
+def strongest(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
+    """The largest attraction of two spheres at any gap [N]."""
+    pieces, (r_i, r_j) = laws_of(forces, fluid), radii
+    reduced = r_i * r_j / (r_i + r_j)
+    gaps = [0.0, *np.geomspace(1e-2 * MINIMUM_GAP, 10.0 * (r_i + r_j), 400).tolist()]
+    views = [PairView(0.0, g, 0.0, g + r_i + r_j, r_i, r_j, reduced, 1.0) for g in gaps]
+    laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
+    return max(0.0, *(-sum(law(view, pieces.parameters) for law in laws) for view in views))
+
+
+def sphere_rate(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
+    """G at which a shear opens two spheres [1/s]: F = 6πγ r* G R/2 is their largest attraction.
+
+    R = r_i + r_j, r* = r_i r_j/R: the pull of a shear along the line of centres, at 45° to the flow
+    and without inertia. For van der Waals forces that is G = H_A/(18πγ d_min² R).
+    """
+    r_i, r_j = radii
+    film = 6.0 * math.pi * fluid.viscosity * r_i * r_j / (r_i + r_j)
+    return 2.0 * strongest(forces, radii, fluid) / (film * (r_i + r_j))
+
+
+def gap_of(bodies: Sequence[Body], position: np.ndarray) -> float:
+    """Distance of two outlines [m], below 0 where they overlap."""
+    cores = [
+        body.shape.placed_vertices(*place) for body, place in zip(bodies, position, strict=True)
+    ]
+    return distance_between(*cores) - sum(body.shape.radius for body in bodies)
+
+
+class Watch:
+    """Stops a run once the doublet is open, or has met the flow from every side."""
+
+    def __init__(self, bodies: Sequence[Body], turns: bool) -> None:
+        self.bodies, self.turns = bodies, turns
+        self.wide = OPEN * min(body.shape.equivalent_radius for body in bodies)
+        self.opened, self.turned, self.angle = False, 0.0, math.nan
+
+    def __call__(self, state: State) -> bool:
+        x, y = state.position[1, :2] - state.position[0, :2]
+        angle = math.atan2(y, x)
+        if not math.isnan(self.angle):
+            self.turned += math.remainder(angle - self.angle, 2.0 * math.pi)
+        self.angle = angle
+        self.opened = bool(gap_of(self.bodies, state.position) > self.wide)
+        return self.opened or (self.turns and abs(self.turned) > TURN)
+
+
+@attrs.frozen(eq=False)
+class Doublet:
+    """Two bodies as a run has left them bound, to be put into flows.
+
+    Weight and thermal motion are left out, and inertia is, too, unless ``integrator`` is another
+    method than Overdamped: what is tested is the bond, at both bodies' drag.
+    """
+
+    start: Trajectory
+    flow: str = "shear"
+    integrator: Integrator = attrs.field(factory=lambda: Overdamped(TOLERANCE))
+    jit: bool = True
+
+    @property
+    def bodies(self) -> list[Body]:
+        """The bodies, none of them held."""
+        return [attrs.evolve(body, fixed=False) for body in self.start.known().bodies]
+
+    @property
+    def forces(self) -> list[Force]:
+        """The forces but for weight and thermal motion."""
+        left_out = Gravity, Thermal
+        return [each for each in self.start.known().forces if not isinstance(each, left_out)]
+
+    def rate_of_spheres(self) -> float:
+        """The rate that would open two spheres of the same radii [1/s]; 1 without attraction."""
+        r_i, r_j = (body.shape.equivalent_radius for body in self.bodies)
+        found = sphere_rate(self.forces, (r_i, r_j), self.start.known().fluid)
+        return found if found > 0.0 else 1.0
+
+    def opens_at(self, rate: float) -> bool | None:
+        """Whether a flow of a rate [1/s] opens the doublet; None where the run fails."""
+        bodies, origin = self.bodies, self.start.known()
+        places = self.start.position[-1, :, :2]
+        gradient, before = FLOWS[self.flow]
+        turn = math.atan2(*(places[1] - places[0])[::-1]) - before
+        c, s = math.cos(turn), math.sin(turn)
+        turning = np.array([[c, -s], [s, c]])
+        matrix = rate * turning @ np.reshape(gradient, (2, 2)) @ turning.T
+        velocity = -matrix @ places.mean(axis=0)
+        fluid = attrs.evolve(origin.fluid, velocity=velocity, gradient=matrix.ravel())
+        system = System(bodies, self.forces, self.integrator, fluid)
+        watch = Watch(bodies, turns=self.flow == "shear")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PlausibilityWarning)
+            run = system.run(
+                self.start.t[-1] + LONGEST / rate, start=self.start, watch=watch, record=False,
+                jit=self.jit,
+            )  # fmt: skip
+        if run.status not in (Status.STOPPED, Status.FINISHED):
+            return None
+        return watch.opened
+
+    def opening(self, precision: float = 5e-3) -> Opening:
+        """The first rate of the ladder at which it opens, then by halves of the logarithm to a
+        relative ``precision``.
+
+        A doublet may hold again at higher rates: it is the first rung that counts.
+        """
+        return first_opening(self.opens_at, self.rate_of_spheres(), precision)
+
+
+def first_opening(
+    opens_at: Callable[[float], bool | None], scale: float, precision: float
+) -> Opening:
+    """The Opening of what opens at some rates: ``opens_at(rate)`` is None where that fails."""
+    holds, runs = math.nan, 0
+    for rung in range(LEAST, MOST + 1):
+        opens, runs = scale * 2.0**rung, runs + 1
+        found = opens_at(opens)
+        if found is None:
+            return Opening(holds, math.nan, FAILED, runs)
+        if found:
+            break
+        holds = opens
+    else:
+        return Opening(holds, math.nan, HOLDS, runs)
+    if math.isnan(holds):
+        return Opening(holds, opens, OPENS_AT_LEAST, runs)
+    while opens > (1.0 + precision) * holds:
+        middle, runs = math.sqrt(holds * opens), runs + 1
+        found = opens_at(middle)
+        if found is None:
+            return Opening(holds, opens, FAILED, runs)
+        holds, opens = (holds, middle) if found else (middle, opens)
+    return Opening(holds, opens, OPENED, runs)
