@@ -1,0 +1,73 @@
+"""Encounters with thermal motion: kicks by (seed, replicate), the same in whatever order."""
+
+import attrs
+import numpy as np
+import pytest
+
+from flocsim.arrays import NOW
+from flocsim.ensembles.collision.encounter import OBSERVER
+from flocsim.forces.thermal import key_of
+from flocsim.run import Run
+from tests.helpers.small_study import small_study
+
+WARM = {
+    "scene": {"types": ["III"]},
+    "shapes": {"vertices": [1]},
+    "forces": {"thermal": {"temperature": 298.15, "kick": "1 ms"}},
+    "integrator": {"name": "overdamped"},
+}
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """A study of spheres whose scenes are not compiled."""
+    from flocsim.system import System
+
+    plain = System.scene
+    monkeypatch.setattr(System, "scene", lambda self, **_: plain(self, jit=False))
+    return small_study(tmp_path, WARM)
+
+
+def end_of(study, replicate, share, until=0.02):
+    """Where the bodies of a replicate are after some kicks, uncompiled."""
+    encounter, angles = study.drawn(0, 1, replicate)
+    driver = encounter.system.compose(observer=OBSERVER, jit=False)
+    run = encounter.begin(driver, angles, share, 10**6, until)
+    assert isinstance(run, Run)
+    run.to_end()
+    return run.work.motion[NOW].copy()
+
+
+def test_a_replicate_has_a_key_of_its_own_at_every_condition(study):
+    keys = [study.drawn(0, 1, replicate)[0].scene.key for replicate in (0, 1, 2, 0)]
+    assert keys == [key_of(study.config.seed, replicate) for replicate in (0, 1, 2, 0)]
+    encounter, _ = study.drawn(0, 1, 2)
+    assert encounter.system.scene().key == encounter.scene.key
+    assert encounter.settling[0][0] is study.encounter(0, 1, [0.0] * 4).settling[0][0]
+
+
+def test_the_order_of_replicates_does_not_matter(study):
+    first = [end_of(study, replicate, 0.5) for replicate in (0, 1, 2)]
+    again = [end_of(study, replicate, 0.5) for replicate in (2, 0, 1)]
+    for one, other in zip(first, (again[1], again[2], again[0]), strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert not np.array_equal(first[0], first[1])
+
+
+def test_without_thermal_motion_encounters_are_shared(tmp_path):
+    cold = small_study(tmp_path, {name: WARM[name] for name in ("scene", "shapes", "integrator")})
+    encounter = cold.encounter(0, 1, [0.0] * 4)
+    assert encounter.keyed(1, 2) is encounter
+
+
+def test_kicks_move_a_pair_off_its_way(study):
+    """The centre of both bodies diffuses away from where settling takes it."""
+    warm = end_of(study, 0, 0.5)
+    cold_forces = [force for force in study.config.forces if type(force).__name__ != "Thermal"]
+    encounter, angles = study.drawn(0, 1, 0)
+    cold = attrs.evolve(encounter, system=attrs.evolve(encounter.system, forces=cold_forces))
+    driver = cold.system.compose(observer=OBSERVER, jit=False)
+    run = cold.begin(driver, angles, 0.5, 10**6, 0.02)
+    run.to_end()
+    moved = np.abs(warm[:, :2] - run.work.motion[NOW, :, :2]).max()
+    assert 1e-9 < moved < 2e-6
