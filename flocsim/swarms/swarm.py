@@ -88,8 +88,8 @@ class Swarm:
         self.check_box()
         if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
-                "a swarm takes kicks of one length, the same in all of its islands: give "
-                'Thermal(kick="1 ms"), or some other time, and leave finest out'
+                "a swarm takes kicks of one length, the same in all of its islands: give the "
+                'thermal force a kick, as "1 ms", and leave finest out'
             )
 
     def __repr__(self) -> str:
