@@ -106,7 +106,8 @@ class Approach:
         """Repulsion [N] of the pair; which kinks the gap lies between is given, not asked."""
         total = 0.0
         distance = math.hypot(gap + self.radii, self.softening)
-        soft, upright = distance - self.radii, (gap + self.radii) / distance
+        soft = distance - self.radii
+        upright = (gap + self.radii) / distance if distance > 0.0 else 1.0  # a trial may go there
         if between < self.reaches[0]:
             # Beyond a kink by a trial step, the law goes on as it was before the kink.
             d_min = self.attraction.d_min

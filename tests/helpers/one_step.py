@@ -32,7 +32,7 @@ class Stage:
         integrator = Implicit(tolerance=tolerance)
         fluids = {} if fluid is None else {"fluid": fluid}
         system = System(bodies, forces, integrator, **fluids)
-        self.fillings = system.fillings(None)
+        self.fillings = system.fillings(grows=True)
         self.scene = system.scene(jit=False)
         work = work_of(self.scene, *system.motion())
         n = len(bodies)

@@ -17,10 +17,9 @@ from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
 from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
-from flocsim.forces.thermal import key_of
+from flocsim.forces.thermal import Thermal, key_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
-from flocsim.integrators.loop.kicks import KICK
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 from flocsim.plausibility.settling import (
     largest_mobility,
@@ -80,7 +79,8 @@ class Encounter:
 
     def keyed(self, *numbers: int) -> "Encounter":
         """The same for a replicate whose random forces go by these numbers (seed, replicate)."""
-        if not self.scene.kicks[KICK] > 0.0:
+        # By the forces, for a scene compiles their laws, and another part of a study comes first.
+        if not any(isinstance(each, Thermal) and not each.absent for each in self.system.forces):
             return self
         other = copy.copy(self)
         object.__setattr__(other, "system", attrs.evolve(self.system, seed=numbers))

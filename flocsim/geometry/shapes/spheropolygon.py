@@ -60,6 +60,10 @@ class SpheroPolygon(Shape):
             swept = swept_by(self.core, self.radius)
         self.__dict__["swept"] = swept
 
+    @property
+    def is_compound(self) -> bool:
+        return bool(self.holes)
+
 
 def scaled_outline(shape: Shape, factor: float) -> Shape:
     """A Sphere, SpheroPolygon or Composite ``factor`` times as large; ShapeError unless finite,

@@ -82,17 +82,17 @@ def test_parts_that_share_their_outline_count_once():
     """The same disk, polygon and frame twice; halves side by side, over each other and in line."""
     for shape in (Sphere(1.3), SpheroPolygon(SQUARE, 0.2), framed()):
         twice = Composite([(shape, (1.0, 2.0), 0.3), (shape, (1.0, 2.0), 0.3)])
-        assert twice.area == pytest.approx(shape.area, rel=1e-10)
-        assert twice.second_moment == pytest.approx(shape.second_moment, rel=1e-10)
+        assert twice.area == pytest.approx(shape.area, rel=1e-8)
+        assert twice.second_moment == pytest.approx(shape.second_moment, rel=1e-8)
     brick = SpheroPolygon(SQUARE * (2.0, 1.0), 0.5)
     for way, size in (((3.0, 0.0), (3.5, 1.0)), ((4.0, 0.0), (4.0, 1.0)), ((0.0, 1.0), (2.0, 1.5))):
         wall = Composite([(brick, (0.0, 0.0)), (brick, way)])
         whole = SpheroPolygon(SQUARE * size, 0.5)
-        assert wall.area == pytest.approx(whole.area, rel=1e-10)
-        assert wall.second_moment == pytest.approx(whole.second_moment, rel=1e-10)
+        assert wall.area == pytest.approx(whole.area, rel=1e-8)
+        assert wall.second_moment == pytest.approx(whole.second_moment, rel=1e-8)
     # Back to back: the outlines run along each other, in opposite senses.
     stacked = Composite([(brick, (0.0, 0.0)), (brick, (0.0, 3.0))])
-    assert stacked.area == pytest.approx(2.0 * brick.area, rel=1e-10)
+    assert stacked.area == pytest.approx(2.0 * brick.area, rel=1e-8)
 
 
 @settings(max_examples=25)
