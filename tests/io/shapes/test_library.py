@@ -189,7 +189,9 @@ def test_holes_survive_the_file(tmp_path):
             assert one.is_compound == other.is_compound
             assert other.area == one.area
             assert all(map(np.array_equal, one.parts[0].rings, other.parts[0].rings))
-            assert other.area == pytest.approx(new.area * PIXEL**2, rel=0.1)
+            # Eight corners are few for an outline and a hole.
+            near = 0.1 if n == 16 else 0.3
+            assert other.area == pytest.approx(new.area * PIXEL**2, rel=near)
     write_library(tmp_path / "again.h5", read)
     assert read_sealed(tmp_path / "again.h5") == read_sealed(path)
 
