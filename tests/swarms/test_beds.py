@@ -96,7 +96,8 @@ def test_bodies_that_bounce_are_not_stopped_by_long_steps():
         Body(Sphere(R), place, 0.0, tuple(1e-2 * rng.normal(size=2)), density=2650.0)
         for place in places
     ]
-    swarm = Swarm(bodies, [Contact(damping_n=0.0, k_t=0.0)], box=(12.0 * R, 12.0 * R))
+    frictionless = [Contact(damping_n=0.0, k_t=0.0)]
+    swarm = Swarm(bodies, frictionless, Implicit(1e-10), box=(12.0 * R, 12.0 * R))
     run = swarm.run(5e-3)
     energy = [float(np.sum(run.velocity[at, :, :2] ** 2)) for at in (0, -1)]
     assert energy[1] == pytest.approx(energy[0], rel=1e-4)
