@@ -25,10 +25,15 @@ def rings_of(shape: Shape) -> list[np.ndarray]:
     rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
     if not shape.is_compound:
         outer, *holes = sorted(rings, key=lambda ring: -abs(area_of(ring)))
-        return [outer if area_of(outer) > 0.0 else outer[::-1], *holes]
+        return [oriented(outer, 1.0), *(oriented(hole, -1.0) for hole in holes)]
     # shapely's outer rings go round in one sense, those of holes in the other.
     sense = 1.0 if area_of(rings[0]) > 0.0 else -1.0
     return [ring if sense > 0.0 else ring[::-1] for ring in rings]
+
+
+def oriented(ring: np.ndarray, sense: float) -> np.ndarray:
+    """A ring that goes round counter-clockwise for a sense above 0, else clockwise."""
+    return ring if area_of(ring) * sense > 0.0 else ring[::-1]
 
 
 def is_hole(ring: np.ndarray) -> bool:
