@@ -157,7 +157,12 @@ class Study:
         self, condition: int, vertices: int, replicate: int
     ) -> tuple[Encounter, tuple[float, float]]:
         """The Encounter and the two angles [rad] that a replicate's random numbers give."""
-        numbers = self.numbers(replicate)
+        return self.met(condition, vertices, replicate, self.numbers(replicate))
+
+    def met(
+        self, condition: int, vertices: int, replicate: int, numbers: Sequence[float] | np.ndarray
+    ) -> tuple[Encounter, tuple[float, float]]:
+        """The same of numbers that are drawn already."""
         encounter = self.encounter(condition, vertices, numbers)
         return encounter.keyed(self.config.seed, replicate), encounter.orientations(numbers)
 
@@ -195,7 +200,7 @@ class Study:
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
         numbers = self.numbers(replicate)
-        encounter, angles = self.drawn(condition, vertices, replicate)
+        encounter, angles = self.met(condition, vertices, replicate, numbers)
         driver = self.driver(encounter)
         share = self.share_of(encounter, share, replicate)
         max_steps = self.config.integrator.max_steps

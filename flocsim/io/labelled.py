@@ -28,6 +28,12 @@ class Column:
     about: dict[str, Any] = attrs.Factory(dict)
 
 
+def about_of(schema: Sequence[str]) -> dict[str, Any]:
+    """Units and long name, the last two of what a schema says of a column, as attributes."""
+    *_, units, text = schema
+    return {"units": units, "long_name": text}
+
+
 @attrs.frozen(eq=False)
 class Labelled:
     """Arrays along named axes; ``axes`` {name: Column} has a coordinate for each.

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.speed.swarms import bulk_fraction
 from flocsim import Body, Sphere, Swarm, floor
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Status
@@ -31,16 +32,6 @@ def falling(number, seed, tolerance=1e-9, wide=5.0, fraction=0.3, **contact):
     held = [Gravity(), StokesDrag(), Contact(**contact)]
     swarm = Swarm(bodies, held, Implicit(tolerance=tolerance), WATER, box=(width, None))
     return swarm, radii
-
-
-def bulk_fraction(position, radii, width, low):
-    """Area fraction of discs between a height and that of four fifths of their centres."""
-    high, total = float(np.quantile(position[:, 1], 0.8)), 0.0
-    for y, radius in zip(position[:, 1], radii, strict=True):
-        part = np.clip([(low - y) / radius, (high - y) / radius], -1.0, 1.0)
-        area = np.arcsin(part) + part * np.sqrt(1.0 - part**2)
-        total += float(radius**2 * (area[1] - area[0]))
-    return total / (width * (high - low))
 
 
 def test_a_pile_comes_to_rest_and_costs_nothing_from_then_on():

@@ -23,7 +23,7 @@ from flocsim.ensembles.studies.replicates import (
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
-from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled, about_of
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
@@ -109,9 +109,9 @@ class StudyResults:
         if not arrays:
             raise UsageError(f"{self.path} has no group {group}: it was written without")
         columns = {}
-        for name, (_, units, text) in schema.items():
+        for name, said in schema.items():
             further = (last_axis(name),) if group == "probabilities" and last_axis(name) else ()
-            about = {"units": units, "long_name": text} | self.flags(group, name)
+            about = about_of(said) | self.flags(group, name)
             columns[name] = Column((*axes, *filter(None, further)), arrays[name], about)
         used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
         sizes = {name: self.radius(name) for name in RADII if group in SIZED}
@@ -119,8 +119,7 @@ class StudyResults:
 
     def radius(self, name: str) -> Column:
         """The radius r_i or r_j that stands for each type: a coordinate along the types."""
-        _, units, text = RADII[name]
-        return Column(("type",), self.results.radii[name], {"units": units, "long_name": text})
+        return Column(("type",), self.results.radii[name], about_of(RADII[name]))
 
     def flags(self, group: str, name: str) -> dict:
         """The codes of a column of the replicates, and their words."""
@@ -140,8 +139,7 @@ class StudyResults:
             "delta": self.delta, "replicate": np.arange(self.count),
             "against": np.array(AXES, dtype=object), "event": np.array(EVENTS, dtype=object),
         } | {name: np.array(words, dtype=object) for name, words in LAST_AXES.items()}  # fmt: skip
-        units, text = COORDINATES[axis]
-        return Column((axis,), known[axis], {"units": units, "long_name": text})
+        return Column((axis,), known[axis], about_of(COORDINATES[axis]))
 
     def to_xarray(self, group: str = "probabilities") -> Dataset:
         """A group of the file as an xarray Dataset, with units, meanings and flags.

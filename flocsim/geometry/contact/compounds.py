@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.arrays import EARLIER, EDGE_BODY, EDGE_START, LATER, RADIUS, VERTEX, VERTEX_BODY, X, Y
+from flocsim.arrays import EDGE_BODY, EDGE_START, LATER, RADIUS, VERTEX, VERTEX_BODY, X, Y
 from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.circle_tree import (
@@ -34,9 +34,8 @@ from flocsim.geometry.contact.circle_tree import (
     reversed_pose,
     run_of,
     side_of,
-    within,
 )
-from flocsim.geometry.contact.near_pairs import add_pair, pose_of
+from flocsim.geometry.contact.near_pairs import add_pair
 from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.geometry.shapes.shape import Shape
 
@@ -109,7 +108,7 @@ def feature_distance2(vertices, pose, point, start):
 
 
 def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
-    """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
+    """near_pairs.list_one_way of rings and lone points, swollen."""
     vertices = scene.vertices
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
@@ -121,29 +120,6 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
                 if feature_distance2(vertices, pose, point, start) < limit * limit:
                     end = start + int(vertices[start, ONWARD])
                     room = add_pair(work, pair, a, point, b, start, end) and room
-    return room
-
-
-def list_compounds(scene, work, pair, cutoff):
-    """List the pairs of features of two bodies, both ways round; False for a full list."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-    side_a, side_b = side_of(scene, a), side_of(scene, b)
-    reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
-    pose = pose_of(scene, work, a, b)
-    back = reversed_pose(pose)
-    plan = plan_of(scene.tree, side_a, side_b)
-    walk = START
-    room = True
-    while goes_on(walk) and room:
-        if not within(scene.tree, pose, plan, walk, reach):
-            walk = passed(plan, walk)
-        elif at_leaves(plan, walk):
-            i, j, _, _ = walk
-            room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
-            room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
-            walk = passed(plan, walk)
-        else:
-            walk = descended(plan, walk)
     return room
 
 
@@ -214,7 +190,7 @@ def same_corner(scene, body, point, other):
 
 
 FILLINGS: dict[Callable, Callable] = {
-    near_pairs.list_polygons: list_compounds,
+    near_pairs.list_one_way: list_one_way,
     circle_tree.core_distance: swollen_distance,
     contacts.row_radii: swollen_radii,
     slip_transfer.same_corner: same_corner,

@@ -71,6 +71,7 @@ def add_pair(work, pair, a, point, b, start, end):
     return True
 
 
+@hook
 def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
     """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
     vertices = scene.vertices

@@ -24,7 +24,7 @@ from flocsim.arrays import (
 )
 from flocsim.compiler.composer import apart
 from flocsim.integrators.radau.elimination import solve_sparse
-from flocsim.integrators.radau.systems import sum_loads
+from flocsim.integrators.radau.systems import balance_load
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_size, rounding_size
@@ -49,10 +49,7 @@ def accelerations(work, row, step, known):
 def solve_loads(scene, work, weight):
     """The solution of the system for the loads less ``weight`` K CHANGE."""
     subtract_product(work, STIFFNESS, weight)
-    for body in range(work.motion.shape[1]):
-        for axis in range(3):
-            work.loads[REAL, 3 * body + axis] *= scene.bodies[body, FREE]
-    sum_loads(work, REAL)
+    balance_load(scene, work)
     solve_sparse(work, False)
 
 

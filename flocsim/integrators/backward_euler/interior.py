@@ -19,23 +19,17 @@ from flocsim.arrays import (
     CANDIDATES,
     CHANGE,
     CLOSED,
-    EDGE_ARM_N,
     EDGE_BODY,
     FIRST_STAGE,
     FORCE,
     FREE,
     GAP,
-    NORMAL_X,
-    NORMAL_Y,
     NOW,
-    SPIN,
     START,
     TIME,
     TRIAL,
-    VERTEX_ARM_N,
+    VELOCITY,
     VERTEX_BODY,
-    VX,
-    VY,
 )
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import (
@@ -52,7 +46,7 @@ from flocsim.integrators.backward_euler.newton import (
 )
 from flocsim.integrators.backward_euler.real_system import factorise_real
 from flocsim.integrators.radau.contact_frames import gather_clusters
-from flocsim.integrators.rhs.views import effective_mass, push_pair
+from flocsim.integrators.rhs.views import along_normal, effective_mass, push_pair
 
 OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE = range(FIRST_STAGE + 2, FIRST_STAGE + 6)
 """Rows of ``Work.slip`` for δ, s and their changes, which Radau has no use for behind a step."""
@@ -74,17 +68,6 @@ def in_play(work, row):
     return work.candidates[row, CLOSED] == 1
 
 
-def gap_change(work, row, state):
-    """n · (difference of velocities) of a pair's bodies, those in a row of ``motion``, in the
-    direction of now [m/s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    g, v = work.geometry, work.motion
-    rate = g[NOW, row, NORMAL_X] * (v[state, a, VX] - v[state, b, VX])
-    rate += g[NOW, row, NORMAL_Y] * (v[state, a, VY] - v[state, b, VY])
-    rate += v[state, a, SPIN] * g[NOW, row, VERTEX_ARM_N]
-    return rate - v[state, b, SPIN] * g[NOW, row, EDGE_ARM_N]
-
-
 def usual_force(scene, work, step):
     """How large forces are that stop, or hold, a body [N], in the mean."""
     total, count = 0.0, 0
@@ -102,7 +85,7 @@ def begin(scene, work, step):
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
             a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-            speed = abs(gap_change(work, row, START))
+            speed = abs(along_normal(work, row, START, VELOCITY))
             stopped += effective_mass(scene, a, b) * speed / step
             way += step * speed
             stiffness += normal_stiffness(scene, work, row, step, 1e-12)
@@ -156,7 +139,7 @@ def write_pair_changes(work, step, target):
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
             overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
-            opening = step * gap_change(work, row, CHANGE)
+            opening = step * along_normal(work, row, CHANGE, VELOCITY)
             change = (pull(work, row, target) - overlap * opening) / (overlap + left)
             off = left - work.geometry[NOW, row, GAP] - overlap
             work.slip[OVERLAP_CHANGE, row] = change

@@ -114,13 +114,18 @@ def solve_real(work):
         solve_sparse(work, False)
 
 
-def solve_for_free(scene, work):
-    """The solution of the real system for its load: none for fixed bodies, and the cluster's sum
-    for first ones."""
+def balance_load(scene, work):
+    """Make the load of the real system none for fixed bodies, and the cluster's sum for first
+    ones."""
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
             work.loads[REAL, 3 * body + axis] *= scene.bodies[body, FREE]
     sum_loads(work, REAL)
+
+
+def solve_for_free(scene, work):
+    """The solution of the real system for its load, balanced."""
+    balance_load(scene, work)
     solve_real(work)
 
 

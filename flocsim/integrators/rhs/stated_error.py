@@ -60,7 +60,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
+from flocsim.integrators.rhs.views import along_normal, contact_view, normal_rate, pressed_view
 from flocsim.laws import contact_force
 
 OF_SWITCHES = 1.5
@@ -191,16 +191,6 @@ def kick_pair(scene, work, row, normal, tangential):
     kick(scene, work, work.candidates[row, EDGE_BODY], -x, -y, -back)
 
 
-def gap_error(work, row, kind):
-    """The error of a pair's gap, of the motion's error of that kind: CARRIED, DEVIATION [m]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    e, g = work.motion, work.geometry
-    gap = g[NOW, row, NORMAL_X] * (e[kind, a, X] - e[kind, b, X])
-    gap += g[NOW, row, NORMAL_Y] * (e[kind, a, Y] - e[kind, b, Y])
-    gap += g[NOW, row, VERTEX_ARM_N] * e[kind, a, ANGLE]
-    return gap - g[NOW, row, EDGE_ARM_N] * e[kind, b, ANGLE]
-
-
 def is_closed(work, row):
     """Whether a pair is flagged as one that touches."""
     return work.candidates[row, CLOSED] == 1
@@ -218,7 +208,7 @@ def doubtful_time(work, row, step, depth, doubt):
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(depth, doubt, DOUBT * abs(gap_error(work, row, DEVIATION)))
+    deepest = max(depth, doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)))
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -230,7 +220,7 @@ def pressed_stiffness(scene, view, overlap):
 
 def signed_time(work, row, step, depth, doubt):
     """The same, above 0 where the force has acted for too long, as the carried error has it."""
-    gap, wrong = work.geometry[NOW, row, GAP], gap_error(work, row, CARRIED)
+    gap, wrong = work.geometry[NOW, row, GAP], along_normal(work, row, CARRIED, X)
     if has_switched(work, row):
         rate = normal_rate(work, NOW, row)
         late = (gap - wrong) / rate if rate != 0.0 else 0.0

@@ -21,6 +21,7 @@ from flocsim.arrays import (
     MASS,
     NORMAL_X,
     NORMAL_Y,
+    NOW,
     SPIN,
     TORQUE,
     VERTEX_ARM_N,
@@ -69,6 +70,18 @@ def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
         time, gap, gap_rate, centre_distance, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
+
+
+def along_normal(work, row, kind, first):
+    """n · (what the vertex's body has − what the edge's has) at a pair's contact point, in the
+    direction of now, of the three columns of a row of ``motion`` from ``first`` on: X, a change of
+    the gap by one of places [m]; VELOCITY, its rate [m/s]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    g, v = work.geometry, work.motion
+    change = g[NOW, row, NORMAL_X] * (v[kind, a, first] - v[kind, b, first])
+    change += g[NOW, row, NORMAL_Y] * (v[kind, a, first + 1] - v[kind, b, first + 1])
+    change += g[NOW, row, VERTEX_ARM_N] * v[kind, a, first + 2]
+    return change - g[NOW, row, EDGE_ARM_N] * v[kind, b, first + 2]
 
 
 def normal_rate(work, state, row):

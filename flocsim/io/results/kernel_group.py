@@ -8,7 +8,7 @@ import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.io.hdf5.expected import Column as Expected
-from flocsim.io.labelled import Column, Labelled
+from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.results.groups import write_labelled
 
 GROUP = "kernel"
@@ -133,11 +133,6 @@ class Kernel:
                     f"{what} must be one of {', '.join(map(str, known))}, found {value}"
                 )
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
-
-
-def about_of(schema: tuple[str, str, str]) -> dict[str, str]:
-    """Units and meaning as attributes."""
-    return {"units": schema[1], "long_name": schema[2]}
 
 
 def write_kernel(file: Any, kernel: Kernel) -> None:

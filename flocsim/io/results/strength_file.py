@@ -20,7 +20,7 @@ from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
 from flocsim.io.json_text import read_json
-from flocsim.io.labelled import Column, Labelled
+from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
@@ -91,35 +91,31 @@ def coordinates(axes: tuple) -> dict[str, Column]:
         "delta": np.asarray(delta, "f8"),
     }  # fmt: skip
     return {
-        name: Column((name,), value, about(*COORDINATES[name])) for name, value in values.items()
+        name: Column((name,), value, about_of(COORDINATES[name])) for name, value in values.items()
     }
-
-
-def about(units: str, text: str) -> dict[str, Any]:
-    return {"units": units, "long_name": text}
 
 
 def labelled_doublets(columns: dict[str, np.ndarray]) -> Labelled:
     """The group ``doublets`` of plain columns (k,)."""
     found = {}
-    for name, (kind, units, text) in DOUBLETS.items():
-        notes = about(units, text)
+    for name, schema in DOUBLETS.items():
+        kind, notes = schema[0], about_of(schema)
         flags = FLAGS["bond"] if name == "bond" else (range(len(STATUS)), STATUS)
         if kind == "u1":
             notes |= {"flag_values": np.array(flags[0], "u1"), "flag_meanings": " ".join(flags[1])}
         found[name] = Column(("doublet",), np.asarray(columns[name], kind), notes)
     count = len(next(iter(columns.values())))
-    scale = Column(("doublet",), np.arange(count), about(*FURTHER["doublet"]))
+    scale = Column(("doublet",), np.arange(count), about_of(FURTHER["doublet"]))
     return Labelled({"doublet": scale}, found)
 
 
 def labelled_conditions(axes: tuple, columns: dict[str, np.ndarray]) -> Labelled:
     """The group ``conditions`` of plain arrays."""
     scales = coordinates(axes)
-    scales["quantile"] = Column(("quantile",), np.array(QUANTILES), about(*FURTHER["quantile"]))
+    scales["quantile"] = Column(("quantile",), np.array(QUANTILES), about_of(FURTHER["quantile"]))
     found = {
-        name: Column((*AXES, *(("quantile",) * (name in RATE))), columns[name], about(units, text))
-        for name, (_, units, text) in (COUNTS | RATE).items()
+        name: Column((*AXES, *(("quantile",) * (name in RATE))), columns[name], about_of(schema))
+        for name, schema in (COUNTS | RATE).items()
     }
     return Labelled(scales, found)
 

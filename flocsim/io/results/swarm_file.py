@@ -21,7 +21,7 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
-from flocsim.io.labelled import Column, Labelled
+from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 
@@ -174,10 +174,6 @@ def mean(values: np.ndarray) -> np.ndarray:
     known = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
-
-
-def about_of(schema):
-    return {"units": schema[1], "long_name": schema[2]}
 
 
 def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> None:

@@ -21,12 +21,15 @@ from flocsim.arrays import (
     work_of,
 )
 from flocsim.body import scene_of
+from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.circle_tree import CIRCLE_RADIUS, CIRCLE_X, CIRCLE_Y, run_of, side_of
-from flocsim.geometry.contact.near_pairs import pose_of
+from flocsim.geometry.contact.near_pairs import list_polygons, pose_of
 from flocsim.geometry.contact.overlap import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, cross, drawn, framed
+
+list_compounds = compose(list_polygons, compounds.FILLINGS, jit=False)
 
 SHAPES = [*(make() for make in MAKERS), Sphere(0.8), SpheroPolygon(2.0 * SQUARE, 0.3)]
 
@@ -79,7 +82,7 @@ DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0
 @given(*DRAWN, st.floats(0.01, 6.0))
 def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    assert work.tally[PAIRS] == 1 and compounds.list_compounds(scene, work, 0, cutoff)
+    assert work.tally[PAIRS] == 1 and list_compounds(scene, work, 0, cutoff)
     rows = work.candidates[: work.tally[CANDIDATES]]
     bodies = [VERTEX_BODY, VERTEX, EDGE_START, EDGE_END]
     first = scene.first
@@ -174,6 +177,6 @@ def test_contacts_of_parts_are_seen():
 
 def test_a_lone_disk_as_a_part_is_a_disk():
     scene, work = placed(Composite([(Sphere(1.0), (7.0, 3.0))]), Sphere(2.0), 3.5, 0.0, 0.0, 0.0)
-    assert compounds.list_compounds(scene, work, 0, 1.0) and work.tally[CANDIDATES] == 1
+    assert list_compounds(scene, work, 0, 1.0) and work.tally[CANDIDATES] == 1
     pose = pose_of(scene, work, 1, 0)
     assert compounds.swollen_distance(scene, 1, 0, pose) == pytest.approx(3.5, rel=1e-14)
