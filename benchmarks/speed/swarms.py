@@ -196,7 +196,7 @@ def pile(arguments, table):
 def threads(arguments, table):
     """Wall time of one thread over that of two, and whether the bytes are the same."""
     swarm = swarm_of(1000, 0.02, 1)
-    until = 0.2 if arguments.quick else 2.0
+    until = 1.0 if arguments.quick else 10.0
     _, one, first = run(swarm, until)
     _, two, second = run(swarm, until, threads=2)
     same = first.position.tobytes() == second.position.tobytes()

@@ -157,7 +157,8 @@ def compiled(entry, fillings, name, allocates):
 
     def call(*arguments):
         try:
-            if not dispatcher.signatures:
+            # Not `signatures`, which hashes the types of all arguments at every call.
+            if not dispatcher.overloads:
                 with quick_typing():
                     dispatcher.compile(tuple(map(numba.typeof, arguments)))
             return dispatcher(*arguments)

@@ -47,7 +47,6 @@ from flocsim.geometry.contact.slip_transfer import keep_slips
 from flocsim.integrators.backward_euler.driver import NEXT_STEP
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM
 from flocsim.swarms.arrays import (
-    ALLOWED,
     AT_EDGE,
     AT_VERTEX,
     BEGIN,
@@ -72,13 +71,9 @@ from flocsim.swarms.arrays import (
 )
 from flocsim.swarms.methods import ACROSS, LOCATES, advance_island
 
-STRAYED = 1
-"""The observer's code where a body strays from its path by more than it may."""
-
 
 def watch_paths(scene, work, observed, time):
-    """Stop an island whose bodies stray too far from the paths on which others count."""
-    strays = False
+    """Note how far bodies stray from the paths on which others count."""
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, FREE] == 1.0:
             since = time - observed[body, SINCE]
@@ -92,10 +87,8 @@ def watch_paths(scene, work, observed, time):
                 - observed[body, START_Y]
                 - since * observed[body, PATH_VY]
             )
-            away = math.hypot(x, y)
-            observed[body, FURTHEST] = max(observed[body, FURTHEST], away)
-            strays = strays or away > observed[body, ALLOWED]
-    return STRAYED if strays else 0
+            observed[body, FURTHEST] = max(observed[body, FURTHEST], math.hypot(x, y))
+    return 0
 
 
 def put_scene(swarm, scene, members, first):
@@ -195,9 +188,7 @@ def global_point(swarm, scene, members, first, point, body, other):
     return swarm.first[members[first + body]] + point - scene.first[body]
 
 
-def put_times(
-    swarm, work, observed, clock, counts, start_clock, start_counts, members, first, all_in
-):
+def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, first):
     """Clock, counts, and the paths that its bodies are expected to go."""
     for place in range(CLOCK_SIZE):
         clock[place] = start_clock[place]
@@ -217,7 +208,6 @@ def put_times(
         observed[body, PATH_VX] = swarm.motion[member, VX]
         observed[body, PATH_VY] = swarm.motion[member, VY]
         observed[body, SINCE], observed[body, FURTHEST] = swarm.times[BEGIN], 0.0
-        observed[body, ALLOWED] = math.inf if all_in else swarm.wander[member]
     clock[STEP] = step if step < math.inf else start_clock[STEP]
 
 
@@ -276,7 +266,7 @@ def take_state(swarm, work, observed, clock, euler, method, members, first):
 
 def run_islands(
     swarm, scene, work, observed, clock, counts, record, euler, start_clock, start_counts,
-    members, starts, codes, costs, found, first, last, all_in,
+    members, starts, codes, costs, found, first, last,
 ):  # fmt: skip
     """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
     their Status into ``codes``. How far that went: to one that found no room, or to the last."""
@@ -291,9 +281,7 @@ def run_islands(
         if not put_slips(swarm, scene, work, members, begin):
             work.tally[FULL] = CANDIDATES_FULL
             return island
-        put_times(
-            swarm, work, observed, clock, counts, start_clock, start_counts, members, begin, all_in
-        )
+        put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, begin)
         method = put_method(swarm, work, euler, members, begin)
         code, method = advance_island(scene, work, observed, clock, counts, record, euler, method)
         if code == NO_ROOM:

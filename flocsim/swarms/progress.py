@@ -1,13 +1,13 @@
 """A swarm in progress: from one common time to the next.
 
 A window is tried until no body of it strays further from its straight path than others have counted
-on: those that did may stray further in the next try, islands that merge by that are run anew, and
-after some tries the window is made shorter. What islands have come to is taken over all at once, so
-that a window leaves nothing behind that is half done.
+on: where one did, islands are found anew with paths as wide as it went, those that merge by that
+are run anew, and after some tries the window is made shorter. What islands have come to is taken
+over all at once, so that a window leaves nothing behind that is half done.
 """
 
+import itertools
 import math
-from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -24,27 +24,25 @@ from flocsim.swarms.arrays import (
     Swarm,
     with_links,
 )
+from flocsim.swarms.finished import Finished
 from flocsim.swarms.leaving import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Runner
 
 LEAST_WANDER = 0.05
 """A body may stray by so many bounding radii at least."""
 
-MORE_WANDER, LESS_WANDER = 2.0, 0.7
+MORE_WANDER, LESS_WANDER = 1.5, 0.7
 """It may stray by so many times as far as it has, and by no less than this share of as far as it
 might before."""
 
 MOST_TRIES = 4
 """Tries of a window before it is made shorter."""
 
-CROWDED, SPARSE = 1.5, 1.2
+CROWDED, SPARSE = 1.2, 1.05
 """Windows get shorter where their islands take more than so many times the work of the least ones,
 those of no time at all, longer where they take less."""
 
 SHORTER, LONGER = 0.6, 1.4
-
-ALL = b""
-"""Key of the contacts of all islands that were run last, where all have finished."""
 
 FIRST_WAY = 0.1
 """Bodies go so many radii against each other in the first window."""
@@ -164,61 +162,41 @@ class Progress:
         swarm, span = self.swarm, min(self.span, self.longest_span())
         least = swarm._replace(wander=self.least_wander)
         clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
-        kept: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-        for tried in range(1, 1000):
+        finished = Finished(self.free)
+        for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
             swarm.times[BEGIN], swarm.times[END] = self.time, stop if whole else self.time + span
             length = swarm.times[END] - self.time
             islands = self.runner.islands_of(swarm, length, self.reach, self.box)
-            status = self.run_fresh(islands, kept)
-            if status == Status.FINISHED:
+            fresh = islands.chosen(finished.missing(islands))
+            if not len(fresh.sizes):
                 break
-            if status != Status.STOPPED:
-                return status
             if tried % MOST_TRIES == 0:
                 self.span = span = 0.5 * length
-                kept = {}
-        self.take_over(list(kept.values()), islands)
+                finished = Finished(self.free)
+                continue
+            status = self.run_fresh(fresh, finished)
+            if status != Status.FINISHED:
+                return status
+        self.take_over(finished)
         self.let_leave()
         if not whole:
             self.choose_span(span, islands.work / clusters.work)
         return Status.FINISHED if whole else Status.PAUSED
 
-    def run_fresh(self, islands: Islands, kept: dict) -> Status:
-        """Run the islands that are not among the finished ones; FINISHED where all are now, STOPPED
-        where bodies have strayed, which may stray further from now on."""
-        count = len(islands.sizes)
-        wanted: Sequence[int] = range(count)
-        if kept:
-            keys = [islands.key(each) for each in wanted]
-            for key in kept.keys() - set(keys):
-                del kept[key]
-            wanted = [each for each, key in enumerate(keys) if key not in kept]
-        fresh = islands.chosen(wanted)
-        links, slips = self.runner.run(self.swarm, fresh, all_in=count == 1)
+    def run_fresh(self, fresh: Islands, finished: Finished) -> Status:
+        """Run islands to the window's end, and let their bodies stray as far as they have: FINISHED
+        or the Status with which one of them ended."""
+        finished.add(fresh, *self.runner.run(self.swarm, fresh))
         self.effort.add(fresh)
-        if np.all(fresh.codes == Status.FINISHED):
-            # Most windows: nothing of them has to be told apart.
-            kept[ALL] = links, slips
-            return Status.FINISHED
-        owners = np.full(len(self.free), -1)
-        found = Status.FINISHED
-        for each, code in enumerate(fresh.codes):
-            members = fresh.members_of(each)
-            owners[members[self.free[members]]] = each
-            if code == Status.STOPPED:
-                found = Status.STOPPED
-                wander, strayed = self.swarm.wander[members], self.swarm.strayed[members]
-                self.swarm.wander[members] = np.maximum(2.0 * wander, MORE_WANDER * strayed)
-            elif code != Status.FINISHED:
-                self.failed = members
-                return Status(code)
-        own = np.maximum(owners[links[:, 0]], owners[links[:, 1]])
-        for each in np.flatnonzero(fresh.codes == Status.FINISHED).tolist():
-            kept[fresh.key(each)] = links[own == each], slips[own == each]
-        return found
+        for each in np.flatnonzero(fresh.codes != Status.FINISHED).tolist():
+            self.failed = fresh.members_of(each)
+            return Status(int(fresh.codes[each]))
+        members, swarm = fresh.members, self.swarm
+        swarm.wander[members] = np.maximum(swarm.wander[members], swarm.strayed[members])
+        return Status.FINISHED
 
-    def take_over(self, contacts: list[tuple[np.ndarray, np.ndarray]], islands: Islands) -> None:
+    def take_over(self, finished: Finished) -> None:
         """Make what the islands have come to the state of the swarm."""
         swarm, free = self.swarm, self.free
         for old, new in (
@@ -231,7 +209,7 @@ class Progress:
         swarm.motion[~free, :VX] += length * swarm.motion[~free, VX:]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
-        self.swarm = with_links(swarm, contacts)
+        self.swarm = with_links(swarm, [(finished.links, finished.slips)])
         self.time, self.error = float(swarm.times[END]), float(swarm.stated.max())
         self.effort.windows += 1
 

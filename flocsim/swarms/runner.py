@@ -1,6 +1,7 @@
 """Islands of a window as arrays, and how threads run them."""
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import attrs
@@ -88,17 +89,18 @@ class Islands:
     @classmethod
     def of(cls, labels: np.ndarray, walls: np.ndarray, touches: np.ndarray) -> "Islands":
         """From the name of every body's island, and which fixed bodies it can reach."""
-        bodies, names = np.arange(len(labels)), labels
-        free = labels >= 0
-        rows, columns = np.nonzero(touches[free]) if len(walls) else ((), ())
-        bodies = np.concatenate([bodies[free], walls[np.array(columns, dtype=int)]])
-        names = np.concatenate([names[free], names[free][np.array(rows, dtype=int)]])
-        pairs = np.unique(np.column_stack([names, bodies]), axis=0)
-        starts = np.flatnonzero(np.diff(pairs[:, 0], prepend=-1))
-        starts = np.append(starts, len(pairs)).astype(np.int64)
+        bodies = np.flatnonzero(labels >= 0)
+        names = labels[bodies]
+        if touches[bodies].any():
+            rows, columns = np.nonzero(touches[bodies])
+            reached = np.unique(np.column_stack([names[rows], walls[columns]]), axis=0)
+            names, bodies = np.append(names, reached[:, 0]), np.append(bodies, reached[:, 1])
+        order = np.lexsort((bodies, names))
+        starts = np.flatnonzero(np.diff(names[order], prepend=-1))
+        starts = np.append(starts, len(names)).astype(np.int64)
         count = len(starts) - 1
         return cls(
-            np.ascontiguousarray(pairs[:, 1]), starts, np.zeros(count, dtype=np.int64),
+            bodies[order], starts, np.zeros(count, dtype=np.int64),
             np.zeros((count, COST_COLUMNS), dtype=np.int64),
         )  # fmt: skip
 
@@ -106,18 +108,13 @@ class Islands:
     def sizes(self) -> np.ndarray:
         return np.diff(self.starts)
 
-    def key(self, island: int) -> bytes:
-        """What tells an island from others."""
-        return self.members_of(island).tobytes()
-
     def members_of(self, island: int) -> np.ndarray:
         """The bodies of an island, in their order."""
         return self.members[self.starts[island] : self.starts[island + 1]]
 
-    def chosen(self, which: Sequence[int]) -> "Islands":
+    def chosen(self, which: np.ndarray) -> "Islands":
         """Some of them, the largest first, those of a size one after another."""
-        order = np.array(which, dtype=int)
-        order = order[np.argsort(-self.sizes[order], kind="stable")]
+        order = which[np.argsort(-self.sizes[which], kind="stable")]
         sizes = self.sizes[order]
         starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         # Where each member stands now: as far behind its island's first as it will.
@@ -140,6 +137,13 @@ class Runner:
     threads: list[ThreadArrays]
     max_steps: int
     pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
+    pool: ThreadPoolExecutor | None = None
+
+    def helpers(self) -> ThreadPoolExecutor:
+        """The threads beside the one that calls."""
+        if self.pool is None:
+            self.pool = ThreadPoolExecutor(len(self.threads) - 1)
+        return self.pool
 
     def islands_of(
         self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
@@ -157,7 +161,7 @@ class Runner:
             self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
 
     def run_chunk(
-        self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int, all_in: bool
+        self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int
     ) -> None:
         """Run islands of one size."""
         place = own.of_size(int(islands.sizes[first]), self.integrator)
@@ -168,7 +172,7 @@ class Runner:
             first = self.driver(
                 swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
                 place.euler, start_clock, start_counts, islands.members, islands.starts,
-                islands.codes, islands.costs, own.found, first, last, all_in,
+                islands.codes, islands.costs, own.found, first, last,
             )  # fmt: skip
             if first == last:
                 return
@@ -177,26 +181,30 @@ class Runner:
             else:
                 place.work = with_room(place.work)
 
-    def run(self, swarm: Swarm, islands: Islands, all_in: bool) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, swarm: Swarm, islands: Islands) -> tuple[np.ndarray, np.ndarray]:
         """Run islands, those of a size one after another, in all threads: the contacts that they
         leave behind (links and slips), in any order."""
         chunks = chunks_of(islands.sizes)
+        largest = int(islands.sizes.max(initial=0))
 
         def work_off(own: ThreadArrays) -> None:
             own.found.filled[0] = 0
-            own.forget_above(int(islands.sizes.max(initial=0)))
+            own.forget_above(largest)
             while chunks:
                 try:
                     first, last = chunks.pop()
                 except IndexError:
                     return
-                self.run_chunk(own, swarm, islands, first, last, all_in)
+                self.run_chunk(own, swarm, islands, first, last)
 
-        if len(self.threads) == 1:
+        try:
+            others = [self.helpers().submit(work_off, own) for own in self.threads[1:]]
             work_off(self.threads[0])
-        else:
-            with ThreadPoolExecutor(len(self.threads)) as pool:
-                list(pool.map(work_off, self.threads))
+        finally:
+            # Where this one is interrupted, the others end with what they have begun.
+            chunks.clear()
+        for other in others:
+            other.result()
         counts = [int(own.found.filled[0]) for own in self.threads]
         both = list(zip(self.threads, counts, strict=True))
         links = np.concatenate([own.found.links[:count] for own, count in both])
@@ -214,12 +222,10 @@ def larger(found: Found) -> Found:
 
 def chunks_of(sizes: np.ndarray) -> list[tuple[int, int]]:
     """(first, last) of islands of one size that a thread takes at once, the smallest first: they
-    are taken from behind."""
-    found, first = [], 0
-    while first < len(sizes):
-        last, most = first + 1, max(1, CHUNK // int(sizes[first]))
-        while last < len(sizes) and sizes[last] == sizes[first] and last - first < most:
-            last += 1
-        found.append((first, last))
-        first = last
+    are taken from behind. ``sizes``: the largest first."""
+    bounds = np.flatnonzero(np.diff(sizes, prepend=-1, append=-1)).tolist()
+    found = []
+    for begin, end in itertools.pairwise(bounds):
+        most = max(1, CHUNK // int(sizes[begin]))
+        found += [(first, min(first + most, end)) for first in range(begin, end, most)]
     return found[::-1]

@@ -1,0 +1,133 @@
+"""What islands of a window are made of, and which of them have been run already."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, LINK_COLUMNS
+from flocsim.swarms.finished import Finished
+from flocsim.swarms.progress import Progress
+from flocsim.swarms.runner import CHUNK, Islands, chunks_of
+from flocsim.swarms.swarm import Swarm
+from tests.helpers.swarm_scenes import WATER, R, crowd, forces
+
+
+def drawn(seed, n=60, walls=3):
+    """Names of islands of n bodies, the last of them fixed, and which of these each reaches."""
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, n // 3, n)
+    labels = np.array([np.flatnonzero(labels == label)[0] for label in labels])
+    fixed = np.arange(n - walls, n)
+    labels[fixed] = -1
+    for label in np.unique(labels[labels >= n - walls]):
+        labels[labels == label] = -1
+    touches = rng.random((n, walls)) < 0.1
+    return labels, fixed, touches
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_islands_are_bodies_of_a_name_and_the_walls_that_these_reach(seed):
+    labels, fixed, touches = drawn(seed, walls=seed % 4)
+    islands = Islands.of(labels, fixed, touches)
+    expected = []
+    for label in sorted({*labels.tolist()} - {-1}):
+        members = np.flatnonzero(labels == label)
+        reached = {int(fixed[k]) for k in np.flatnonzero(touches[members].any(axis=0))}
+        expected.append(sorted({*members.tolist(), *reached}))
+    found = [islands.members_of(k).tolist() for k in range(len(islands.sizes))]
+    assert sorted(found) == sorted(expected)
+    chosen = islands.chosen(np.arange(0, len(found), 2))
+    assert sorted(chosen.members_of(k).tolist() for k in range(len(chosen.sizes))) == sorted(
+        found[::2]
+    )
+    assert (np.diff(chosen.sizes) <= 0).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_chunks_are_of_one_size_and_take_every_island_once(seed):
+    sizes = np.sort(np.random.default_rng(seed).geometric(0.3, 300))[::-1]
+    chunks = chunks_of(sizes)[::-1]
+    assert [first for first, _ in chunks] == [0, *(last for _, last in chunks[:-1])]
+    assert chunks[-1][1] == len(sizes)
+    for first, last in chunks:
+        assert len(np.unique(sizes[first:last])) == 1
+        assert (last - first) * sizes[first] <= max(CHUNK, sizes[first])
+    assert chunks_of(sizes[:0]) == []
+
+
+def contacts_of(islands, free, rng):
+    """A contact of each island of two free bodies or more, or of one and a wall."""
+    links = []
+    for k in range(len(islands.sizes)):
+        members = islands.members_of(k)
+        if len(members) > 1:
+            later, earlier = members[-1], members[0]
+            links.append([later, earlier, *rng.integers(0, 100, 2)])
+    links = np.array(links, dtype=np.int64).reshape(-1, LINK_COLUMNS)
+    return links, rng.random((len(links), 2))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_has_been_run_is_not_run_again_and_contacts_are_those_of_the_last_islands(seed):
+    rng = np.random.default_rng([seed, 1])
+    labels, fixed, touches = drawn(seed)
+    free = labels >= 0
+    finished, ran = Finished(free), {}
+    for _ in range(4):
+        islands = Islands.of(labels, fixed, touches)
+        fresh = islands.chosen(finished.missing(islands))
+        members = {tuple(islands.members_of(k)) for k in range(len(islands.sizes))}
+        assert {tuple(fresh.members_of(k)) for k in range(len(fresh.sizes))} == members - ran.keys()
+        links, slips = contacts_of(fresh, free, rng)
+        finished.add(fresh, links, slips)
+        assert len(finished.missing(islands)) == 0
+        here = dict.fromkeys(members - ran.keys())
+        for link, slip in zip(links.tolist(), slips.tolist(), strict=True):
+            owner = int(finished.owners(np.array([link]))[0])
+            here[next(key for key in here if owner in key)] = (tuple(link), tuple(slip))
+        ran = {key: ran[key] for key in members & ran.keys()} | here
+        kept = zip(finished.links.tolist(), finished.slips.tolist(), strict=True)
+        known = {(tuple(link), tuple(slip)) for link, slip in kept}
+        assert known == {each for each in ran.values() if each}
+        # Some merge, some reach another wall; none reaches fewer.
+        one, other = rng.choice(np.unique(labels[free]), 2)
+        labels[labels == max(one, other)] = min(one, other)
+        touches = touches | (rng.random(touches.shape) < 0.01)
+
+
+def test_paths_are_as_wide_as_bodies_stray_and_islands_those_of_the_paths():
+    """What makes a window right: whoever strayed did so within what its neighbours counted on."""
+    bodies, side = crowd(30, 2)
+    swarm = Swarm(bodies, forces(), fluid=WATER, box=(side, side))
+    progress, seen, widened = swarm.begin(0.05), 0, 0
+    # So far that bodies meet whom straight paths would have missed.
+    progress.span *= 30.0
+    take_over = progress.take_over
+
+    def watched(finished):
+        nonlocal seen, widened
+        arrays = progress.swarm
+        assert (arrays.strayed <= arrays.wander).all()
+        length = arrays.times[1] - arrays.times[0]
+        islands = progress.runner.islands_of(arrays, length, progress.reach, progress.box)
+        assert len(finished.missing(islands)) == 0
+        seen += 1
+        widened += bool((arrays.strayed > 0.05 * R).any())
+        take_over(finished)
+
+    progress.take_over = watched
+    while progress.advance(0.05).name == "PAUSED":
+        assert isinstance(progress, Progress)
+    assert seen > 3 and widened > 0
+    assert progress.effort.tries > progress.effort.windows
+
+
+def test_links_are_named_by_a_body_that_moves():
+    finished = Finished(np.array([True, False, True]))
+    rows = list(itertools.permutations(range(3), 2))
+    links = np.zeros((len(rows), LINK_COLUMNS), dtype=np.int64)
+    links[:, [LATER_BODY, EARLIER_BODY]] = rows
+    owners = finished.owners(links)
+    assert finished.free[owners].all()
+    assert all(owner in row for owner, row in zip(owners, rows, strict=True))
