@@ -140,8 +140,10 @@ NOTHING_FULL, CANDIDATES_FULL, PAIRS_FULL, BLOCKS_FULL = range(4)
     SETTLED_STEP,
     ESTIMATE_SHARE,
     HORIZON,
+    SEEN_PACE,
+    SEEN_STEP,
     CLOCK_SIZE,
-) = range(20)
+) = range(22)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
 error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
@@ -150,7 +152,8 @@ step that is expected to work at all; the error of the step just taken [m]; size
 tolerance of the trial that was just rejected (0: none was); steps in a row that ended at a switch,
 until one has been taken that does not; the size of the last such step; the share of what the method
 estimates for its steps that counts in the stated error; until when the run goes on, where UNTIL is
-but a stop on the way (0: it is not) [s]."""
+but a stop on the way (0: it is not) [s]; the pace of the last second iteration that was made (0: it
+is not known), and the size of its step."""
 
 STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, COUNTS_SIZE = range(9)
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after

@@ -97,11 +97,12 @@ def lowest_share(scene, work, step, row):
     return share
 
 
-def crossing(scene, work, step, row, high, resolution):
-    """The share at which the margin, which is too low at ``high``, is just below zero."""
+def crossing(scene, work, step, row, high, at_high, resolution):
+    """The share at which the margin, ``at_high`` at ``high`` and too low there, is just below
+    zero."""
     low, target = 0.0, 0.5 * resolution
     at_low = margin(work, NOW, row) + target
-    at_high = look_at(scene, work, step, high, row) + target
+    at_high += target
     side = 0
     share = high
     for _ in range(MOST_TRIALS):
@@ -151,9 +152,10 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
         if lowest > high:
             return earliest
         high = lowest
-    if look_at(scene, work, step, high, row) >= -limit:
+    at_high = look_at(scene, work, step, high, row)
+    if at_high >= -limit:
         return earliest
-    return crossing(scene, work, step, row, high, resolution)
+    return crossing(scene, work, step, row, high, at_high, resolution)
 
 
 def may_switch(scene, work, step, resolution, depth):

@@ -1,14 +1,19 @@
 """The cubic through the stages of a Radau IIA step: the motion in it, its end where something
 switches, the guess for the next."""
 
+import math
+
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     DAMPING,
     FIRST_STAGE,
+    FORCE,
     FREE,
+    NEAR,
     NEW,
     NOW,
+    RELAXATION,
     STAGED_AT,
     STAGED_STEP,
     START,
@@ -28,6 +33,9 @@ STIFF = 25.0
 
 TINY = 1e-300
 """Stands for no inertia."""
+
+SOFT = 10.0
+"""Accelerations last for a step that is so many times as short as velocities do."""
 
 LONGEST_GUESS = 2.0
 """The last step's cubic is carried on for a step that is at most so many times as long."""
@@ -121,6 +129,29 @@ def keep_velocities(work):
                 work.motion[FIRST_STAGE + stage, body, axis] = work.motion[NOW, body, axis]
 
 
+def keep_accelerations(scene, work, step):
+    """First guess: the accelerations stay as they are."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            mass = inertia(scene, body, axis)
+            gain = scene.bodies[body, FREE] * step * work.rates[NOW, body, FORCE + axis]
+            for stage in range(3):
+                speed = work.motion[NOW, body, VELOCITY + axis]
+                speed += NODES[stage] * gain / max(mass, TINY)
+                work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] = speed
+
+
+def is_soft(work, step):
+    """Whether no pair of features acts, and drag takes little of a velocity in a step."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0:
+            return False
+    shortest = math.inf
+    for body in range(work.bodies.shape[0]):
+        shortest = min(shortest, work.bodies[body, RELAXATION])
+    return shortest >= SOFT * step
+
+
 def carry_on(work, begin, scale):
     """First guess: the cubic of the stages that are there, whose step began ``begin`` of it ago."""
     one, two, three = NODES
@@ -138,11 +169,13 @@ def carry_on(work, begin, scale):
                 work.motion[FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
-def guess_stages(work, clock, step):
+def guess_stages(scene, work, clock, step):
     """The stages' velocities to start from, and where this step starts."""
     staged = clock[STAGED_STEP]
     if staged > 0.0 and step <= LONGEST_GUESS * staged:
         carry_on(work, (clock[TIME] - clock[STAGED_AT]) / staged, step / staged)
+    elif is_soft(work, step):
+        keep_accelerations(scene, work, step)
     else:
         keep_velocities(work)
     for body in range(work.motion.shape[1]):

@@ -15,6 +15,8 @@ from flocsim.arrays import (
     MEMORY,
     NOW,
     PACE,
+    SEEN_PACE,
+    SEEN_STEP,
     SLIP_RATES,
     SOLVES,
     TIME,
@@ -37,6 +39,14 @@ FIRST_PACE = 0.5
 
 NEWTON_SHARE = 1e-3
 """Newton's method goes on until what is left is below this share of the tolerance."""
+
+DOUBTED_PACE = 10.0
+"""The second iteration is expected to shrink the first one's change by so many times less than it
+did when it was last made, its pace going with the square of the step, …"""
+
+LEAST_PACE = 1e-3
+"""… and to this share at least: what it is not needed for changes places by no more than the
+tolerance, so that a pace which is far worse than expected errs by little."""
 
 
 def place_stages(work, step):
@@ -104,18 +114,33 @@ def newton_step(scene, work, time, step):
     return correct_stages(scene, work, step)
 
 
-def finish_stages(scene, work, step):
-    """Places and tangential displacements that go with the last correction; the end is NEW."""
+def finish_stages(scene, work, step, located):
+    """Places and tangential displacements that go with the last correction; the end is NEW.
+
+    ``located``: whether the last correction was so small that contacts lie where they did before.
+    """
     place_stages(work, step)
     for state in range(FIRST_STAGE, FIRST_STAGE + 3):
-        rate_slips(work, state)
+        if located:
+            rate_slips(work, state)
+        else:
+            locate_and_rate(scene, work, state)
     slip_stages(scene, work, step)
     take_stage(work, THIRD_STAGE)
 
 
+def expected_pace(clock, step):
+    """What to expect of the second iteration before it is made."""
+    if clock[SEEN_PACE] == 0.0:
+        return FIRST_PACE
+    longer = max(step / clock[SEEN_STEP], 1.0)
+    return min(max(DOUBTED_PACE * clock[SEEN_PACE] * longer * longer, LEAST_PACE), FIRST_PACE)
+
+
 def solve_stages(scene, work, clock, step):
     """Find the stages' velocities; False where Newton's method does not converge."""
-    guess_stages(work, clock, step)
+    guess_stages(scene, work, clock, step)
+    expected = expected_pace(clock, step)
     allowed = step_tolerance(work, clock)
     # Turning makes every other iteration worse, so that the pace is taken over two of them.
     before, earlier = math.inf, math.inf
@@ -123,13 +148,17 @@ def solve_stages(scene, work, clock, step):
         change = newton_step(scene, work, clock[TIME], step)
         goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
-        if before == math.inf:
-            pace = FIRST_PACE
+        first = before == math.inf
+        if first:
+            pace = expected
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
-            finish_stages(scene, work, step)
-            clock[PACE] = pace if before < math.inf else 0.0
+            finish_stages(scene, work, step, not first)
+            clock[PACE] = 0.0 if first else pace
+            if not first:
+                clock[SEEN_PACE], clock[SEEN_STEP] = pace, step
             return True
         if not change < math.inf or (earlier < math.inf and pace > 1.0):
-            return False
+            break
         before, earlier = change, before
+    clock[SEEN_PACE] = 0.0
     return False

@@ -1,0 +1,79 @@
+"""How many iterations the stages take, and what a step that is taken anew knows already."""
+
+import numpy as np
+import pytest
+
+from flocsim import Body, Sphere, System
+from flocsim.arrays import (
+    CLOCK_SIZE,
+    EVALUATIONS,
+    LOCATED,
+    SEEN_PACE,
+    SEEN_STEP,
+    SOLVES,
+    STAGED_AT,
+    STAGED_STEP,
+    TIME,
+)
+from flocsim.forces import Contact, Gravity, StokesDrag
+from flocsim.integrators import Implicit
+from flocsim.integrators.implicit import is_tried_again
+from flocsim.integrators.radau.stages import DOUBTED_PACE, FIRST_PACE, LEAST_PACE, expected_pace
+
+
+def seen(pace, step):
+    """A clock that has seen a second iteration of this pace in such a step."""
+    clock = np.zeros(CLOCK_SIZE)
+    clock[SEEN_PACE], clock[SEEN_STEP] = pace, step
+    return clock
+
+
+def test_without_experience_a_second_iteration_is_needed():
+    assert expected_pace(np.zeros(CLOCK_SIZE), 1e-6) == FIRST_PACE
+
+
+def test_a_longer_step_is_expected_to_converge_as_its_square():
+    clock = seen(1e-3, 1e-6)
+    assert expected_pace(clock, 1e-6) == pytest.approx(DOUBTED_PACE * 1e-3)
+    assert expected_pace(clock, 3e-6) == pytest.approx(9.0 * DOUBTED_PACE * 1e-3)
+    assert expected_pace(clock, 1e-7) == pytest.approx(DOUBTED_PACE * 1e-3)
+
+
+@pytest.mark.parametrize(("pace", "expected"), [(1e-12, LEAST_PACE), (0.3, FIRST_PACE)])
+def test_what_is_expected_has_bounds(pace, expected):
+    assert expected_pace(seen(pace, 1e-6), 1e-6) == expected
+
+
+def test_constant_forces_take_one_iteration():
+    """The first guess carries accelerations on, which is all that there is to a fall in nothing."""
+    body = Body(Sphere(1e-5), (0.0, 0.0), velocity=(1e-3, 0.0), density=2650.0)
+    found = System([body], [Gravity()], Implicit()).begin(1e-3, max_steps=1000, jit=False)
+    found.to_end()
+    assert found.work.tally[SOLVES] == found.steps + found.rejected
+
+
+def test_a_step_that_is_taken_anew_starts_from_what_is_known():
+    """Two spheres that meet: a step that ends at their touch begins where the one before did."""
+    bodies = [
+        Body(Sphere(1e-5), (0.0, y), velocity=(0.0, v), density=2650.0)
+        for y, v in ((0.0, 0.0), (2.02e-5, -1e-2))
+    ]
+    system = System(bodies, [StokesDrag(), Contact()], Implicit())
+    run = system.begin(2e-3, max_steps=1000, jit=False)
+    run.to_end()
+    trials = run.steps + run.rejected + run.counts[LOCATED]
+    starts = run.work.tally[EVALUATIONS] - 3 * run.work.tally[SOLVES]
+    assert run.counts[LOCATED] > 0
+    assert starts == trials - run.counts[LOCATED]
+
+
+@pytest.mark.parametrize(
+    ("staged", "at", "reach", "known"),
+    [(1e-6, 0.5, -1.0, True), (0.0, 0.5, -1.0, False), (1e-6, 0.4, -1.0, False),
+     (1e-6, 0.5, 1e-7, False)],
+)  # fmt: skip
+def test_surface_forces_and_rejected_steps_start_afresh(staged, at, reach, known):
+    scene = System([Body(Sphere(1e-5), density=2650.0)], [Gravity()], Implicit()).scene(jit=False)
+    clock = np.zeros(CLOCK_SIZE)
+    clock[TIME], clock[STAGED_STEP], clock[STAGED_AT] = 0.5, staged, at
+    assert bool(is_tried_again(scene._replace(surface_reach=reach), clock)) == known
