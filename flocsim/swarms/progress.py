@@ -55,7 +55,7 @@ ALL_BUT = 0.999
 
 
 OF_CONTACTS = ("links", "slips")
-STATE = ("motion", "carried", "errors", "steps", "methods", "wander", *OF_CONTACTS)
+STATE = ("motion", "carried", "errors", "stated", "steps", "methods", "wander", *OF_CONTACTS)
 """Arrays of a swarm that the rest of a run follows from."""
 
 
@@ -100,7 +100,7 @@ class Progress:
         self.least_wander = LEAST_WANDER * swarm.bodies[:, BOUNDING_RADIUS]
         swarm.wander[:] = self.least_wander
         swarm.times[HORIZON_AT] = until
-        self.time, self.error, self.effort = 0.0, 0.0, Effort()
+        self.time, self.effort = 0.0, Effort()
         self.span = min(self.time_to_go(FIRST_WAY * self.mean_radius), 1e-3 * until)
         self.failed: np.ndarray | None = None
 
@@ -120,6 +120,16 @@ class Progress:
         side = min(self.box)
         return self.time_to_go(LONGEST_WAY * side) if side < math.inf else math.inf
 
+    @property
+    def error(self) -> float:
+        """The largest stated error of position of a body [m]."""
+        return float(self.swarm.stated.max())
+
+    @property
+    def median_error(self) -> float:
+        """The stated error of position that half of the bodies that move keep below [m]."""
+        return float(np.median(self.swarm.stated[self.free])) if self.free.any() else 0.0
+
     def seen(self) -> tuple[float, np.ndarray, float]:
         """(time [s], motion (n, 6), the largest stated error [m]) now; NaN for bodies that are
         gone."""
@@ -130,7 +140,7 @@ class Progress:
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
         swarm = self.swarm
-        numbers = {"time": self.time, "span": self.span, "error": self.error}
+        numbers = {"time": self.time, "span": self.span}
         return {
             **{name: getattr(swarm, name).copy() for name in STATE},
             **{name: np.array(value) for name, value in numbers.items()},
@@ -145,9 +155,7 @@ class Progress:
             if name not in OF_CONTACTS:
                 getattr(self.swarm, name)[...] = state[name]
         self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
-        self.time, self.span, self.error = (
-            float(state[name]) for name in ("time", "span", "error")
-        )
+        self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
         self.forget(state["gone"] == 1)
@@ -210,7 +218,7 @@ class Progress:
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, [(finished.links, finished.slips)])
-        self.time, self.error = float(swarm.times[END]), float(swarm.stated.max())
+        self.time = float(swarm.times[END])
         self.effort.windows += 1
 
     def forget(self, gone: np.ndarray) -> None:

@@ -122,6 +122,7 @@ def moment_part(
     near = gauge.neighbours(position, study.scene.link)
     found = Clusters.of(swarm.bodies, position, velocity, near, ~progress.gone)
     facts = {"place": place, "time": now, "error": error} | summary_of(found)
+    facts["median_error"] = progress.median_error
     facts |= {"removed": int(progress.gone.sum()), "reentered": int(progress.returns.sum())}
     facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
     label = np.where(progress.gone, GONE, found.label).astype(np.int32)

@@ -51,6 +51,8 @@ def test_what_is_written_agrees_with_itself(finished):
             labels = moments["cluster"][k, t]
             assert len(set(labels.tolist())) == counts["clusters"][k, t]
             assert np.bincount(labels).max() == counts["largest"][k, t]
+    half, largest = counts["median_error"], counts["error"]
+    assert (half[:, 1:] > 0.0).all() and (half <= largest).all() and (half < largest).any()
     fell = moments["position"][:, -1, :, 1] - moments["position"][:, 0, :, 1]
     assert fell.max() < 0.0
     bonds = results.groups["bonds"]
