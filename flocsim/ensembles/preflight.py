@@ -8,7 +8,7 @@ import numpy as np
 from flocsim.arrays import NOW, ContactView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
-from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
+from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.zone import zone_distance
@@ -77,7 +77,7 @@ def check_study(config: Config) -> None:
         )
     for name, pair in sphere_pairs(config, flocs):
         check_approach(config, name, pair)
-        check_compilable(pair.system)
+        check_compilable(pair)
         check_numbers(pair.system)
     if not isinstance(config.integrator.check_share, str) and (
         config.integrator.check_share > 0.0 and exact_method(config.integrator.method) is None
@@ -90,11 +90,12 @@ def check_study(config: Config) -> None:
     check_impacts(config, flocs)
 
 
-def check_compilable(system: System) -> None:
+def check_compilable(pair: Encounter) -> None:
     """KernelError where a kernel calls what compiled code cannot, as print, or does not compile."""
+    system = pair.system
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
-    refuse_interpreter(advance, system.fillings(OBSERVER))
+    refuse_interpreter(advance, system.fillings(pair.observer))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
 

@@ -1,0 +1,3 @@
+"""Pairs under thermal motion: how far kicks let them climb (climb), and what becomes of them
+(kicked).
+"""
