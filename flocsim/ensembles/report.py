@@ -163,17 +163,20 @@ def kernel_row(kernel, place):
 
 
 def touch_lines(results: Results) -> list[str]:
-    """What share of the pairs of a brownian study touched before they had escaped, for each type
-    and N; none of other studies."""
+    """What share of the decided pairs of a brownian study touched before they had escaped, for each
+    type and N; none of other studies. Those that are held apart did not."""
     if not stored(results.run, "equivalent_spheres"):
         return []
     table, lines = results.probabilities, []
     for t, v in itertools.product(range(len(results.types)), range(len(results.vertices))):
-        touched, missed = (int(table[name][t, v].sum()) for name in ("n_collided", "n_missed"))
+        touched, missed, held = (
+            int(table[name][t, v].sum()) for name in ("n_collided", "n_missed", "n_held")
+        )
+        decided = touched + missed + held
         where = f"type {visible(results.types[t], '')}, N = {results.vertices[v]}"
-        if touched + missed:
-            low, high = (float(end) for end in wilson(touched, touched + missed))
-            told = f"{touched / (touched + missed):.4f} [{low:.4f}, {high:.4f}]"
+        if decided:
+            low, high = (float(end) for end in wilson(touched, decided))
+            told = f"{touched / decided:.4f} [{low:.4f}, {high:.4f}]"
             lines.append(f"{where}: {told} touched before they had escaped")
     return lines
 

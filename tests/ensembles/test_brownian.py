@@ -179,6 +179,18 @@ def test_a_study_is_run_reported_resumed_and_dealt_to_processes(folder, capsys):
     assert not same_data("study.h5", "more.h5"), "nothing differs"
 
 
+def test_a_pair_that_a_secondary_minimum_holds_never_touches(folder, capsys):
+    text = text_of(4, forces="[forces.thermal]").replace("0.5 um", "5 um").replace("1e-20", "1e-19")
+    layer = 'double_layer = { potential = "50 mV", debye_length = "20 nm" }'
+    text = text.replace("double_layer = false", layer).replace('cut = "2 nm"', "")
+    (folder / "held.toml").write_text(text, "utf-8")
+    assert main(["ensemble", "held.toml"]) == 0
+    assert "0.0000 [0.0000, 0.4899] touched before they had escaped" in capsys.readouterr().out
+    table = read_results("held.h5").probabilities
+    assert table["n_held"].sum() >= 2
+    assert table["n_held"].sum() + table["n_missed"].sum() == 4
+
+
 def test_a_replicate_can_be_looked_at(folder, capsys):
     words = ["trajectory", "study.toml", "--scene", "0.5um-0.5um,1,0", "--replicate", "1"]
     assert main([*words, "-o", "a.png"]) == 0

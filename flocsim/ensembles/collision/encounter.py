@@ -9,19 +9,19 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import EQUIVALENT_RADIUS, NOW, Scene, Work, work_of
+from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.ensembles.collision import bonds, meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided, outcome_of
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, replicate_row
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
 from flocsim.ensembles.collision.thermal import climb, kicked
+from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
 from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.forces.thermal import Thermal, key_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
-from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 from flocsim.plausibility.settling import (
     largest_mobility,
     least_mobility,
@@ -71,7 +71,7 @@ class Encounter:
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
         if self.meeting == BROWNIAN:
-            self.refuse_release()
+            refuse_release(self.options, self.shapes, self.diffusion)
         if self.meeting != SETTLING:
             names = [type(force).__name__ for force in self.system.forces]
             meetings.refuse_drift(motions[1][0] - motions[0][0], -self.drift[1], names)
@@ -113,27 +113,10 @@ class Encounter:
         """D of the two against each other [m²/s]."""
         return self.kick_energy * sum(mobility for _, mobility in self.settling)
 
-    @property
+    @functools.cached_property
     def ends(self) -> tuple[float, float]:
         """Distances of the centres [m] at which a brownian meeting begins, and is missed."""
-        assert self.options.release is not None and self.options.escape is not None
-        size = sum(shape.equivalent_radius for shape in self.shapes)
-        return self.options.release * size, self.options.escape * size
-
-    def refuse_release(self) -> None:
-        """UsageError where a brownian meeting has no kicks, or outlines would touch at first."""
-        if not self.diffusion > 0.0:
-            raise UsageError(
-                "two bodies that do not diffuse never meet: add [forces.thermal], of a temperature "
-                "above 0 K"
-            )
-        if not self.outer < self.ends[0]:
-            size = sum(shape.equivalent_radius for shape in self.shapes)
-            raise UsageError(
-                f"scene.release = {self.options.release:g} (r_i + r_j) lets outlines touch that "
-                f"reach {self.outer / size:.3g} (r_i + r_j): give a larger one, and scene.escape "
-                "above it"
-            )
+        return ends_of(self.options, self.shapes)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -300,8 +283,7 @@ class Encounter:
         In a brownian meeting ``share`` is the direction of j, over a full turn.
         """
         if self.meeting == BROWNIAN:
-            place = np.array([[0.0, 0.0, angles[0]], [0.0, 0.0, angles[1]]])
-            place[1, :2] = meetings.start_apart(share, self.ends[0])
+            place = start_apart(angles, share, self.ends[0])
             return work_of(self.scene, place, np.zeros((2, 3)))
         if self.rate is not None:
             return self.start_in_flow(angles, share)
@@ -411,32 +393,3 @@ def run_encounter(
     if status in UNABLE and (why := force_to_blame(encounter.system, run)):
         row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
     return row
-
-
-def replicate_row(status, angles, run):
-    """What the table of replicates holds of a Run that has ended."""
-    observed = run.observed
-    outcome, failure = outcome_of(status, run.code, observed)
-    touched = collided(observed)
-    zone = observed[numbers.ZONE]
-    return {
-        "angle_i": angles[0],
-        "angle_j": angles[1],
-        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
-        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
-        "D_0": zone,
-        "outcome": outcome,
-        "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
-        "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
-        "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
-        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
-        "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
-        "d_c_last": observed[numbers.D_LAST],
-        "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,
-        "t_end": run.time,
-        "steps": run.steps,
-        "rejected": run.rejected,
-        "error": run.error,
-        "failure": failure,
-    }

@@ -1,5 +1,5 @@
-"""What brings two bodies together: settling, a flow alone, or thermal motion alone; where they
-start, and how they turn.
+"""What brings two bodies together: settling, a flow, or thermal motion; where they start,
+and how they turn.
 
 In a flow alone weight is left out, so that rates of the mechanisms add up as in population
 balances. Body i lies where the flow stands still, j comes along a way of the undisturbed flow that
@@ -12,8 +12,8 @@ Neither has a way that comes back: a pair that the flow carries apart does not m
 that turn faster than they strain have closed ways alone, no pair in them comes from afar, and
 none are offered here.
 
-In thermal motion alone weight is left out, too, and j starts in any direction from i. What kicks
-make of the end of a meeting is in thermal/kicked.py.
+In thermal motion alone weight is left out, too; where j is let go then, and what kicks make of the
+end of a meeting, is in the folder thermal.
 """
 
 import math
@@ -242,13 +242,6 @@ def resting_place(rates: np.ndarray, place: int) -> float:
             return (place + way * (ahead - 1 + share)) % len(rates)
         before = after
     return float(place)
-
-
-def start_apart(direction: float, far: float) -> tuple[float, float]:
-    """Where j starts [m], i being at the origin: at a distance ``far``, in a direction that is a
-    share of a full turn."""
-    turn = 2.0 * math.pi * direction
-    return far * math.cos(turn), far * math.sin(turn)
 
 
 def refuse_drift(drift: np.ndarray, speed: float, names: Sequence[str]) -> None:
