@@ -73,7 +73,7 @@ INNER_ROWS = {
         ["estimates"],
         ["storage"],
         ["kernels"],
-        ["study", "doubts"],
+        ["study", "doubts", "equivalent_spheres"],
         ["preflight"],
         ["impact"],
         ["collision"],

@@ -52,8 +52,9 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     bodies = [body for system in systems for body in system.bodies]
     lines = [line for name, force in forces.items() for line in unusual(force, name)]
     lines += unusual(first.fluid, names.fluid)
+    warm = any(isinstance(force, Thermal) and not force.absent for force in forces.values())
     for body in bodies:
-        lines += [*unusual(body, names.body), *about_shape(body)]
+        lines += [*unusual(body, names.body), *about_shape(body, warm)]
     settled = [each for system in systems for each in all_settled(system)]
     lines += [
         about_weight(first.fluid, bodies, forces, names.buoyancy),
@@ -64,10 +65,11 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     return [line for line in dict.fromkeys(lines) if line]
 
 
-def about_shape(body: Body) -> list[str]:
-    """Lines on the size of a body, and on its spheroradius where it has edges."""
+def about_shape(body: Body, warm: bool) -> list[str]:
+    """Lines on the size of a body, which thermal motion allows to be as small as it likes, and on
+    its spheroradius where it has edges."""
     size = body.shape.equivalent_radius
-    lines = [RADIUS.doubt("equivalent radius", size)]
+    lines = [] if warm and size < RADIUS.low else [RADIUS.doubt("equivalent radius", size)]
     if len(body.shape.vertices) > 1:
         lines.append(ROUNDING.doubt("spheroradius / equivalent radius", body.shape.radius / size))
     return lines
