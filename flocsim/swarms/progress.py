@@ -55,7 +55,7 @@ ALL_BUT = 0.999
 
 
 OF_CONTACTS = ("links", "slips")
-STATE = ("motion", "carried", "errors", "stated", "steps", "methods", "wander", *OF_CONTACTS)
+STATE = ("motion", "carried", "errors", "steps", "methods", "wander", *OF_CONTACTS)
 """Arrays of a swarm that the rest of a run follows from."""
 
 
@@ -101,6 +101,8 @@ class Progress:
         swarm.wander[:] = self.least_wander
         swarm.times[HORIZON_AT] = until
         self.time, self.effort = 0.0, Effort()
+        # Its own: a window that fails leaves that of the swarm half written.
+        self.stated = np.zeros(len(swarm.bodies))
         self.span = min(self.time_to_go(FIRST_WAY * self.mean_radius), 1e-3 * until)
         self.failed: np.ndarray | None = None
 
@@ -123,12 +125,12 @@ class Progress:
     @property
     def error(self) -> float:
         """The largest stated error of position of a body [m]."""
-        return float(self.swarm.stated.max())
+        return float(self.stated[self.free].max(initial=0.0))
 
     @property
     def median_error(self) -> float:
         """The stated error of position that half of the bodies that move keep below [m]."""
-        return float(np.median(self.swarm.stated[self.free])) if self.free.any() else 0.0
+        return float(np.median(self.stated[self.free])) if self.free.any() else 0.0
 
     def seen(self) -> tuple[float, np.ndarray, float]:
         """(time [s], motion (n, 6), the largest stated error [m]) now; NaN for bodies that are
@@ -147,6 +149,7 @@ class Progress:
             "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
             "gone": self.gone.astype(np.int64),
             "returns": self.returns.copy(),
+            "stated": self.stated.copy(),
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -158,6 +161,7 @@ class Progress:
         self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
+        self.stated[...] = state["stated"]
         self.forget(state["gone"] == 1)
 
     def advance(self, stop: float) -> Status:
@@ -219,6 +223,7 @@ class Progress:
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, [(finished.links, finished.slips)])
         self.time = float(swarm.times[END])
+        self.stated[...] = swarm.stated
         self.effort.windows += 1
 
     def forget(self, gone: np.ndarray) -> None:
