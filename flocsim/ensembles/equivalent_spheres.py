@@ -17,7 +17,7 @@ from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import BROWNIAN, Config
 from flocsim.ensembles.preflight import sphere_pairs
-from flocsim.forces import Thermal
+from flocsim.forces.thermal import thermal_in
 
 
 def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
@@ -39,7 +39,7 @@ def facts_of(pair: Encounter) -> dict[str, Any]:
     system, (near, far) = pair.system, pair.ends
     radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
     radii = radius_i, radius_j
-    [thermal] = [each for each in system.forces if isinstance(each, Thermal)]
+    [thermal] = thermal_in(system.forces)
     known: dict[str, Any] = {"temperature": thermal.temperature, "fluid": system.fluid}
     with np.errstate(all="ignore"):
         found = {

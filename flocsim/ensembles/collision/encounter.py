@@ -19,7 +19,7 @@ from flocsim.ensembles.collision.thermal import climb, kicked
 from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
 from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
-from flocsim.forces.thermal import Thermal, key_of
+from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
 from flocsim.plausibility.settling import (
@@ -100,8 +100,7 @@ class Encounter:
     @property
     def kick_energy(self) -> float:
         """k_B T of the thermal motion [J], 0 without."""
-        warm = (each.energy for each in self.system.forces if isinstance(each, Thermal))
-        return max(warm, default=0.0)
+        return max((each.energy for each in thermal_in(self.system.forces)), default=0.0)
 
     @property
     def observer(self) -> dict[Callable, Callable]:

@@ -52,6 +52,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.base import Force
+from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
 
@@ -855,7 +856,7 @@ def thermal_contradictions(
     scene: SceneConfig, forces: Iterable[Force]
 ) -> Iterator[tuple[tuple[str, ...], str]]:
     """What of a scene does not go with thermal motion, or without."""
-    warm = any(isinstance(force, Thermal) and not force.absent for force in forces)
+    warm = bool(thermal_in(forces))
     if scene.meetings == (BROWNIAN,):
         if not warm:
             text = '"brownian" needs kicks: add [forces.thermal], of a temperature above 0 K'
