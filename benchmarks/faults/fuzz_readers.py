@@ -53,6 +53,31 @@ def read_results_file(path):
     results_text("r.h5", found, read_overview(path)[1])
 
 
+def read_kernel_file(path):
+    """Read it, and make the tables for other models."""
+    from flocsim.io.results.file import read_results
+    from flocsim.io.results.kernel_tables import kernel_csv, kernel_matrix
+
+    read_results_file(path)
+    kernel = read_results(path).kernel
+    if kernel is not None:
+        kernel_csv(kernel)
+        for mechanism in kernel.mechanisms:
+            for vertices in kernel.vertices.tolist():
+                kernel_matrix(kernel, mechanism, vertices)
+
+
+def read_strengths_file(path):
+    """Read it, describe it, draw it."""
+    from flocsim.ensembles.strength.distribution import table_of
+    from flocsim.io.plots.strength import over_rate
+    from flocsim.io.results.strength_file import read_strengths
+
+    found = read_strengths(path)
+    table_of(found)
+    over_rate(found)
+
+
 def read_library_file(path):
     """Read it, and make the shapes."""
     from flocsim.commands.info import library_text
@@ -248,6 +273,9 @@ def reader(name, folder):
         "swarms": (hostile_files.swarm_file, read_swarm_file),
         "results": (hostile_files.results_file, read_results_file),
         "libraries": (hostile_files.library_file, read_library_file),
+        "compounds": (hostile_files.compounds_file, read_library_file),
+        "kernels": (hostile_files.kernel_file, read_kernel_file),
+        "strengths": (hostile_files.strengths_file, read_strengths_file),
         "pictures": (hostile_files.picture_file, read_picture_file),
         "masks": (hostile_files.masks_file, read_masks_file),
         "configs": (hostile_files.config_file, read_config_file),
@@ -256,6 +284,7 @@ def reader(name, folder):
 
 KINDS = (
     "results", "libraries", "journals", "pictures", "masks", "configs", "swarms", "swarm_journals",
+    "compounds", "kernels", "strengths",
 )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from flocsim.brownian.splitting import length
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.forces.base import Force
-from flocsim.forces.thermal import Thermal, key_of
+from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.overdamped import Overdamped
@@ -85,7 +85,7 @@ def brownian_meetings(
     """
     if len(bodies) != 2:
         raise UsageError(f"a meeting is one of two bodies, found {len(bodies)}")
-    if not any(isinstance(force, Thermal) and not force.absent for force in forces):
+    if not thermal_in(forces):
         raise UsageError("a brownian meeting needs a Thermal force of a temperature above 0 K")
     if not is_whole(replicates) or replicates < 1:
         raise UsageError(f"replicates must be a whole number from 1, found {replicates!r}")

@@ -17,8 +17,8 @@ import numpy as np
 
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision.checking import TIGHTER, exact_method
-from flocsim.ensembles.collision.encounter import Encounter, replicate_row
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.failures import FAILURES, replicate_row
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting

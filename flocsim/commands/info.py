@@ -14,12 +14,14 @@ import numpy as np
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.toml_text import parse
+from flocsim.ensembles.equivalent_spheres import sphere_words
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
     checked_line,
     efficiency_lines,
     format_table,
     kernel_lines,
+    touch_lines,
     undecided_line,
 )
 from flocsim.ensembles.storage.cpu_kind import describe_kind
@@ -37,7 +39,7 @@ from flocsim.io.shapes.library import is_library, read_library, read_settings
 from flocsim.io.terminal import aligned
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "settling", "size_classes")  # fmt: skip
+         "warnings", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -157,7 +159,9 @@ def summary(path: str, results: Results, totals: Totals) -> Summary:
         warnings = [str(line) for line in stored(run, "warnings")]
         warnings += filter(None, [undecided_line(results)])
         failed = [describe_note(note) for note in stored(run, "failed")]
-        return Summary(facts + settling(run), origin(run), warnings, failed)
+        facts += settling(run) + thermal(run)
+        facts += [("touched", line) for line in touch_lines(results)]
+        return Summary(facts, origin(run), warnings, failed)
     except ValueError as error:
         raise FileError(f"{path} holds no readable results: {error}; run it again") from error
 
@@ -328,6 +332,13 @@ def settling(run):
         number = f"{visible(each['body'], '')} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
         types.setdefault(visible(each["type"], ""), []).append(number)
     return [("settling", f"{name}: {', '.join(numbers)}") for name, numbers in types.items()]
+
+
+def thermal(run):
+    """[(name, value)] of what integrals say of equivalent spheres, for each type of a brownian
+    study."""
+    found = stored(run, "equivalent_spheres")
+    return [("thermal", f"{visible(each['type'], '')}: {sphere_words(each)}") for each in found]
 
 
 def origin(run):

@@ -216,6 +216,62 @@ vertices = [16]            # one number: 1 for spheres
 cut = "1 um"               # bodies further apart do not attract each other
 """
 
+KERNEL = """\
+# Rates for population balances: collision kernels and efficiencies of all pairs of size classes.
+#     flocsim kernel {file}
+#     flocsim plot {stem}.h5
+#     flocsim export matrix {stem}.h5 --model spheres      # or flocmod
+# docs/kernels.md; docs/config.md has all keys.
+preset = "tang2014"        # the paper's values; or "si": quartz in water, of its real weight
+seed = 1
+replicates = 1024          # points of each pair of classes: scrambles times a power of 2; more
+                           # later with --replicates 4096 --resume
+
+[scene]
+kind = "kernel"
+meeting = ["settling", "shear"]       # each by itself; "extension", too
+rate = "10 1/s"            # of the shear
+sizes = ["5 um", "10 um", "20 um"]    # radii of the classes: their pairs are what costs
+# pairs = "measured"       # instead of sizes: flocs of a library at their own sizes, in
+# classes = 3              # so many classes, or between radii as in ["8 um", "15 um"]
+scrambles = 8              # intervals follow from the scatter of these
+
+[shapes]
+source = "library"         # flocs fitted to images with `flocsim fit`
+file = "synthetic"         # ships with flocsim; now write "shapes.h5", your own
+vertices = [1, 16]         # 1: the equivalent sphere, which a model's own kernel is of
+pool = 10                  # each point draws its flocs from the ten nearest in size
+
+[integrator]
+tolerance = "1 nm"         # largest error in position of a step
+"""
+
+BROWNIAN = """\
+# Two colloids meet by thermal motion alone, or escape; for `flocsim ensemble`. docs/physics.md.
+preset = "si"              # quartz in water; weight is left out
+seed = 1
+replicates = 200           # pairs that are let go, each with directions and kicks of its own
+
+[scene]
+meeting = "brownian"
+pairs = [["0.5 um", "0.5 um"]]
+release = 2.0              # centres at first, over r_i + r_j; outlines must be clear
+escape = 4.0               # the same where a pair has missed: half of free spheres do
+
+[shapes]
+source = "library"
+file = "synthetic"         # ships with flocsim; or "shapes.h5", your own
+vertices = [1, 16]         # 1: the equivalent sphere, whose share is known as an integral, too
+radius = "50 nm"           # spheroradius
+
+[forces.thermal]
+temperature = "298.15 K"
+
+[integrator]
+name = "overdamped"        # no inertia, which colloids forget in a microsecond
+tolerance = "1 nm"
+"""
+
 MEASURED = (
     ("binary collisions of settling flocs,", "binary collisions of flocs as measured,"),
     (
@@ -271,8 +327,13 @@ KINDS = {
     "force": (FORCE, "a force of your own, its module too"),
     "sweep": (SWEEP, "several values of a key"),
     "swarm": (SWARM, "many bodies in a box"),
+    "kernel": (KERNEL, "rates for population balances"),
+    "brownian": (BROWNIAN, "two bodies that meet by thermal motion"),
 }
 """What there is to begin with: {name: (text, help)}."""
+
+COMMANDS = {"swarm": "swarm", "kernel": "kernel"}
+"""What runs it, where that is not `flocsim ensemble`."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -308,6 +369,6 @@ def run(args: Namespace) -> int:
     for each, content in files.items():
         write_file(each, content.encode(), rule)
     wrote = " and ".join(map(str, files))
-    command = "swarm" if args.kind == "swarm" else "ensemble"
+    command = COMMANDS.get(args.kind, "ensemble")
     print(f"wrote {wrote}; run it with: flocsim {command} {args.file}")
     return 0

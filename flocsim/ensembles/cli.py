@@ -211,14 +211,19 @@ def verdict(results, output):
 
 
 def report(ended, output):
-    from flocsim.ensembles.report import checked_line, format_table, kernel_lines
+    from flocsim.ensembles.report import (
+        checked_line,
+        format_table,
+        kernel_lines,
+        touch_lines,
+    )
 
     results = ended.results
     if results.kernel is not None:
         tell("\n".join(kernel_lines(results.kernel)))
     else:
         tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
-    if line := checked_line(results):
+    for line in filter(None, [*touch_lines(results), checked_line(results)]):
         tell(line)
     total = int(results.probabilities["n_total"].sum())
     seconds = ended.wall_time

@@ -7,7 +7,7 @@ Of flocs of measured sizes it looks at the largest of each collision type, which
 from collections.abc import Sequence
 
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BROWNIAN, Config
 from flocsim.ensembles.preflight import pairings, sphere_pairs
 from flocsim.plausibility.doubts import Names, doubts_of
 from flocsim.plausibility.ranges import ROUNDING
@@ -43,10 +43,13 @@ def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[st
 def settling_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
     """[{type, body, radius [m], speed [m/s], reynolds, stokes}] of every free equivalent sphere.
 
-    It is the same at every N: a floc settles as the sphere of its area.
+    It is the same at every N: a floc settles as the sphere of its area. Nothing where bodies meet
+    by thermal motion alone, without their weight.
     """
     found = []
     for name, pair in sphere_pairs(config, flocs, "largest"):
+        if pair.meeting == BROWNIAN:
+            continue
         for letter, body in zip("ij", pair.system.bodies, strict=True):
             if (each := settled(pair.system, body)) is not None:
                 found.append({"type": name, "body": letter, **each._asdict()})

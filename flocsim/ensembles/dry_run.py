@@ -9,8 +9,9 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts, class_words
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BROWNIAN, Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.equivalent_spheres import sphere_facts, sphere_words
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
@@ -48,14 +49,22 @@ def condition_lines(config, flocs):
     if classes := class_words(class_facts(found)):
         yield f"  {classes}"
     spans = {each.name: each.spans for each in found}
+    thermal = {each["type"]: each for each in sphere_facts(config, flocs)}
     for name, pair in sphere_pairs(config, flocs):
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         falls = [1e3 * -velocity[1] for velocity, _ in pair.settling]
-        yield (
+        sizes = (
             f"  {name}: r_i = {1e6 * radius_i:.4g} um, r_j = {1e6 * radius_j:.4g} um, "
-            f"D_0 = {1e6 * pair.zone_distance:.4g} um; "
-            f"settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time {pair.turn_time:.3g} s"
+            f"D_0 = {1e6 * pair.zone_distance:.4g} um"
         )
+        yield (
+            sizes
+            if name in thermal
+            else f"{sizes}; settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time "
+            f"{pair.turn_time:.3g} s"
+        )
+        if name in thermal:
+            yield f"    {sphere_words(thermal[name])}"
         if config.shapes.size == "own":
             (low_i, high_i), (low_j, high_j) = (np.array(each) * 1e6 for each in spans[name])
             yield (
@@ -68,7 +77,8 @@ def condition_lines(config, flocs):
             if each["type"] == name
         ]
         largest = "the largest " if config.shapes.size == "own" else ""
-        yield f"    {largest}at terminal speed: {'; '.join(numbers)}"
+        if numbers:
+            yield f"    {largest}at terminal speed: {'; '.join(numbers)}"
 
 
 def code_lines(config, flocs):
@@ -221,6 +231,15 @@ def piloted(config, ranks):
         return [f"none could be run: {type(error).__name__}: {words}"]
 
 
+def way_words(scene):
+    """How the bodies of a scene meet, in words."""
+    if scene.meetings == (BROWNIAN,):
+        return f"brownian: from {scene.release:g} to {scene.escape:g} (r_i + r_j) apart"
+    return (
+        f"delta {list(scene.delta)} of the {scene.delta_max} delta_max, receiver {scene.receiver}"
+    )
+
+
 def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
     """All that is known of a study before it is run; with a ``pilot``, what some of its replicates
     say as well."""
@@ -239,8 +258,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
         f"seed {config.seed}, {ranks} rank(s), results in {config.output.file}",
-        f"  vertices {list(shapes.vertices)}, delta {list(scene.delta)} of the {scene.delta_max} "
-        f"delta_max, receiver {scene.receiver}",
+        f"  vertices {list(shapes.vertices)}, {way_words(scene)}",
         f"  flocs: {flocs}",
         f"  integrator: {chosen_words(config) or f'{config.integrator.label}, {accuracy}'}",
         f"  run again: {checked_words(config)}",

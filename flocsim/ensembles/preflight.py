@@ -8,11 +8,11 @@ import numpy as np
 from flocsim.arrays import NOW, ContactView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
-from flocsim.ensembles.collision.encounter import OBSERVER, Encounter, make_encounter
-from flocsim.ensembles.collision.flocs import Floc, read_flocs
+from flocsim.ensembles.collision.encounter import Encounter, make_encounter
+from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BROWNIAN, Config
 from flocsim.ensembles.impact import too_deep
 from flocsim.errors import ConfigError, KernelError
 from flocsim.forces import ContactForce
@@ -75,9 +75,11 @@ def check_study(config: Config) -> None:
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
         )
+    if config.scene.meetings == (BROWNIAN,):
+        check_release(config, flocs)
     for name, pair in sphere_pairs(config, flocs):
         check_approach(config, name, pair)
-        check_compilable(pair.system)
+        check_compilable(pair)
         check_numbers(pair.system)
     if not isinstance(config.integrator.check_share, str) and (
         config.integrator.check_share > 0.0 and exact_method(config.integrator.method) is None
@@ -90,11 +92,30 @@ def check_study(config: Config) -> None:
     check_impacts(config, flocs)
 
 
-def check_compilable(system: System) -> None:
+def check_release(config: Config, flocs: Sequence[Floc]) -> None:
+    """ConfigError where outlines may touch as they are let go; of grown flocs it is not known."""
+    release, pool = config.scene.release, pool_of(config.shapes, flocs)
+    assert release is not None
+    shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
+    shapes += [
+        pool.shape(place, n, radius)
+        for each in pairings(config, flocs) for radius in each.radii
+        for place, floc in enumerate(flocs) for n in floc.shapes
+    ]  # fmt: skip
+    farthest = max(shape.bounding_radius / shape.equivalent_radius for shape in shapes)
+    if farthest >= release:
+        raise ConfigError(
+            f"scene.release = {release:g} (r_i + r_j) lets outlines touch that reach up to "
+            f"{farthest:.3g} r_eq: give a larger one, and scene.escape above it"
+        )
+
+
+def check_compilable(pair: Encounter) -> None:
     """KernelError where a kernel calls what compiled code cannot, as print, or does not compile."""
+    system = pair.system
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
-    refuse_interpreter(advance, system.fillings(OBSERVER))
+    refuse_interpreter(advance, system.fillings(pair.observer))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.estimates.statistics import HOOK
+from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
 from flocsim.io.confidence import wilson
 from flocsim.io.results.efficiency import efficiency
@@ -159,6 +160,25 @@ def kernel_row(kernel, place):
         f"{found['beta2']:.3g}", f"{found['beta3']:.3g} +-{spread:.1g}",
         f"{found['efficiency3']:.3f}",
     )  # fmt: skip
+
+
+def touch_lines(results: Results) -> list[str]:
+    """What share of the decided pairs of a brownian study touched before they had escaped, for each
+    type and N; none of other studies. Those that are held apart did not."""
+    if not stored(results.run, "equivalent_spheres"):
+        return []
+    table, lines = results.probabilities, []
+    for t, v in itertools.product(range(len(results.types)), range(len(results.vertices))):
+        touched, missed, held = (
+            int(table[name][t, v].sum()) for name in ("n_collided", "n_missed", "n_held")
+        )
+        decided = touched + missed + held
+        where = f"type {visible(results.types[t], '')}, N = {results.vertices[v]}"
+        if decided:
+            low, high = (float(end) for end in wilson(touched, decided))
+            told = f"{touched / decided:.4f} [{low:.4f}, {high:.4f}]"
+            lines.append(f"{where}: {told} touched before they had escaped")
+    return lines
 
 
 def undecided_line(results: Results) -> str:

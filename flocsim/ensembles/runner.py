@@ -19,6 +19,7 @@ from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
@@ -428,6 +429,7 @@ def facts(study, start, notes, ended, ranks):
         "size_classes": storable(json.dumps(class_facts(study.pairings))),
         "warnings": storable(json.dumps(study_doubts(config, study.flocs))),
         "settling": storable(json.dumps(settling_facts(config, study.flocs))),
+        "equivalent_spheres": storable(json.dumps(sphere_facts(config, study.flocs))),
     }
 
 

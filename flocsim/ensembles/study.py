@@ -10,7 +10,6 @@ import numpy as np
 from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
 from flocsim.ensembles.collision.encounter import (
-    OBSERVER,
     Encounter,
     Record,
     make_encounter,
@@ -21,7 +20,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_o
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BROWNIAN, Config
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
@@ -72,7 +71,7 @@ class Study:
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
-    drivers: dict[tuple[str, type], Callable] = attrs.field(init=False, factory=dict)
+    drivers: dict[tuple[str, type, bool], Callable] = attrs.field(init=False, factory=dict)
     exact: dict[str, Integrator | None] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -109,7 +108,7 @@ class Study:
         return int(np.prod(self.shape))
 
     def numbers(self, replicate: int) -> np.ndarray:
-        """The random numbers of a replicate in [0, 1): two orientations, two choices of floc."""
+        """The random numbers of a replicate in [0, 1), see draws."""
         return draws(self.config.seed, replicate)
 
     def facts(self) -> dict[str, Any]:
@@ -117,7 +116,10 @@ class Study:
         return {}
 
     def share_of(self, encounter: Encounter, share: float, replicate: int) -> float:
-        """The displacement of a replicate over δ_max in a condition of this ``share``."""
+        """The displacement of a replicate over δ_max in a condition of this ``share``; in a
+        brownian meeting the direction of j, over a full turn."""
+        if encounter.meeting == BROWNIAN:
+            return float(self.numbers(replicate)[4])
         return share
 
     def choose_flocs(
@@ -173,10 +175,10 @@ class Study:
         """
         system = encounter.system
         method = method or system.integrator
-        kind = system.family, type(method)
+        kind = system.family, type(method), bool(encounter.kick_energy)
         if kind not in self.drivers:
             made = attrs.evolve(system, integrator=method)
-            self.drivers[kind] = made.compose(observer=OBSERVER)
+            self.drivers[kind] = made.compose(observer=encounter.observer)
         return self.drivers[kind]
 
     @property

@@ -1,7 +1,7 @@
 """Thermal motion: the kicks of the fluid's molecules, which Stokes's drag balances."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import attrs
@@ -95,6 +95,11 @@ class Thermal(BodyForce):
         return force * body.kick_x, force * body.kick_y, torque * body.kick_turn
 
 
+def thermal_in(forces: Iterable[Force]) -> list[Thermal]:
+    """The random forces among some that are of a temperature above 0 K."""
+    return [force for force in forces if isinstance(force, Thermal) and not force.absent]
+
+
 def kicks_of(
     forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid
 ) -> tuple[float, float, float, float]:
@@ -102,7 +107,7 @@ def kicks_of(
 
     UsageError for more than one of them.
     """
-    found = [force for force in forces if isinstance(force, Thermal) and not force.absent]
+    found = thermal_in(forces)
     radii = sorted(body.shape.equivalent_radius for body in bodies if not body.fixed)
     if not found or not radii:
         return 0.0, 0.0, 0.0, 0.0

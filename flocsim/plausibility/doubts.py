@@ -13,7 +13,7 @@ from flocsim.forces.contact import Contact
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.lubrication import Lubrication
-from flocsim.forces.thermal import Thermal
+from flocsim.forces.thermal import Thermal, thermal_in
 from flocsim.plausibility.ranges import RADIUS, ROUNDING, unusual
 from flocsim.plausibility.reynolds import all_settled, beyond_the_law
 
@@ -31,7 +31,7 @@ class Names:
     buoyancy: str = "Fluid(buoyancy=True)"
     drop: str = "leave {} out"
 
-    def acting(self, forces: Sequence[Any]) -> dict[str, Any]:
+    def thermal_in(self, forces: Sequence[Any]) -> dict[str, Any]:
         """{name: force} of those forces that act, two of one name told apart."""
         found: dict[str, Any] = {}
         names = self.forces or tuple(type(force).__name__ for force in forces)
@@ -48,12 +48,13 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     Values outside their usual ranges, sizes, weight, drag, contacts.
     """
     names, first = names or Names(), systems[0]
-    forces = names.acting(first.forces)
+    forces = names.thermal_in(first.forces)
     bodies = [body for system in systems for body in system.bodies]
     lines = [line for name, force in forces.items() for line in unusual(force, name)]
     lines += unusual(first.fluid, names.fluid)
+    warm = bool(thermal_in(forces.values()))
     for body in bodies:
-        lines += [*unusual(body, names.body), *about_shape(body)]
+        lines += [*unusual(body, names.body), *about_shape(body, warm)]
     settled = [each for system in systems for each in all_settled(system)]
     lines += [
         about_weight(first.fluid, bodies, forces, names.buoyancy),
@@ -64,10 +65,11 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     return [line for line in dict.fromkeys(lines) if line]
 
 
-def about_shape(body: Body) -> list[str]:
-    """Lines on the size of a body, and on its spheroradius where it has edges."""
+def about_shape(body: Body, warm: bool) -> list[str]:
+    """Lines on the size of a body, which thermal motion allows to be as small as it likes, and on
+    its spheroradius where it has edges."""
     size = body.shape.equivalent_radius
-    lines = [RADIUS.doubt("equivalent radius", size)]
+    lines = [] if warm and size < RADIUS.low else [RADIUS.doubt("equivalent radius", size)]
     if len(body.shape.vertices) > 1:
         lines.append(ROUNDING.doubt("spheroradius / equivalent radius", body.shape.radius / size))
     return lines

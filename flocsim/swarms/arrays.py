@@ -32,7 +32,7 @@ STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
     START_X, START_Y, PATH_VX, PATH_VY, SINCE, FURTHEST, TRACK_COLUMNS,
 ) = range(7)  # fmt: skip
 """Columns of what an island's observer sees, of every body: the straight path that it is expected
-to go, and from when; how far it may stray from it, and how far it has [m]."""
+to go, and from when; how far it has strayed from it [m]."""
 
 
 class Swarm(NamedTuple):

@@ -261,7 +261,8 @@ def take_state(swarm, work, observed, clock, euler, method, members, first):
         swarm.new_steps[member] = clock[STEP]
         swarm.stated[member] = clock[ERROR]
         swarm.new_methods[member, METHOD] = method
-        swarm.new_methods[member, METHOD_STEP] = euler[NEXT_STEP]
+        # Of no matter for the other method, and no number at first.
+        swarm.new_methods[member, METHOD_STEP] = euler[NEXT_STEP] if method == ACROSS else 0.0
 
 
 def run_islands(

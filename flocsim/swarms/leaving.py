@@ -13,8 +13,8 @@ import numpy as np
 
 from flocsim.arrays import ANGLE, BOUNDING_RADIUS, VY, X, Y
 from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
-from flocsim.swarms.clusters import placed_together
-from flocsim.swarms.contacts import Gauge
+from flocsim.swarms.together.clusters import placed_together
+from flocsim.swarms.together.contacts import Gauge
 
 KEEP, REMOVE, REENTER = "keep", "remove", "reenter"
 RULES = (KEEP, REMOVE, REENTER)

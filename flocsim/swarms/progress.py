@@ -100,7 +100,9 @@ class Progress:
         self.least_wander = LEAST_WANDER * swarm.bodies[:, BOUNDING_RADIUS]
         swarm.wander[:] = self.least_wander
         swarm.times[HORIZON_AT] = until
-        self.time, self.error, self.effort = 0.0, 0.0, Effort()
+        self.time, self.effort = 0.0, Effort()
+        # Its own: a window that fails leaves that of the swarm half written.
+        self.stated = np.zeros(len(swarm.bodies))
         self.span = min(self.time_to_go(FIRST_WAY * self.mean_radius), 1e-3 * until)
         self.failed: np.ndarray | None = None
 
@@ -120,6 +122,16 @@ class Progress:
         side = min(self.box)
         return self.time_to_go(LONGEST_WAY * side) if side < math.inf else math.inf
 
+    @property
+    def error(self) -> float:
+        """The largest stated error of position of a body [m]."""
+        return float(self.stated[self.free].max(initial=0.0))
+
+    @property
+    def median_error(self) -> float:
+        """The stated error of position that half of the bodies that move keep below [m]."""
+        return float(np.median(self.stated[self.free])) if self.free.any() else 0.0
+
     def seen(self) -> tuple[float, np.ndarray, float]:
         """(time [s], motion (n, 6), the largest stated error [m]) now; NaN for bodies that are
         gone."""
@@ -130,13 +142,14 @@ class Progress:
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
         swarm = self.swarm
-        numbers = {"time": self.time, "span": self.span, "error": self.error}
+        numbers = {"time": self.time, "span": self.span}
         return {
             **{name: getattr(swarm, name).copy() for name in STATE},
             **{name: np.array(value) for name, value in numbers.items()},
             "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
             "gone": self.gone.astype(np.int64),
             "returns": self.returns.copy(),
+            "stated": self.stated.copy(),
         }
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -145,11 +158,10 @@ class Progress:
             if name not in OF_CONTACTS:
                 getattr(self.swarm, name)[...] = state[name]
         self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
-        self.time, self.span, self.error = (
-            float(state[name]) for name in ("time", "span", "error")
-        )
+        self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
+        self.stated[...] = state["stated"]
         self.forget(state["gone"] == 1)
 
     def advance(self, stop: float) -> Status:
@@ -210,7 +222,8 @@ class Progress:
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, [(finished.links, finished.slips)])
-        self.time, self.error = float(swarm.times[END]), float(swarm.stated.max())
+        self.time = float(swarm.times[END])
+        self.stated[...] = swarm.stated
         self.effort.windows += 1
 
     def forget(self, gone: np.ndarray) -> None:

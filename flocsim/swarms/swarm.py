@@ -23,13 +23,13 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.bonds import BondGauge
-from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.islands import run_islands, watch_paths
 from flocsim.swarms.leaving import Leaving
 from flocsim.swarms.neighbours import find_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
+from flocsim.swarms.together.bonds import BondGauge
+from flocsim.swarms.together.contacts import Gauge
 from flocsim.swarms.trajectory import SwarmTrajectory
 from flocsim.system import System, check_bodies, check_forces, read_seed
 

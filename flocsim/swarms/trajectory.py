@@ -7,10 +7,10 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.integrators.base import Status
-from flocsim.swarms.bonds import BondGauge, Bonds
-from flocsim.swarms.clusters import Clusters
-from flocsim.swarms.contacts import Gauge, Neighbours
 from flocsim.swarms.progress import Effort
+from flocsim.swarms.together.bonds import BondGauge, Bonds
+from flocsim.swarms.together.clusters import Clusters
+from flocsim.swarms.together.contacts import Gauge, Neighbours
 
 
 @attrs.frozen(eq=False, repr=False)

@@ -3,7 +3,7 @@
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.commands.init import KINDS
+from flocsim.commands.init import COMMANDS, KINDS
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -11,7 +11,7 @@ def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 0
     told = capsys.readouterr().out
-    command = "swarm" if kind == "swarm" else "ensemble"
+    command = COMMANDS.get(kind, "ensemble")
     assert told.endswith(f"run it with: flocsim {command} 1-{kind}.toml\n")
     assert main([command, f"1-{kind}.toml", "--dry-run", "--no-pilot"]) == 0
     assert "nothing was run" in capsys.readouterr().out
@@ -26,3 +26,13 @@ def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
     capsys.readouterr()
     assert main(["sweep", "s.toml", *over, "--dry-run"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+@pytest.mark.parametrize("kind", ["kernel", "brownian"])
+def test_few_spheres_of_it_come_to_results(kind, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "s.toml", "--kind", kind]) == 0
+    few = ["--replicates", "8", "--set", "shapes.vertices=[1]"]
+    assert main([COMMANDS.get(kind, "ensemble"), "s.toml", *few]) == 0
+    told = capsys.readouterr().out
+    assert ("capture widths" if kind == "kernel" else "touched before they had escaped") in told

@@ -8,8 +8,17 @@ from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
+from flocsim.geometry.shapes.parts import table_of
 from flocsim.io.results.schema import REPLICATES
-from tests.helpers.small_study import small_config, small_study, write_star_library
+from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
+from tests.helpers.compound_shapes import framed
+from tests.helpers.small_study import (
+    load_text,
+    small_config,
+    small_study,
+    star_fit,
+    write_star_library,
+)
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +136,46 @@ def test_how_flocs_are_read_is_part_of_a_studys_identity(tmp_path):
     assert plain != own and plain != alike
     assert {"flocs.size"} <= own.keys() - plain.keys()
     assert {"flocs.8"} <= alike.keys() - plain.keys()
+
+
+def test_flocs_with_holes_and_without_have_engines_of_their_own(tmp_path):
+    """Replicates of one study draw both: an engine of outlines would see no hole."""
+    fits = {"plain": star_fit(8, 6.0), "other": star_fit(8, 6.5), "frame": stored(framed(1e-6))}
+    entries = [
+        ShapeEntry(name, "flocs.png", 1e-6, (0.0, 0.0), 100, 6.0, 1.0, {8: fit})
+        for name, fit in fits.items()
+    ]
+    write_library(tmp_path / "both.h5", entries)
+    text = SMALL_LIBRARY.format(file="both.h5")
+    study = Study(load_text(tmp_path, text))
+    families, engines = set(), {}
+    for replicate in range(12):
+        encounter, _ = study.drawn(0, 8, replicate)
+        holes = any(shape.is_compound for shape in encounter.shapes)
+        family = encounter.system.family
+        assert family == ("compounds" if holes else "polygons")
+        engines.setdefault(family, study.driver(encounter))
+        assert study.driver(encounter) is engines[family]
+        families.add(family)
+    assert families == {"compounds", "polygons"}
+    assert engines["compounds"] is not engines["polygons"]
+
+
+SMALL_LIBRARY = """\
+preset = "tang2014"
+seed = 3
+replicates = 12
+[scene]
+types = ["I"]
+delta = [0.5]
+[shapes]
+source = "library"
+file = "{file}"
+vertices = [8]
+pool = 3
+"""
+
+
+def stored(shape):
+    """A fit of a library with all rings of a shape."""
+    return StoredFit(shape.vertices, shape.radius, 1.0, table_of(shape.parts))

@@ -18,10 +18,15 @@ import numpy as np
 from PIL import Image
 
 from flocsim.ensembles.chunks import Condition, chunk_record, layout
+from flocsim.geometry.shapes.parts import table_of
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.journal.records import CHUNK, SESSION, encode
 from flocsim.io.results.file import write_results
+from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
+from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
+from tests.helpers.compound_shapes import beads, cross, framed
+from tests.helpers.small_rates import mixed, some_kernel
 from tests.helpers.small_study import VALID, write_star_library
 from tests.helpers.swarm_study import make_swarm_results
 from tests.helpers.synthetic_results import make_results
@@ -90,6 +95,34 @@ def valid_library(folder):
     """The HDF5 data of a small shape library."""
     write_star_library(folder / "valid-library.h5", vertices=(1, 4, 8))
     return read_sealed(folder / "valid-library.h5")
+
+
+@cache
+def valid_compounds(folder):
+    """The HDF5 data of a small library of shapes with holes and of several parts."""
+    fits = {}
+    for make in (framed, beads, cross):
+        shape = make(1e-6)
+        table = table_of(shape.parts)
+        fits[len(shape.vertices)] = StoredFit(shape.vertices, shape.radius, 1.0, table)
+    entry = ShapeEntry("a floc", "flocs.png", 1e-6, (0.0, 0.0), 100, 8.0, 1.0, fits)
+    write_library(folder / "valid-compounds.h5", [entry])
+    return read_sealed(folder / "valid-compounds.h5")
+
+
+@cache
+def valid_kernel(folder):
+    """The HDF5 data of a small results file of a kernel study."""
+    results = make_results(types=("I", "III"), vertices=(1, 8), delta=(1.0,), count=5)
+    write_results(folder / "valid-kernel.h5", attrs.evolve(results, kernel=some_kernel()))
+    return read_sealed(folder / "valid-kernel.h5")
+
+
+@cache
+def valid_strengths(folder):
+    """The HDF5 data of a small file of strengths of bonds."""
+    write_strengths(folder / "valid-strengths.h5", mixed())
+    return read_sealed(folder / "valid-strengths.h5")
 
 
 def objects_of(file):
@@ -218,6 +251,21 @@ def results_file(rng, folder):
 def library_file(rng, folder):
     """A hostile shape library."""
     return written(folder, "l.h5", hostile_hdf5(rng, valid_library(folder)))
+
+
+def compounds_file(rng, folder):
+    """A hostile library of shapes with holes and of several parts."""
+    return written(folder, "c.h5", hostile_hdf5(rng, valid_compounds(folder)))
+
+
+def kernel_file(rng, folder):
+    """A hostile results file of a kernel study."""
+    return written(folder, "k.h5", hostile_hdf5(rng, valid_kernel(folder)))
+
+
+def strengths_file(rng, folder):
+    """A hostile file of strengths of bonds."""
+    return written(folder, "b.h5", hostile_hdf5(rng, valid_strengths(folder)))
 
 
 @cache

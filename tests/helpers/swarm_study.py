@@ -48,7 +48,7 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
     position[..., 1] -= 1e-6 * np.arange(times)[:, None]
     numbers = ("clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension",
                "settling", "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching",
-               "removed", "reentered", "error")  # fmt: skip
+               "removed", "reentered", "median_error", "error")  # fmt: skip
     counts = {name: np.full(shape, 2.0) for name in numbers}
     each = {name: np.full((replicates, bodies), 1e-6) for name in ("r_eq", "spheroradius", "mass")}
     places = np.broadcast_to(np.arange(bodies), (replicates, bodies)).copy()

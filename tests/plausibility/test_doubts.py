@@ -14,6 +14,7 @@ from flocsim.forces import (
     DoubleLayer,
     Gravity,
     StokesDrag,
+    Thermal,
     VanDerWaals,
 )
 from flocsim.plausibility.doubts import doubts_of
@@ -85,6 +86,13 @@ def test_sizes():
     share = round_square.radius / round_square.equivalent_radius
     [line] = doubts([Body(round_square, density=2650.0)])
     assert line.startswith(f"spheroradius / equivalent radius = {share:g} is implausible")
+
+
+def test_small_bodies_are_usual_where_they_diffuse():
+    small = [attrs.evolve(body, shape=Sphere(2e-7)) for body in PAIR]
+    assert "Brownian motion, which is left out here" in doubts(small)[0]
+    assert doubts(small, [*USUAL_FORCES, Thermal()]) == []
+    assert doubts(small, [*USUAL_FORCES, Thermal(temperature=0.0)]) == doubts(small)
 
 
 def test_weight_without_buoyancy():

@@ -131,3 +131,18 @@ def test_links_are_named_by_a_body_that_moves():
     owners = finished.owners(links)
     assert finished.free[owners].all()
     assert all(owner in row for owner, row in zip(owners, rows, strict=True))
+
+
+def test_a_window_that_fails_leaves_time_motion_and_error_as_they_were():
+    bodies, side = crowd(30, 2)
+    progress = Swarm(bodies, forces(), fluid=WATER, box=(side, side)).begin(0.05)
+    for _ in range(15):
+        assert progress.advance(0.05).name == "PAUSED"
+    time, motion, error = progress.seen()
+    half = progress.median_error
+    assert error > half > 0.0
+    progress.runner.max_steps = 1
+    assert progress.advance(0.05).name == "STEP_BUDGET"
+    after = progress.seen()
+    assert (after[0], after[2], progress.median_error) == (time, error, half)
+    assert np.array_equal(after[1], motion)

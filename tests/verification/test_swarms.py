@@ -8,8 +8,8 @@ import pytest
 from flocsim import Body, Sphere, Swarm, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Status
-from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.placement import place_at_random
+from flocsim.swarms.together.clusters import Clusters
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces
 
 
@@ -144,7 +144,8 @@ def test_a_thousand_pairs_end_as_each_by_itself():
     sticky = [Gravity(), StokesDrag(), VanDerWaals(1e-19, gap="surface", cut=1e-6), Contact()]
     side = APART * math.ceil(math.sqrt(count))
     run = finished(Swarm(bodies, sticky, fluid=WATER, box=(side, side)), until)
-    assert 100 < len(run.neighbours().pairs) < 900
+    # Most meet, and some do not.
+    assert 0.5 * count < len(run.neighbours().pairs) < 0.97 * count
     for k in range(0, 2 * count, 2):
         alone = System(bodies[k : k + 2], sticky, fluid=WATER).run(until, record=False)
         apart = np.hypot(*(run.position[-1, k : k + 2] - alone.position[-1])[:, :2].T).max()

@@ -14,8 +14,7 @@ import numpy as np
 
 from flocsim.commands.trajectory import select
 from flocsim.ensembles.collision.checking import MORE_STEPS
-from flocsim.ensembles.collision.encounter import replicate_row
-from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.failures import FAILED, replicate_row
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels.study import study_of

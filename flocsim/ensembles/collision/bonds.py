@@ -119,19 +119,21 @@ def surface_attraction(scene, work, time):
     return -surface_force(scene, at_rest(scene, view))
 
 
-def arms_hold(work, attraction, load, nx, ny, distance):
-    """Whether the attraction along the centres holds against prying about both outer contacts."""
-    left_holds, right_holds = False, False
+def leverage(work, nx, ny, distance):
+    """By how much a load that pries about either outer contact outdoes one that pulls straight at
+    the attraction along the centres; inf where no contact lies on one side of it."""
+    left, right = math.inf, math.inf
     for row in range(work.tally[CANDIDATES]):
         if work.geometry[NOW, row, GAP] >= 0.0:
             continue
         x, y = contact_point(work, row, BODY_I)
         side = nx * y - ny * x
         lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny))
-        holds = attraction * abs(side) > load * lever
-        left_holds = left_holds or (holds and side > 0.0)
-        right_holds = right_holds or (holds and side < 0.0)
-    return left_holds and right_holds
+        if side > 0.0:
+            left = min(left, lever / side)
+        elif side < 0.0:
+            right = min(right, -lever / side)
+    return max(left, right)
 
 
 def is_held(scene, work, observed, time, nx, ny, distance):
@@ -148,7 +150,7 @@ def is_held(scene, work, observed, time, nx, ny, distance):
         return along < CALM * drift and centres + surfaces > load
     if shear > CALM * drift or centres <= load:
         return False
-    return arms_hold(work, centres, load, nx, ny, distance)
+    return centres > load * leverage(work, nx, ny, distance)
 
 
 def energy(scene, work):

@@ -9,18 +9,19 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import EQUIVALENT_RADIUS, NOW, Scene, Work, work_of
+from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
-from flocsim.ensembles.collision import meetings, outcomes
+from flocsim.ensembles.collision import bonds, meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, collided, outcome_of
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, replicate_row
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
-from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
+from flocsim.ensembles.collision.thermal import climb, kicked
+from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
+from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
-from flocsim.forces.thermal import Thermal, key_of
+from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
-from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 from flocsim.plausibility.settling import (
     largest_mobility,
     least_mobility,
@@ -37,11 +38,18 @@ OBSERVER: dict[Callable, Callable] = {
 }
 """What a binary collision puts into the driver."""
 
+KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: kicked.watch_kicked_pair}
+"""The same for one under thermal motion."""
+
 REST_TURNS = 3.0
 """Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
 
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
+
+LIMIT_ESCAPES = 100.0
+"""The same of a brownian meeting, in times escape²/D: e^-578 of those that nothing holds are still
+there."""
 
 
 @attrs.frozen(eq=False, slots=False)
@@ -62,7 +70,9 @@ class Encounter:
     def __attrs_post_init__(self):
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
-        if self.rate is not None:
+        if self.meeting == BROWNIAN:
+            refuse_release(self.options, self.shapes, self.diffusion)
+        if self.meeting != SETTLING:
             names = [type(force).__name__ for force in self.system.forces]
             meetings.refuse_drift(motions[1][0] - motions[0][0], -self.drift[1], names)
             return
@@ -80,7 +90,7 @@ class Encounter:
     def keyed(self, *numbers: int) -> "Encounter":
         """The same for a replicate whose random forces go by these numbers (seed, replicate)."""
         # By the forces, for a scene compiles their laws, and another part of a study comes first.
-        if not any(isinstance(each, Thermal) and not each.absent for each in self.system.forces):
+        if not self.kick_energy:
             return self
         other = copy.copy(self)
         object.__setattr__(other, "system", attrs.evolve(self.system, seed=numbers))
@@ -88,21 +98,42 @@ class Encounter:
         return other
 
     @property
+    def kick_energy(self) -> float:
+        """k_B T of the thermal motion [J], 0 without."""
+        return max((each.energy for each in thermal_in(self.system.forces)), default=0.0)
+
+    @property
+    def observer(self) -> dict[Callable, Callable]:
+        """What the encounter puts into the driver."""
+        return KICKED if self.kick_energy else OBSERVER
+
+    @property
+    def diffusion(self) -> float:
+        """D of the two against each other [m²/s]."""
+        return self.kick_energy * sum(mobility for _, mobility in self.settling)
+
+    @functools.cached_property
+    def ends(self) -> tuple[float, float]:
+        """Distances of the centres [m] at which a brownian meeting begins, and is missed."""
+        return ends_of(self.options, self.shapes)
+
+    @property
     def shapes(self) -> tuple[Shape, ...]:
         return tuple(body.shape for body in self.system.bodies)
 
     @property
     def rate(self) -> float | None:
-        """That of the flow in which the two meet [1/s], None where they settle."""
-        return None if self.meeting == SETTLING else self.options.rate
+        """That of the flow in which the two meet [1/s], None where there is none."""
+        return self.options.rate if self.meeting in FLOWS else None
 
     @property
     def drift(self) -> np.ndarray:
         """Settling velocity of j relative to i (2,) [m/s]; in a flow one of about the speed at
-        which they meet, its rate times r_i + r_j."""
-        if self.rate is not None:
+        which they meet, its rate times r_i + r_j, and in thermal motion D/(r_i + r_j)."""
+        if self.meeting != SETTLING:
             size = sum(shape.equivalent_radius for shape in self.shapes)
-            return np.array([0.0, -self.rate * size])
+            speed = self.diffusion / size if self.rate is None else self.rate * size
+            return np.array([0.0, -speed])
         return self.settling[1][0] - self.settling[0][0]
 
     @property
@@ -171,8 +202,11 @@ class Encounter:
         """The pull on the bond of a settling doublet in its worst orientation [N].
 
         |drift|/(µ_i + µ_j); where drag is not linear, at the least mobilities up to the speed of
-        the faster one, which bounds it from above. In a flow that of meetings.flow_load.
+        the faster one, which bounds it from above. In a flow that of meetings.flow_load; in
+        thermal motion alone none.
         """
+        if self.meeting == BROWNIAN:
+            return 0.0
         if self.rate is not None:
             return meetings.flow_load(self.meeting, self.rate, self.outer, self.yielding)
         fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
@@ -212,11 +246,28 @@ class Encounter:
             observed[numbers.IN_FLOW] = 1.0
             flow = slice(numbers.FLOW_XX, numbers.FLOW_YY + 1)
             observed[flow] = self.system.fluid.gradient
+        if self.meeting == BROWNIAN:
+            observed[numbers.BROWNIAN], observed[numbers.ESCAPE] = 1.0, self.ends[1]
+        if self.kick_energy:
+            observed[numbers.KICK_ENERGY] = self.kick_energy
+            observed[numbers.CAGE_LOW : numbers.CAGE_HIGH + 1] = self.cage
         return observed
+
+    @functools.cached_property
+    def cage(self) -> tuple[float, float]:
+        """Gaps [m] of a secondary minimum between which kicks do not let the two out."""
+        if not self.system.spheres_only and "centre_force" in self.system.pieces.laws:
+            # Shapes come round what acts between their centres.
+            return 0.0, 0.0
+        mobility = sum(each for _, each in self.yielding)
+        load, barrier = bonds.SAFETY * self.largest_load, kicked.BARRIER * self.kick_energy
+        return climb.cage(self.pull, mobility, load, barrier)
 
     def time_limit(self, share: float = 1.0) -> float:
         """Simulated time [s] after which a replicate at δ = share · δ_max is undecided."""
         if isinstance(self.options.time_limit, str):  # "auto"
+            if self.meeting == BROWNIAN:
+                return LIMIT_ESCAPES * self.ends[1] ** 2 / self.diffusion
             if self.rate is not None:
                 offset = share * self.outer
                 approach = meetings.approach_time(self.meeting, self.rate, offset, self.far)
@@ -226,7 +277,13 @@ class Encounter:
         return self.options.time_limit
 
     def start(self, angles: Sequence[float], share: float) -> Work:
-        """Work arrays of a replicate with these angles [rad] at δ = share · δ_max."""
+        """Work arrays of a replicate with these angles [rad] at δ = share · δ_max.
+
+        In a brownian meeting ``share`` is the direction of j, over a full turn.
+        """
+        if self.meeting == BROWNIAN:
+            place = start_apart(angles, share, self.ends[0])
+            return work_of(self.scene, place, np.zeros((2, 3)))
         if self.rate is not None:
             return self.start_in_flow(angles, share)
         shapes = self.shapes
@@ -335,32 +392,3 @@ def run_encounter(
     if status in UNABLE and (why := force_to_blame(encounter.system, run)):
         row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
     return row
-
-
-def replicate_row(status, angles, run):
-    """What the table of replicates holds of a Run that has ended."""
-    observed = run.observed
-    outcome, failure = outcome_of(status, run.code, observed)
-    touched = collided(observed)
-    zone = observed[numbers.ZONE]
-    return {
-        "angle_i": angles[0],
-        "angle_j": angles[1],
-        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
-        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
-        "D_0": zone,
-        "outcome": outcome,
-        "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
-        "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
-        "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
-        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
-        "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
-        "d_c_last": observed[numbers.D_LAST],
-        "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,
-        "t_end": run.time,
-        "steps": run.steps,
-        "rejected": run.rejected,
-        "error": run.error,
-        "failure": failure,
-    }

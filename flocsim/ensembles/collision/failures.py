@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.arrays import EQUIVALENT_RADIUS
+from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
 from flocsim.ensembles.collision.start import orientations
 from flocsim.integrators.base import Status
-from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
+from flocsim.io.results.schema import AGGREGATED, BLANKS, NOT_APPLICABLE, OUTCOMES, REPLICATES
 
 FAILED = OUTCOMES.index("failed")
 
@@ -64,6 +66,35 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
 
 def collided(observed: np.ndarray) -> bool:
     return bool(observed[COLLIDED] == 1.0)
+
+
+def replicate_row(status, angles, run):
+    """What the table of replicates holds of a Run that has ended."""
+    observed = run.observed
+    outcome, failure = outcome_of(status, run.code, observed)
+    touched = collided(observed)
+    zone = observed[numbers.ZONE]
+    return {
+        "angle_i": angles[0],
+        "angle_j": angles[1],
+        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
+        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
+        "D_0": zone,
+        "outcome": outcome,
+        "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
+        "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
+        "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
+        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
+        "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
+        "d_c_last": observed[numbers.D_LAST],
+        "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,
+        "t_end": run.time,
+        "steps": run.steps,
+        "rejected": run.rejected,
+        "error": run.error,
+        "failure": failure,
+    }
 
 
 def run_safely(

@@ -1,4 +1,5 @@
-"""What brings two bodies together: settling, or a flow alone; where they start, and how they turn.
+"""What brings two bodies together: settling, a flow, or thermal motion; where they start,
+and how they turn.
 
 In a flow alone weight is left out, so that rates of the mechanisms add up as in population
 balances. Body i lies where the flow stands still, j comes along a way of the undisturbed flow that
@@ -10,6 +11,9 @@ passes i's centre at the least distance |b|:
 Neither has a way that comes back: a pair that the flow carries apart does not meet again. Flows
 that turn faster than they strain have closed ways alone, no pair in them comes from afar, and
 none are offered here.
+
+In thermal motion alone weight is left out, too; where j is let go then, and what kicks make of the
+end of a meeting, is in the folder thermal.
 """
 
 import math
@@ -20,7 +24,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.config.schema import EXTENSION, SETTLING, SHEAR
+from flocsim.ensembles.config.schema import BROWNIAN, EXTENSION, SETTLING, SHEAR
 from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
@@ -57,11 +61,13 @@ def gradient_of(meeting: str, rate: float) -> tuple[float, float, float, float]:
 def circumstances(
     forces: Sequence[Force], fluid: Fluid, meeting: str, rate: float | None
 ) -> tuple[Sequence[Force], Fluid]:
-    """(forces, fluid) in which bodies meet so: in a flow without their weight."""
+    """(forces, fluid) in which bodies meet so: but in settling without their weight."""
     if meeting == SETTLING:
         return forces, fluid
-    assert rate is not None, "the config refuses a flow without a rate"
     kept = [force for force in forces if not isinstance(force, Gravity)]
+    if meeting == BROWNIAN:
+        return kept, fluid
+    assert rate is not None, "the config refuses a flow without a rate"
     return kept, attrs.evolve(fluid, gradient=gradient_of(meeting, rate))
 
 
@@ -239,10 +245,11 @@ def resting_place(rates: np.ndarray, place: int) -> float:
 
 
 def refuse_drift(drift: np.ndarray, speed: float, names: Sequence[str]) -> None:
-    """UsageError where bodies move by themselves in a flow that alone should bring them along."""
+    """UsageError where bodies move by themselves though a flow, or thermal motion, alone should
+    bring them together."""
     if math.hypot(*drift) > 1e-9 * speed:
         raise UsageError(
-            "in a flow bodies meet without their weight, but here they move against each other at "
+            "without settling bodies meet without weight, but here they move against each other at "
             f"{1e3 * math.hypot(*drift):.3g} mm/s by other forces ({', '.join(names)}): leave "
             'these out, or give scene.meeting = "settling"'
         )

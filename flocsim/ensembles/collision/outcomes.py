@@ -57,13 +57,20 @@ def follow(observed, distance):
             observed[CROSSED] = 1.0
 
 
-def watch_pair(scene, work, observed, time):
-    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
+def look_at_pair(scene, work, observed, time):
+    """(direction from i to j, d_c, the least gap of the listed features), their first touch and
+    their distances noted."""
     nx, ny, distance = centre_line(scene, work, NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(observed, time, distance)
     follow(observed, distance)
+    return nx, ny, distance, gap
+
+
+def watch_pair(scene, work, observed, time):
+    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
+    nx, ny, distance, gap = look_at_pair(scene, work, observed, time)
     if has_departed(scene, work, observed, time, nx, ny, distance, gap):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
     if observed[COLLIDED] == 0.0:

@@ -17,14 +17,15 @@ MOST_ADVANCES = 1000
 
 
 def draws(seed: int, replicate: int) -> np.ndarray:
-    """Four uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc.
+    """Five uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc, and
+    the direction of j in a brownian meeting.
 
     They depend on the seed and the replicate's index alone, so that no number of ranks changes
     them, and one replicate has the same orientations and the same flocs at every displacement,
     number of vertices and type.
     """
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
-    return np.random.Generator(np.random.Philox(stream)).random(4)
+    return np.random.Generator(np.random.Philox(stream)).random(5)
 
 
 def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:

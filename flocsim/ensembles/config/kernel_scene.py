@@ -10,7 +10,7 @@ from flocsim.ensembles.config.schema import (
     KERNEL_REPLICATES,
     LARGEST_LENGTH,
     MEASURED,
-    MEETINGS,
+    MECHANISMS,
     MOST_CLASSES,
     SETTLING,
     SceneConfig,
@@ -29,7 +29,7 @@ from flocsim.fields import choice, number_range, quantity, word_or_quantity
 
 MOST_SCRAMBLES = 64
 
-read_meeting = one_of(MEETINGS)
+read_meeting = one_of(MECHANISMS)
 read_meetings = list_of(read_meeting, "one of, or a list of, 'settling', 'shear', 'extension'")
 
 
@@ -89,6 +89,8 @@ class KernelScene(SceneConfig):
     weight: str | None = inherited("weight")
     classes: int | tuple[float, ...] | None = inherited("classes")
     types: None = fixed(None)
+    release: None = fixed(None)
+    escape: None = fixed(None)
     delta: tuple[float, ...] = fixed((1.0,))
     delta_max: str = fixed("radius")
     receiver: str = fixed("free")
@@ -118,8 +120,8 @@ class KernelScene(SceneConfig):
     )
 
     def __attrs_post_init__(self):
-        if not set(self.meeting) <= set(MEETINGS):
-            raise ConfigError(f"meeting must be of {', '.join(MEETINGS)}")
+        if not set(self.meeting) <= set(MECHANISMS):
+            raise ConfigError(f"meeting must be of {', '.join(MECHANISMS)}")
         if (self.sizes is None) == (self.pairs is None):
             found = "neither" if self.sizes is None else "both"
             raise ConfigError(

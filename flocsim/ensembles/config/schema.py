@@ -52,6 +52,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.base import Force
+from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
 
@@ -80,13 +81,27 @@ def of_measured(value: Any) -> Any:
     return attrs.Factory(lambda self: value if self.pairs == MEASURED else None, takes_self=True)
 
 
-SETTLING, SHEAR, EXTENSION = MEETINGS = ("settling", "shear", "extension")
-"""What brings two bodies together: their weight, or a flow u = (G y, 0) or u = (s x, −s y)."""
+SETTLING, SHEAR, EXTENSION = MECHANISMS = ("settling", "shear", "extension")
+"""What drives two bodies together: their weight, or a flow u = (G y, 0) or u = (s x, −s y)."""
+
+FLOWS = (SHEAR, EXTENSION)
+
+BROWNIAN = "brownian"
+"""Thermal motion alone brings two bodies together, or does not."""
+
+MEETINGS = (*MECHANISMS, BROWNIAN)
+
+
+def of_brownian(value: Any, otherwise: Any = None) -> Any:
+    """A default where thermal motion alone brings bodies together, and elsewhere."""
+    return attrs.Factory(
+        lambda self: value if self.meeting == BROWNIAN else otherwise, takes_self=True
+    )
 
 
 def check_rate(meetings: Collection[str], rate: float | None) -> None:
     """ConfigError where a flow has no rate, or a rate no flow."""
-    flows = [each for each in meetings if each != SETTLING]
+    flows = [each for each in meetings if each in FLOWS]
     if flows and rate is None:
         raise ConfigError(
             f'meeting = "{flows[0]}" needs rate, how fast the flow shears or stretches, as in '
@@ -94,7 +109,7 @@ def check_rate(meetings: Collection[str], rate: float | None) -> None:
         )
     if rate is not None and not flows:
         raise ConfigError(
-            'rate is that of a flow, but meeting is "settling": give meeting = "shear" or '
+            f'rate is that of a flow, but meeting is "{next(iter(meetings))}": give "shear" or '
             '"extension", or remove rate'
         )
 
@@ -114,10 +129,28 @@ class SceneConfig:
         default=SETTLING,
         help="what brings the two together: settling, the faster from above; or a flow alone, "
         "their weight left out: shear, u = (G y, 0), or extension, u = (s x, -s y), in which δ is "
-        "how near the centres would come to each other, as a share of R_i + R_j",
+        "how near the centres would come to each other, as a share of R_i + R_j; or thermal motion "
+        "alone, brownian, their weight left out: let go `release` apart, in any direction, they "
+        "touch, or miss each other once they are `escape` apart; needs [forces.thermal]",
     )
     rate: float | None = quantity(
         "1/s", above=0.0, default=None, help="G or s of a flow in which they meet"
+    )
+    release: float | None = quantity(
+        "",
+        above=1.0,
+        default=of_brownian(2.0),
+        shown="2.0",
+        help="in a brownian meeting: distance of the centres at the start, over r_i + r_j; there "
+        "outlines of any angle have to be clear of each other",
+    )
+    escape: float | None = quantity(
+        "",
+        above=1.0,
+        default=of_brownian(4.0),
+        shown="4.0",
+        help="in a brownian meeting: distance of the centres, over r_i + r_j, at which a pair has "
+        "missed, or departed",
     )
     pairs: tuple[tuple[float, float], ...] | str | None = read_by(
         word_or(
@@ -189,7 +222,8 @@ class SceneConfig:
     delta: tuple[float, ...] = read_by(
         list_of(number("", *number_range(at_least=0.0)), "a list of fractions such as [0.0, 0.5]"),
         "a list of distinct numbers, each at least 0",
-        default=(0.0, 0.25, 0.5, 0.75, 1.0),
+        default=of_brownian((0.0,), (0.0, 0.25, 0.5, 0.75, 1.0)),
+        shown="[0.0, 0.25, 0.5, 0.75, 1.0]",
         help="horizontal displacements of the centres, as fractions of δ_max",
     )
     delta_max: str = choice(
@@ -234,10 +268,11 @@ class SceneConfig:
 
     def __attrs_post_init__(self):
         check_rate(self.meetings, self.rate)
+        self.check_brownian()
         if self.meetings != (SETTLING,) and self.receiver == "fixed":
             raise ConfigError(
-                'receiver = "fixed" goes with meeting = "settling": a body that is held in a flow '
-                "is met by others, and otherwise, than one that drifts with it"
+                'receiver = "fixed" goes with meeting = "settling": a body that is held is met by '
+                "others, and otherwise, than one that a flow or thermal motion carries along"
             )
         if not self.is_measured:
             for field in attrs.fields(type(self)):
@@ -262,6 +297,29 @@ class SceneConfig:
         count = len(self.class_labels)
         if count > MOST_CLASSES:
             raise ConfigError(f"classes may be {MOST_CLASSES} at most, found {count}")
+
+    def check_brownian(self) -> None:
+        """ConfigError where keys of brownian meetings are given to others, or the other way."""
+        if self.meeting != BROWNIAN:
+            for name in ("release", "escape"):
+                if getattr(self, name) is not None:
+                    raise ConfigError(f'{name} goes with meeting = "brownian": remove it')
+            return
+        assert self.release is not None and self.escape is not None
+        if not self.release < self.escape:
+            raise ConfigError(
+                f"release = {self.release:g} must be below escape = {self.escape:g}: bodies are "
+                "let go nearer than where they have missed"
+            )
+        fields: Any = attrs.fields_dict(type(self))
+        for name in ("delta", "delta_max", "start_gap", "escape_gap", "rest_time"):
+            default = (0.0,) if name == "delta" else fields[name].default
+            if getattr(self, name) != default:
+                raise ConfigError(
+                    f"{name} is for bodies that are driven together: in a brownian meeting they "
+                    "are let go at release, in any direction, until they are escape apart; remove "
+                    "it"
+                )
 
     @property
     def meetings(self) -> tuple[str, ...]:
@@ -770,6 +828,7 @@ def contradictions(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], 
     """
     yield from weight_contradictions(parts["bodies"], parts["fluid"])
     yield from flow_contradictions(parts["scene"], parts["fluid"])
+    yield from thermal_contradictions(parts["scene"], parts["forces"])
     if parts["scene"].is_measured:
         yield from measured_contradictions(parts["shapes"])
 
@@ -778,6 +837,12 @@ def flow_contradictions(scene: SceneConfig, fluid: Fluid) -> Iterator[tuple[tupl
     """What of [fluid] does not go with bodies that meet in a flow of their own."""
     if scene.meetings == (SETTLING,) and scene.kind == "binary":
         return
+    if scene.meetings == (BROWNIAN,):
+        text = "carries bodies along, and thermal motion alone is to move them: leave it out"
+        for name in ("velocity", "gradient"):
+            if any(getattr(fluid, name)):
+                yield ("fluid", name), text
+        return
     text = (
         "is another flow than that of scene.meeting, along which bodies come from afar; in a flow "
         "that turns faster than it strains all ways are closed, and none do: leave it out"
@@ -785,6 +850,31 @@ def flow_contradictions(scene: SceneConfig, fluid: Fluid) -> Iterator[tuple[tupl
     for name in ("velocity", "gradient"):
         if any(getattr(fluid, name)):
             yield ("fluid", name), text
+
+
+def thermal_contradictions(
+    scene: SceneConfig, forces: Iterable[Force]
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """What of a scene does not go with thermal motion, or without."""
+    warm = bool(thermal_in(forces))
+    if scene.meetings == (BROWNIAN,):
+        if not warm:
+            text = '"brownian" needs kicks: add [forces.thermal], of a temperature above 0 K'
+            yield ("scene", "meeting"), text
+    elif warm and scene.kind == "kernel":
+        text = (
+            "brings bodies together from beyond the offsets that a study of rates samples, which "
+            "would cut its widths off: leave it out, or let two bodies meet by scene.meeting = "
+            '"brownian"'
+        )
+        yield ("forces", "thermal"), text
+    elif warm and SHEAR in scene.meetings:
+        text = (
+            '"shear" has no end with [forces.thermal]: across a shear flow kicks bring a pair back '
+            'from any distance, so that none has departed; give "extension", "settling" or '
+            '"brownian", or leave forces.thermal out'
+        )
+        yield ("scene", "meeting"), text
 
 
 def measured_contradictions(shapes: ShapesConfig) -> Iterator[tuple[tuple[str, ...], str]]:

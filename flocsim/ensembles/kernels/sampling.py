@@ -59,9 +59,13 @@ def as_draws(numbers: np.ndarray) -> np.ndarray:
 
 def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(towards −x, towards +x) extents [m] of an outline about its centroid, at many angles."""
-    core = shape.placed_vertices(angle=0.0)
-    x = np.cos(angles)[:, None] * core[:, 0] - np.sin(angles)[:, None] * core[:, 1]
-    return shape.radius - x.min(axis=1), shape.radius + x.max(axis=1)
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    # Each part by its own spheroradius: the widest part need not be the one that reaches farthest.
+    ends = [(c * p.points[:, 0] - s * p.points[:, 1], p.radius) for p in shape.parts]
+    return (
+        np.max([radius - x.min(axis=1) for x, radius in ends], axis=0),
+        np.max([radius + x.max(axis=1) for x, radius in ends], axis=0),
+    )
 
 
 def settling_interval(

@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flocsim.arrays import EVALUATIONS
-from flocsim.ensembles.collision.encounter import replicate_row
-from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.failures import FAILED, replicate_row
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import Task

@@ -71,11 +71,11 @@ def stokes_number(config: Config, flocs: Sequence[Floc] | None = None) -> float:
     return max(numbers, default=0.0)
 
 
-def without_force(place):
-    """A System → the same without the force at a place."""
+def without_force(force):
+    """A System → the same without one of its forces."""
 
     def left_out(system):
-        forces = [force for at, force in enumerate(system.forces) if at != place]
+        forces = [each for each in system.forces if each is not force]
         return attrs.evolve(system, forces=forces)
 
     return left_out
@@ -93,18 +93,21 @@ def parts_of(
 ) -> Iterator[Part | Finding]:
     """The parts that may be left out; a Finding for those that cannot, or need not be tried."""
     contacts = [force for force in config.forces if isinstance(force, ContactForce)]
-    for place, (name, force) in enumerate(zip(config.force_names, config.forces, strict=True)):
-        if force.absent:
+    pairs = [pair for _, pair in sphere_pairs(config, flocs)]
+    # By themselves: where bodies meet without their weight, its place is another force's.
+    acting = {id(each) for pair in pairs for each in pair.system.forces}
+    for name, force in zip(config.force_names, config.forces, strict=True):
+        if force.absent or id(force) not in acting:
             continue
         if contacts == [force]:
             yield Finding(name, why="a collision needs a contact force")
             continue
-        part = Part(name, without_force(place))
+        part = Part(name, without_force(force))
         try:
-            for _, pair in sphere_pairs(config, flocs):
+            for pair in pairs:
                 attrs.evolve(pair, system=part.left_out(pair.system))
         except FlocsimError:
-            yield Finding(name, why="the pair would not settle towards each other")
+            yield Finding(name, why="the pair would not come together")
             continue
         yield part
     if all(isinstance(each, Overdamped) for each in methods):
@@ -132,7 +135,8 @@ def tried_without(
     study: Study, runs: Sequence[Timed], part: Part, go_on: Callable[[], None], seconds: float
 ) -> Finding:
     """Run replicates without a part until it matters, or the time [s] is up."""
-    made: dict[int, Encounter] = {}
+    # With the encounters themselves, as an id is another's once its owner has gone.
+    made: dict[int, tuple[Encounter, Encounter]] = {}
     drivers: dict[str, Callable] = {}
     changed, count, spent, before, whole = 0, 0, 0.0, 0.0, 0.0
     for run in runs:
@@ -143,10 +147,10 @@ def tried_without(
         encounter, angles = study.drawn(task.condition, task.vertices, task.replicate)
         if id(encounter) not in made:
             bare = attrs.evolve(encounter, system=part.left_out(encounter.system))
-            made[id(encounter)] = bare
+            made[id(encounter)] = bare, encounter
             compiled(study, bare, angles, drivers, run)
         began = time.process_time()
-        taken, outcome, inside = one_without(study, made[id(encounter)], angles, drivers, run)
+        taken, outcome, inside = one_without(study, made[id(encounter)][0], angles, drivers, run)
         count += 1
         changed += (outcome, inside) != (run.outcome, run.inside)
         spent, before = spent + taken, before + run.first

@@ -18,7 +18,6 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.ensembles.config.schema import SETTLING
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
@@ -203,7 +202,7 @@ def facts_of_code(study, pair):
         if pair.meeting != SETTLING:
             name += f" in {pair.meeting}"
         laws = sorted(system.pieces.laws.items())
-        codes = [fingerprint(advance, system.fillings(OBSERVER))]
+        codes = [fingerprint(advance, system.fillings(pair.observer))]
         codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
         facts[f"kernels.{name}"] = hashlib.blake2b(
             "\n".join(codes).encode(), digest_size=12

@@ -25,6 +25,12 @@ SETTLED = {
 }  # fmt: skip
 """A body at its terminal speed: flocsim.plausibility.reynolds.Settled."""
 
+SPHERES = {
+    "type": str, "release": float, "escape": float, "diffusion": float,
+}  # fmt: skip
+"""Of a brownian study: `flocsim.ensembles.equivalent_spheres.sphere_facts`; three numbers more,
+each of which may be none."""
+
 SIZE_CLASS = {"label": str, "low": float, "high": float, "flocs": int}
 """A size class of measured flocs: `flocsim.ensembles.collision.pairings.class_facts`."""
 
@@ -39,6 +45,7 @@ FORMS: dict[str, tuple[Any, Any]] = {
     "warnings": ([str], []),
     "settling": ([SETTLED], []),
     "size_classes": ([SIZE_CLASS], []),
+    "equivalent_spheres": ([SPHERES], []),
 }
 
 

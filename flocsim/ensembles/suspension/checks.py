@@ -110,7 +110,7 @@ def check_state(part: Part, form: Form) -> None:
         "steps": ("f8", (n,)), "wander": ("f8", (n,)),
         "methods": ("f8", (n, METHOD_COLUMNS)), "links": ("i8", (count, 4)),
         "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
-        "error": ("f8", one), "effort": ("i8", (len(EFFORT),)),
+        "stated": ("f8", (n,)), "effort": ("i8", (len(EFFORT),)),
         "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
     for name in ("steps", "wander"):

@@ -12,11 +12,11 @@ from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import GONE, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
-from flocsim.swarms.bonds import Bonds
-from flocsim.swarms.clusters import Clusters
-from flocsim.swarms.contacts import Gauge
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.swarm import Swarm
+from flocsim.swarms.together.bonds import Bonds
+from flocsim.swarms.together.clusters import Clusters
+from flocsim.swarms.together.contacts import Gauge
 
 
 @attrs.frozen(eq=False)
@@ -122,6 +122,7 @@ def moment_part(
     near = gauge.neighbours(position, study.scene.link)
     found = Clusters.of(swarm.bodies, position, velocity, near, ~progress.gone)
     facts = {"place": place, "time": now, "error": error} | summary_of(found)
+    facts["median_error"] = progress.median_error
     facts |= {"removed": int(progress.gone.sum()), "reentered": int(progress.returns.sum())}
     facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
     label = np.where(progress.gone, GONE, found.label).astype(np.int32)

@@ -92,13 +92,17 @@ def draw_bonds(axes, results):
     """The pairs that touch over time, by what holds them, in the mean over swarms."""
     counts, times, below = results.groups["counts"], results.scales["time"], 0.0
     for kind, word, colour in BOND_COLOURS:
-        level = below + mean(counts[f"bonds_{kind}"])
+        number = mean(counts[f"bonds_{kind}"])
+        if not np.nansum(number) > 0.0:
+            continue
+        level = below + number
         axes.fill_between(times, below, level, color=colour, label=word, linewidth=0.0)
         below = level
     axes.set_xlabel("time [s]")
     axes.set_title("bonds", fontsize=8.0)
     axes.set_ylim(bottom=0.0)
-    axes.legend(loc="upper left", fontsize=6)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def sizes(results: SwarmResults) -> Figure:

@@ -120,6 +120,9 @@ command of those before), `computed` (replicates that the last of them ran), `wa
 equivalent `radius` [m], terminal `speed` [m/s], `reynolds` = 2 r ρ_f v/γ and `stokes` = τ v/r, the
 same at every N); `size_classes` (JSON: label, least and largest r_eq `low` and `high` [m] and
 number of `flocs` of each class of measured flocs);
+`equivalent_spheres` (JSON, of brownian studies: type, `release` and `escape` [m], `diffusion`
+[m²/s] of the two against each other, the probabilities to touch `free` of forces between them and
+with them, `touch`, and the `stability` ratio; null for what is no number);
 `cpus` (JSON: every kind of CPU that rows were computed on: what LLVM calls it, what numba compiled
 for, the instructions that numpy used, the C library); `failed` (JSON: up to 1000 failed replicates
 with reasons).

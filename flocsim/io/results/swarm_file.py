@@ -26,7 +26,7 @@ from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 ROOT = {"format": "text", "schema_version": "i8"}
 
 WALL = -2
@@ -47,6 +47,7 @@ COUNTS = {
     "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
     "removed": ("f8", "1", "bodies that have left the box for good"),
     "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
+    "median_error": ("f8", "m", "stated error of position that half of the bodies keep below"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""

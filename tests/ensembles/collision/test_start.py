@@ -205,7 +205,7 @@ def test_draws_repeat_and_do_not_depend_on_what_was_drawn_before():
     np.random.default_rng(0).random(3)
     draws(5, 18)
     assert draws(5, 17).tolist() == first.tolist()
-    assert first.shape == (4,)
+    assert first.shape == (5,)
 
 
 def test_other_seeds_and_replicates_give_other_numbers():
@@ -223,7 +223,7 @@ def test_draws_are_uniform_and_independent():
     table = np.array([draws(1, replicate) for replicate in range(3000)])
     for column in table.T:
         assert kstest(column, "uniform").pvalue > 1e-3
-    assert np.abs(np.corrcoef(table.T) - np.eye(4)).max() < 0.07
+    assert np.abs(np.corrcoef(table.T) - np.eye(5)).max() < 0.07
 
 
 def test_orientations_are_full_turns():

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from flocsim.arrays import NOW
-from flocsim.ensembles.collision.encounter import OBSERVER
 from flocsim.forces.thermal import key_of
 from flocsim.run import Run
 from tests.helpers.small_study import small_study
@@ -28,10 +27,10 @@ def study(tmp_path, monkeypatch):
     return small_study(tmp_path, WARM)
 
 
-def end_of(study, replicate, share, until=0.02):
+def end_of(study, replicate, share, until=0.0015):
     """Where the bodies of a replicate are after some kicks, uncompiled."""
     encounter, angles = study.drawn(0, 1, replicate)
-    driver = encounter.system.compose(observer=OBSERVER, jit=False)
+    driver = encounter.system.compose(observer=encounter.observer, jit=False)
     run = encounter.begin(driver, angles, share, 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
@@ -66,8 +65,8 @@ def test_kicks_move_a_pair_off_its_way(study):
     cold_forces = [force for force in study.config.forces if type(force).__name__ != "Thermal"]
     encounter, angles = study.drawn(0, 1, 0)
     cold = attrs.evolve(encounter, system=attrs.evolve(encounter.system, forces=cold_forces))
-    driver = cold.system.compose(observer=OBSERVER, jit=False)
-    run = cold.begin(driver, angles, 0.5, 10**6, 0.02)
+    driver = cold.system.compose(observer=cold.observer, jit=False)
+    run = cold.begin(driver, angles, 0.5, 10**6, 0.0015)
     run.to_end()
     moved = np.abs(warm[:, :2] - run.work.motion[NOW, :, :2]).max()
-    assert 1e-9 < moved < 2e-6
+    assert 1e-10 < moved < 2e-6

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from flocsim.ensembles.collision.start import largest_displacement, place_pair
+from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
 from flocsim.ensembles.kernels.sampling import (
     ANGLE_I,
     OFFSET,
     as_draws,
     flow_offset,
+    half_widths,
     point,
     points_of,
     settling_interval,
 )
+from flocsim.geometry.shapes.composite import Composite
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 
@@ -24,6 +26,15 @@ STAR = SpheroPolygon(
     1e-6 * np.array([[6.0, 0.0], [1.0, 1.5], [-3.0, 5.0], [-1.5, 0.0], [-4.0, -4.0], [1.0, -1.0]]),
     5e-7,
 )  # fmt: skip
+
+
+HEADED = Composite(
+    [
+        (Sphere(4e-6), (0.0, 0.0)),
+        (SpheroPolygon([(-3e-6, 0.0), (3e-6, 0.0)], 5e-7), (6e-6, 1e-6), 0.4),
+    ]
+)
+"""A wide head on a thin stick: the smallest spheroradius is an eighth of the largest."""
 
 
 def test_points_do_not_change_with_their_number():
@@ -81,12 +92,24 @@ def test_cauchy_holds_for_the_points_within_the_interval_of_their_scrambles():
     assert abs(means.mean() - expected) <= half + 1e-4 * expected
 
 
+def test_parts_of_unlike_spheroradii_reach_as_far_as_their_outline():
+    turns = np.linspace(0.0, 2.0 * np.pi, 12)
+    left, right = half_widths(HEADED, turns)
+    for place, turn in enumerate(turns):
+        outline = np.concatenate(HEADED.outline(angle=turn, points_per_quadrant=500))[:, 0]
+        assert left[place] == pytest.approx(-outline.min(), rel=1e-5, abs=0.0)
+        assert right[place] == pytest.approx(outline.max(), rel=1e-5, abs=0.0)
+        extents = half_extents(HEADED, turn)
+        assert (left[place], right[place]) == pytest.approx(extents, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("other", [STAR, HEADED])
 @pytest.mark.parametrize("angles", [(0.3, 2.0), (4.0, 5.5), (1.0, 0.1)])
-def test_outlines_touch_exactly_within_the_interval(angles):
-    shapes = (HOOK, STAR)
+def test_outlines_touch_exactly_within_the_interval(angles, other):
+    shapes = (HOOK, other)
     low, high = settling_interval(shapes, np.array([angles[0]]), np.array([angles[1]]), 0.0, 0.0)
     assert high[0] == pytest.approx(
-        largest_displacement("projected", HOOK, angles[0], STAR, angles[1]), rel=1e-12, abs=0.0
+        largest_displacement("projected", HOOK, angles[0], other, angles[1]), rel=1e-12, abs=0.0
     )
     clear = sum(shape.bounding_radius for shape in shapes)
     gap = 1e-9

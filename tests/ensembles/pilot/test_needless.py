@@ -52,7 +52,7 @@ def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, 
     found = {each.name: each for each in find(study, runs, never, seconds=0.0)}
     assert list(found) == [*study.config.force_names, INERTIA]
     for name in ("gravity", "drag"):
-        assert "settle" in found[name].why
+        assert "come together" in found[name].why
     assert "needs a contact force" in found["contact"].why
     assert found["double_layer"][1:3] == (0, LEAST)
     assert found["double_layer"].time > 0.0
@@ -61,7 +61,7 @@ def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, 
 
 def test_attraction_that_holds_spheres_matters(study, runs):
     place = study.config.force_names.index("van_der_waals")
-    part = Part("van_der_waals", without_force(place))
+    part = Part("van_der_waals", without_force(study.config.forces[place]))
     found = tried_without(study, runs * 3, part, never, seconds=100.0)
     # Spheres that no force holds roll off each other: a few are enough to know.
     assert found[1:3] == (ENOUGH, ENOUGH)
@@ -71,6 +71,18 @@ def test_outcomes_are_held_against_those_of_the_pilot(study, runs):
     other = [run._replace(inside=1 - run.inside) for run in runs]
     found = tried_without(study, other, Part("nothing", lambda system: system), never, 0.0)
     assert found[1:3] == (LEAST, LEAST)
+
+
+def test_a_force_is_left_out_by_itself_where_bodies_meet_without_their_weight(tmp_path):
+    """Without gravity all places of forces are others in the scene than in the config."""
+    shear = SPHERES | {"scene": {"types": ["III"], "meeting": "shear", "rate": "100 1/s"}}
+    study = small_study(tmp_path, shear | {"zone": {"distance": 5e-6}})
+    system = study.encounter(0, 1, [0.0] * 5).system
+    parts = [each for each in parts_of(study.config, [Overdamped()]) if isinstance(each, Part)]
+    assert [each.name for each in parts] == ["van_der_waals", "double_layer"]
+    for part, name in zip(parts, ("VanDerWaals", "DoubleLayer"), strict=True):
+        left = [type(force).__name__ for force in part.left_out(system).forces]
+        assert sorted([*left, name]) == sorted(type(force).__name__ for force in system.forces)
 
 
 def test_a_force_that_is_absent_is_not_tried(tmp_path):

@@ -9,14 +9,13 @@ import pytest
 from flocsim import __main__ as program
 from flocsim.commands import plot
 from flocsim.ensembles.strength import survey as module
-from flocsim.ensembles.strength.distribution import quantiles_of, strengths_of, table_of
-from flocsim.ensembles.strength.opening import FAILED, HOLDS, OPENED, OPENS_AT_LEAST, Opening
+from flocsim.ensembles.strength.distribution import quantiles_of, table_of
+from flocsim.ensembles.strength.opening import OPENED, Opening
 from flocsim.ensembles.strength.survey import Bound, bound_doublets, survey
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.strength import over_rate
 from flocsim.io.results.strength_file import QUANTILES, read_strengths, write_strengths
-
-AXES = ("I", "III"), np.array([1, 16]), np.array([0.0, 0.5])
+from tests.helpers.small_rates import AXES, mixed
 
 
 class FakeResults:
@@ -98,18 +97,6 @@ def test_quantiles_count_what_holds_as_never():
     assert quantiles_of(np.array([3.0, 1.0, 2.0]), 0).tolist() == [1.0, 1.0, 2.0, 3.0, 3.0]
     assert quantiles_of(np.array([1.0]), 3).tolist() == [1.0, 1.0, math.inf, math.inf, math.inf]
     assert np.isnan(quantiles_of(np.array([]), 0)).all()
-
-
-def mixed():
-    """One doublet of each kind in one condition."""
-    openings = [
-        Opening(1.0, 2.0, OPENED, 9), Opening(math.nan, 0.5, OPENS_AT_LEAST, 1),
-        Opening(64.0, math.nan, HOLDS, 21), Opening(4.0, math.nan, FAILED, 3),
-    ]  # fmt: skip
-    places = np.array([[1, 0, 1, k, 2] for k in range(4)])
-    bound = np.zeros((2, 2, 2), dtype=np.int64)
-    bound[1, 0, 1] = 6
-    return strengths_of(AXES, bound, places, openings, {"flow": "shear", "precision": 0.005})
 
 
 def test_counts_of_a_condition():

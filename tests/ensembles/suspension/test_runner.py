@@ -13,8 +13,10 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.suspension import dealing
+from flocsim.ensembles.suspension.checks import check_part
 from flocsim.ensembles.suspension.records import Part, part_of
 from flocsim.ensembles.suspension.replicate import Left, run_replicate
+from flocsim.ensembles.suspension.runner import form_of
 from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.errors import FileError, UsageError
 from flocsim.io.journal.records import Record, scan
@@ -51,6 +53,8 @@ def test_what_is_written_agrees_with_itself(finished):
             labels = moments["cluster"][k, t]
             assert len(set(labels.tolist())) == counts["clusters"][k, t]
             assert np.bincount(labels).max() == counts["largest"][k, t]
+    half, largest = counts["median_error"], counts["error"]
+    assert (half[:, 1:] > 0.0).all() and (half <= largest).all() and (half < largest).any()
     fell = moments["position"][:, -1, :, 1] - moments["position"][:, 0, :, 1]
     assert fell.max() < 0.0
     bonds = results.groups["bonds"]
@@ -66,10 +70,11 @@ def test_what_is_written_agrees_with_itself(finished):
 
 def run_parts(config, halts=(), left=None, replicate=0):
     """(Parts that a replicate keeps, whether it ended); it is asked to halt at some looks."""
-    parts, looks = [], iter(range(10**9))
-    ended = run_replicate(
-        SwarmStudy(config), replicate, parts.append, left, lambda: next(looks) in halts
-    )
+    parts, looks, study = [], iter(range(10**9)), SwarmStudy(config)
+    ended = run_replicate(study, replicate, parts.append, left, lambda: next(looks) in halts)
+    for part in parts:
+        # What is written is taken when it is read.
+        check_part(part_of_encoded(part), form_of(study, study.swarm(replicate)[0]))
     return parts, ended
 
 
@@ -173,9 +178,23 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, tmp_path, numbe
         main_raises(["info", str(tmp_path / "swarm.h5")])
     with start(tmp_path, "--resume", "--jobs", "2") as process:
         said, _ = process.communicate(timeout=240)
-    assert process.returncode == 0, said
+    assert process.returncode == 0 and "left out" not in said, said
     assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
     assert not journal.exists()
+
+
+def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
+    """Steps without an end, or of the other method, are no reason to begin anew."""
+    scene = {"floor": True, "periodic": "x", "duration": 4.0, "every": 1.0, "area_fraction": 0.4}
+    config = swarm_config(tmp_path, {"scene": scene})
+    whole, ended = run_parts(config)
+    assert ended
+    for look in (2, 10, 20):
+        first, ended = run_parts(config, halts={look})
+        assert not ended and first[-1].of == "state"
+        rest, _ = run_parts(config, left=Left(first[-1].facts["moments"], first[-1].arrays))
+        both = [part.encoded() for part in [*first, *rest] if part.of == "moment"]
+        assert both == [part.encoded() for part in whole if part.of == "moment"]
 
 
 def main_raises(words):

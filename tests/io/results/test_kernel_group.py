@@ -6,22 +6,9 @@ import numpy as np
 import pytest
 
 from flocsim.errors import UsageError
-from flocsim.io.results.kernel_group import KERNEL, Kernel, check_kernel
+from flocsim.io.results.kernel_group import Kernel, check_kernel
 from flocsim.io.results.kernel_tables import efficiency_for, kernel_csv, kernel_matrix
-
-
-def some_kernel():
-    """Two mechanisms, two N, two classes; bodies of one size do not settle onto each other."""
-    shape = (2, 2, 2, 2)
-    arrays = {name: np.arange(1.0, 17.0).reshape(shape) * (k + 1) for k, name in enumerate(KERNEL)}
-    for values in arrays.values():
-        values[...] = 0.5 * (values + np.swapaxes(values, 2, 3))
-    diagonal = np.arange(2)
-    arrays["beta3_reference"][0, :, diagonal, diagonal] = 0.0
-    arrays["efficiency3"][0, :, diagonal, diagonal] = np.nan
-    return Kernel(
-        ("settling", "shear"), np.array([1, 32]), ("5um", "10um"), np.array([5e-6, 1e-5]), arrays
-    )
+from tests.helpers.small_rates import some_kernel
 
 
 def test_arrays_have_axes_units_and_meanings():

@@ -13,7 +13,7 @@ from flocsim.ensembles.collision.observed import DRIFT_X, DRIFT_Y, LOAD, OBSERVE
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.swarms.bonds import CERTIFICATE, HOOK, REST, TOUCHING, BondGauge, alone
+from flocsim.swarms.together.bonds import CERTIFICATE, HOOK, REST, TOUCHING, BondGauge, alone
 from tests.helpers.swarm_scenes import WATER, R
 
 SETTLING = [Gravity(), StokesDrag()]

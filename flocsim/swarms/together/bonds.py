@@ -43,8 +43,8 @@ from flocsim.integrators.rhs.surface_gap import RANGE, flag_near, gap_of, surfac
 from flocsim.integrators.rhs.views import centre_line, centre_view
 from flocsim.laws import CENTRE_FORCE, centre_force, compiled_calls, has, surface_force
 from flocsim.plausibility.settling import least_mobility, terminal_motion
-from flocsim.swarms.clusters import placed_together
-from flocsim.swarms.contacts import Neighbours
+from flocsim.swarms.together.clusters import placed_together
+from flocsim.swarms.together.contacts import Neighbours
 
 TOUCHING, CERTIFICATE, HOOK, REST = range(4)
 KINDS = ("touching", "certificate", "hook", "rest")

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body
-from flocsim.swarms.contacts import Neighbours
+from flocsim.swarms.together.contacts import Neighbours
 
 
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
