@@ -56,15 +56,19 @@ along the tangent; displacements and such offsets that are set aside while the l
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X, FRAMES,
-) = 0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21, 22, 23, 26  # fmt: skip
+    SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
+    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, FRAMES,
+) = (
+    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21, 22, 23, 26, 27, 28, 29,
+)  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
 of velocity [m/s]; what all steps' errors, and those of switches, have led to; of the
 first body of a cluster: the share to which the carried error is shortened, the sums of forces, and
 of masses times accelerations (x, y); of body 0, where the present kick begins and how long it is,
-in the shortest kicks; the noise in it (x, y, angle); its frames at an implicit step's stages."""
+in the shortest kicks; the noise in it (x, y, angle); an
+angle, and its cosine and sine, as they are remembered; its frames at an implicit step's stages."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""

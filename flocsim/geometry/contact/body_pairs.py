@@ -19,6 +19,7 @@ from flocsim.arrays import (
     PAIRS_FULL,
     VELOCITY,
 )
+from flocsim.geometry.contact.separation import length_of
 from flocsim.geometry.contact.sweep import (
     MOVES,
     PLACE_X,
@@ -71,7 +72,7 @@ def wandered(scene, work, state):
     for body in range(scene.bodies.shape[0]):
         x = work.motion[state, body, 0] - work.bodies[body, LISTED] - drift_x
         y = work.motion[state, body, 1] - work.bodies[body, LISTED + 1] - drift_y
-        furthest = max(furthest, math.hypot(x, y))
+        furthest = max(furthest, length_of(x, y))
     return furthest / most
 
 
@@ -84,7 +85,7 @@ def time_to_wander(scene, work, share):
     for body in range(scene.bodies.shape[0]):
         x = work.motion[NOW, body, VELOCITY] - drift_x
         y = work.motion[NOW, body, VELOCITY + 1] - drift_y
-        fastest = max(fastest, math.hypot(x, y))
+        fastest = max(fastest, length_of(x, y))
     return share * most / fastest if fastest > 0.0 else math.inf
 
 

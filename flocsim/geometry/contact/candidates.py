@@ -28,7 +28,7 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
 from flocsim.hooks import skin_factor
 
@@ -86,11 +86,7 @@ def list_pair(scene, work, pair):
     ox, oy = separation(scene, work, NOW, a, b)
     reach = scene.surface_reach
     skin = skin_of(scene, a, b)
-    apart = (
-        math.sqrt(ox * ox + oy * oy)
-        - scene.bodies[a, BOUNDING_RADIUS]
-        - scene.bodies[b, BOUNDING_RADIUS]
-    )
+    apart = length_of(ox, oy) - scene.bodies[a, BOUNDING_RADIUS] - scene.bodies[b, BOUNDING_RADIUS]
     if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
     if reach > 0.0:
@@ -117,7 +113,7 @@ def shifted_by(dx, dy, ox, oy, turn):
     """How far (dx, dy) lies from (ox, oy) turned by an angle."""
     c, s = math.cos(turn), math.sin(turn)
     x, y = dx - (c * ox - s * oy), dy - (s * ox + c * oy)
-    return math.sqrt(x * x + y * y)
+    return length_of(x, y)
 
 
 def moved(scene, work, state, a, b, enough):
@@ -168,8 +164,8 @@ def relative_speed(scene, work, a, b):
     vx, vy = v[NOW, a, VX] - v[NOW, b, VX], v[NOW, a, VY] - v[NOW, b, VY]
     spin_a, spin_b = v[NOW, a, SPIN], v[NOW, b, SPIN]
     turning = abs(spin_a - spin_b)
-    seen_from_b = math.hypot(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
-    seen_from_a = math.hypot(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
+    seen_from_b = length_of(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
+    seen_from_a = length_of(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
     return min(seen_from_b, seen_from_a)
 
 

@@ -40,7 +40,7 @@ from flocsim.geometry.contact.circle_tree import (
     side_of,
     within,
 )
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
 
@@ -132,7 +132,7 @@ def list_spheres(scene, work, pair, cutoff):
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
     ox, oy = separation(scene, work, NOW, a, b)
-    return math.sqrt(ox * ox + oy * oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+    return length_of(ox, oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
 
 
 @hook

@@ -36,7 +36,8 @@ from flocsim.arrays import (
     X,
     Y,
 )
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.rotation import cosine_and_sine
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.shapes.cores import closest_share
 from flocsim.hooks import hook
 
@@ -47,8 +48,8 @@ TINY = 1e-300
 @hook
 def turn_body(work, state, body):
     """Cosine and sine of a body's angle in a state, into ``work.bodies``."""
-    work.bodies[body, COSINE] = math.cos(work.motion[state, body, ANGLE])
-    work.bodies[body, SINE] = math.sin(work.motion[state, body, ANGLE])
+    cosine, sine = cosine_and_sine(work, body, work.motion[state, body, ANGLE])
+    work.bodies[body, COSINE], work.bodies[body, SINE] = cosine, sine
 
 
 def turn_bodies(work, state):
@@ -104,7 +105,7 @@ def locate_polygons(scene, work, state, row):
     fy = sy + share * (ey - sy)
     dx = px + ox - fx
     dy = py + oy - fy
-    distance = math.sqrt(dx * dx + dy * dy)
+    distance = length_of(dx, dy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
@@ -122,7 +123,7 @@ def locate_spheres(scene, work, state, row):
     a = work.candidates[row, VERTEX_BODY]
     b = work.candidates[row, EDGE_BODY]
     ox, oy = separation(scene, work, state, a, b)
-    distance = math.sqrt(ox * ox + oy * oy)
+    distance = length_of(ox, oy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = ox / distance, oy / distance

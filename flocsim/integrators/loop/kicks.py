@@ -30,7 +30,7 @@ from flocsim.arrays import (
     STAGED_STEP,
     TIME,
 )
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.integrators.loop.philox import three_normals
 
 KICK, HALVINGS, SPREAD, LEAST_WAY = range(4)
@@ -87,7 +87,7 @@ def nearest(scene, work):
     for pair in range(work.tally[PAIRS]):
         a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
         x, y = separation(scene, work, NOW, a, b)
-        gap = math.sqrt(x * x + y * y)
+        gap = length_of(x, y)
         gap -= scene.bodies[a, BOUNDING_RADIUS] + scene.bodies[b, BOUNDING_RADIUS]
         if gap <= 0.0:
             gap = listed_gap(work, pair)

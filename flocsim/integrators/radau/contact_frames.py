@@ -12,8 +12,6 @@ and the mean, weighted by the masses, are those of all bodies that act on one an
 Newton's method adds keeps their momentum however far it has come.
 """
 
-import math
-
 from flocsim.arrays import (
     ACTING,
     BODY_COLUMNS,
@@ -50,6 +48,7 @@ from flocsim.arrays import (
     VERTEX_ARM_T,
     VERTEX_BODY,
 )
+from flocsim.geometry.contact.separation import length_of
 from flocsim.laws import CENTRE_FORCE, has
 
 LEADING_SHARE = 0.2
@@ -131,7 +130,7 @@ def average_shifts(work):
         for frame in range(FRAMES, BODY_COLUMNS, FRAME_COLUMNS):
             cosine = work.bodies[body, frame + TURN_COSINE]
             sine = work.bodies[body, frame + TURN_SINE]
-            size = math.hypot(cosine, sine)
+            size = length_of(cosine, sine)
             if size > 0.0:
                 work.bodies[body, frame + SHIFT_X] /= size
                 work.bodies[body, frame + SHIFT_Y] /= size
@@ -148,7 +147,7 @@ def share_turns(work):
             # Leaders come first, and have the cosine and sine of their sums by then.
             cosine = work.bodies[leader, frame + TURN_COSINE]
             sine = work.bodies[leader, frame + TURN_SINE]
-            size = math.hypot(cosine, sine)
+            size = length_of(cosine, sine)
             work.bodies[body, frame + TURN_COSINE] = cosine / size if size > 0.0 else 1.0
             work.bodies[body, frame + TURN_SINE] = sine / size if size > 0.0 else 0.0
 

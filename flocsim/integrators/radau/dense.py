@@ -13,6 +13,12 @@ def magnitude(value):
     return abs(value.real) + abs(value.imag)
 
 
+def reciprocal(value):
+    """1/value, without Python's guards against overflow, which pivots come nowhere near."""
+    size = value.real * value.real + value.imag * value.imag
+    return complex(value.real / size, -value.imag / size)
+
+
 def subtract_pivot(system, which, row, pivot):
     """Subtract a pivot's row from one below it, and keep the share in its place."""
     if which == REAL:
@@ -50,7 +56,7 @@ def factorise(system, pivots, which):
                 kept = system[which, pivot, column]
                 system[which, pivot, column] = system[which, best, column]
                 system[which, best, column] = kept
-        system[which, pivot, pivot] = 1.0 / system[which, pivot, pivot]
+        system[which, pivot, pivot] = reciprocal(system[which, pivot, pivot])
         for row in range(pivot + 1, size):
             if system[which, row, pivot] != 0.0:
                 subtract_pivot(system, which, row, pivot)

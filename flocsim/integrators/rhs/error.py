@@ -29,6 +29,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.geometry.contact.separation import length_of
 from flocsim.integrators.rhs.views import inertia, lever
 
 ROUNDING = 1e-15
@@ -55,7 +56,7 @@ def turnover_rate(scene, work, body, mean_x, mean_y):
     motion = work.motion
     vx = motion[NOW, body, VX] - mean_x
     vy = motion[NOW, body, VY] - mean_y
-    return math.hypot(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, SPIN])
+    return length_of(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, SPIN])
 
 
 def remember_velocities(scene, work, remaining):
@@ -100,10 +101,10 @@ def body_error(scene, work, body):
     parts of it are written down."""
     e = work.motion
     size = scene.bodies[body, BOUNDING_RADIUS]
-    place = math.hypot(e[DEVIATION, body, X], e[DEVIATION, body, Y]) + size * abs(
+    place = length_of(e[DEVIATION, body, X], e[DEVIATION, body, Y]) + size * abs(
         e[DEVIATION, body, ANGLE]
     )
-    speed = math.hypot(e[DEVIATION, body, VX], e[DEVIATION, body, VY]) + size * abs(
+    speed = length_of(e[DEVIATION, body, VX], e[DEVIATION, body, VY]) + size * abs(
         e[DEVIATION, body, SPIN]
     )
     work.bodies[body, STEP_PLACE], work.bodies[body, STEP_SPEED] = place, speed

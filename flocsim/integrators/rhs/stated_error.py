@@ -59,6 +59,7 @@ from flocsim.arrays import (
     X,
     Y,
 )
+from flocsim.geometry.contact.separation import length_of
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.views import along_normal, contact_view, normal_rate, pressed_view
 from flocsim.laws import contact_force
@@ -125,7 +126,7 @@ def carried_size(scene, work, body):
     """How large a body's carried error is in the place of its outline [m]."""
     e = work.motion
     turn = scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, ANGLE])
-    return math.hypot(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
+    return length_of(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
 
 
 def shorten(scene, work):
@@ -240,7 +241,7 @@ def add_switch_errors(scene, work, clock, step, depth):
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
-            impulse = late * math.hypot(normal, tangential)
+            impulse = late * length_of(normal, tangential)
             add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse)
             add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse)
             kick_pair(scene, work, row, signed * normal, signed * tangential)

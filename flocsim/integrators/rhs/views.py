@@ -37,7 +37,7 @@ from flocsim.arrays import (
 )
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import row_radii
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.hooks import hook
 
 
@@ -159,7 +159,7 @@ def push_pair(work, state, row, normal, tangential):
 def centre_line(scene, work, state, a, b):
     """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
     dx, dy = separation(scene, work, state, a, b)
-    distance = math.sqrt(dx * dx + dy * dy)
+    distance = length_of(dx, dy)
     if distance == 0.0:
         return 0.0, 1.0, 0.0
     return dx / distance, dy / distance, distance

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.integrators.radau.dense import factorise, solve_dense
+from flocsim.integrators.radau.dense import factorise, reciprocal, solve_dense
 from flocsim.integrators.radau.tableau import PAIR, REAL
 
 
@@ -93,3 +93,8 @@ def test_rows_of_masses_and_inertias_lie_many_orders_apart():
 )
 def test_singular_and_undefined_systems_are_refused(matrix):
     assert solved(np.array(matrix), np.array([1.0, 1.0])) is None
+
+
+@pytest.mark.parametrize("value", [2.0, -3e-12 + 4e-12j, 1e9j, 1e-20 + 1e20j])
+def test_reciprocals(value):
+    assert reciprocal(complex(value)) == pytest.approx(1.0 / value, rel=1e-15)
