@@ -1,10 +1,12 @@
 """The throughput of this tree over that of another commit, replicates taken in turn.
 
     python -m benchmarks.speed.against_commit COMMIT [--quick] [--markdown] [--vertices N]
+                                              [--meeting settling | shear]
 
-Both run the same replicates of `tang2014` in processes of their own, one group (four displacements)
-after the other, each group twice and in both orders; of two CPU times the smaller counts. The
-machine's moods hit both alike then: the median over the groups is steadier than the ratio of sums.
+Both run the same replicates of `tang2014` in processes of their own, one group (four displacements,
+or four points of a study of kernels in shear) after the other, each group twice and in both orders;
+of two CPU times the smaller counts. The machine's moods hit both alike then: the median over the
+groups is steadier than the ratio of sums.
 """
 
 import os
@@ -17,27 +19,54 @@ import numpy as np
 
 from benchmarks.reporting import ROOT, Table, parser_of, print_heading
 
-TYPES = ("I", "II", "III")
+TYPES = {
+    "settling": ("I", "II", "III"),
+    "shear": ("5 with 10 um", "10 with 20 um", "20 with 20 um"),
+}
 
 CHILD = """
 import sys, time
 from pathlib import Path
+{made}
+vertices = config.shapes.vertices[0]
+for line in sys.stdin:
+    condition, group = map(int, line.split())
+    began = time.process_time()
+    for share, replicate in group_of(group):
+        study.run(condition, vertices, share, replicate)
+    print(time.process_time() - began, flush=True)
+"""
+"""Runs groups of replicates on demand."""
+
+MADE = {
+    "settling": """\
 from flocsim.ensembles import load_config
 from flocsim.ensembles import study as room
 
 config = load_config(Path(sys.argv[1]))
 study = room.Study(config, flocs=room.flocs_of(config))
-vertices, shares = config.shapes.vertices[0], config.scene.delta
-for line in sys.stdin:
-    condition, replicate = map(int, line.split())
-    began = time.process_time()
-    for share in shares:
-        study.run(condition, vertices, share, replicate)
-    print(time.process_time() - began, flush=True)
-"""
-"""Runs groups of replicates on demand, with names that were there in every version."""
 
-STUDY = """\
+
+def group_of(group):
+    return [(share, group) for share in config.scene.delta]
+""",
+    "shear": """\
+from flocsim.ensembles.config.loader import load_any_config
+from flocsim.ensembles.kernels.study import study_of
+
+config = load_any_config(Path(sys.argv[1]))
+study = study_of(config)
+
+
+def group_of(group):
+    return [(1.0, 4 * group + k) for k in range(4)]
+""",
+}
+"""How the child makes its study, and what is in a group; of settling, with names that were there in
+every version."""
+
+STUDY = {
+    "settling": """\
 preset = "tang2014"
 seed = 1
 replicates = 1000
@@ -48,16 +77,36 @@ delta = [0.0, 0.25, 0.5, 0.75]
 source = "synthetic"
 vertices = [{}]
 pool = 10
-"""
+""",
+    "shear": """\
+preset = "tang2014"
+seed = 1
+replicates = 1024
+[scene]
+kind = "kernel"
+meeting = "shear"
+rate = "10 1/s"
+sizes = ["5 um", "10 um", "20 um"]
+[shapes]
+source = "library"
+file = "synthetic"
+vertices = [{}]
+""",
+}
+
+PLACES = {"settling": (0, 1, 2), "shear": (1, 4, 5)}
+"""Of the conditions of a study, those that are run, by the names in TYPES."""
 
 
 class Child:
     """A process that runs groups of replicates with the flocsim of a folder."""
 
-    def __init__(self, tree, study, cache):
+    def __init__(self, tree, study, meeting, cache):
         environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": str(cache)}
+        program = CHILD.format(made=MADE[meeting])
         self.process = subprocess.Popen(
-            [sys.executable, "-c", CHILD, str(study)], env=environment, cwd=study.parent, text=True,
+            [sys.executable, "-c", program, str(study)],
+            env=environment, cwd=study.parent, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
 
@@ -98,22 +147,24 @@ def main():
     """Print the table."""
     parser = parser_of(__doc__)
     parser.add_argument("commit", help="the other commit")
+    parser.add_argument("--meeting", choices=list(TYPES), default="settling")
     parser.add_argument("--vertices", type=int, default=64, metavar="N", help="default: 64")
     arguments = parser.parse_args()
     print_heading()
+    meeting = arguments.meeting
     groups = 10 if arguments.quick else 60
     table = Table(
-        f"Throughput over that of {arguments.commit}, N = {arguments.vertices}",
+        f"Throughput over that of {arguments.commit}, {meeting}, N = {arguments.vertices}",
         ("type", "groups", "of all", "median", "a quarter below", "a quarter above"),
     )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         study = folder / "study.toml"
-        study.write_text(STUDY.format(arguments.vertices))
-        there = Child(other_tree(arguments.commit, folder), study, folder / "cache_there")
-        here = Child(ROOT, study, folder / "cache_here")
+        study.write_text(STUDY[meeting].format(arguments.vertices))
+        there = Child(other_tree(arguments.commit, folder), study, meeting, folder / "cache_there")
+        here = Child(ROOT, study, meeting, folder / "cache_here")
         every = []
-        for condition, kind in enumerate(TYPES):
+        for condition, kind in zip(PLACES[meeting], TYPES[meeting], strict=True):
             found = compare(there, here, condition, groups)
             every.append(found)
             add(table, kind, found)
