@@ -15,13 +15,15 @@ from flocsim.ensembles.collision import bonds, meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, replicate_row
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
-from flocsim.ensembles.collision.thermal import climb, kicked
+from flocsim.ensembles.collision.thermal import kicked
+from flocsim.ensembles.collision.thermal.cage import caged_between
 from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
 from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, SceneConfig
 from flocsim.errors import UsageError
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.plausibility.settling import (
     largest_mobility,
     least_mobility,
@@ -260,8 +262,8 @@ class Encounter:
             # Shapes come round what acts between their centres.
             return 0.0, 0.0
         mobility = sum(each for _, each in self.yielding)
-        load, barrier = bonds.SAFETY * self.largest_load, kicked.BARRIER * self.kick_energy
-        return climb.cage(self.pull, mobility, load, barrier)
+        load, barrier = bonds.SAFETY * self.largest_load, BARRIER * self.kick_energy
+        return caged_between(self.pull, mobility, load, barrier)
 
     def time_limit(self, share: float = 1.0) -> float:
         """Simulated time [s] after which a replicate at δ = share · δ_max is undecided."""

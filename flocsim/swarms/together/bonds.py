@@ -11,7 +11,8 @@ outermost contact points, with a lever as long as the cluster; a surface force f
 
 Rest: since the time before, the two have kept their pose. Where attraction alone could not carry
 the load, their shapes do, and such a rest is a hook. All others touch, and roll or part. What rests
-on a wall does not settle: there the load is all the weight.
+on a wall does not settle: there the load is all the weight. Where bodies are kicked, other proofs
+take the place of these (kicked.py).
 """
 
 import math
@@ -36,15 +37,30 @@ from flocsim.arrays import (
 )
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
+from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.surface_gap import RANGE, flag_near, gap_of, surface_view
-from flocsim.integrators.rhs.views import centre_line, centre_view
-from flocsim.laws import CENTRE_FORCE, centre_force, compiled_calls, has, surface_force
+from flocsim.integrators.rhs.views import (
+    centre_line,
+    centre_view,
+    contact_view,
+    pressed_view,
+)
+from flocsim.laws import (
+    CENTRE_FORCE,
+    CONTACT_FORCE,
+    centre_force,
+    compiled_calls,
+    contact_force,
+    has,
+    surface_force,
+)
 from flocsim.plausibility.settling import least_mobility, terminal_motion
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Neighbours
+from flocsim.swarms.together.kicked import KickedBonds
 
 TOUCHING, CERTIFICATE, HOOK, REST = range(4)
 KINDS = ("touching", "certificate", "hook", "rest")
@@ -57,9 +73,22 @@ CALM, STILL = 0.02, 1e-3
 """A pair that moves at less than this share of the drift is calm enough for a certificate, and one
 that has moved by less than this share of the drift's way rests."""
 
-CENTRES, SURFACES, LEFT, RIGHT, NORMAL_OF, PULL_COLUMNS = 0, 1, 2, 3, 4, 6
+CENTRES, SURFACES, LEFT, RIGHT, NORMAL_OF, DISTANCE, APART, SPRINGS, PULL_COLUMNS = (
+    0, 1, 2, 3, 4, 6, 7, 8, 9,
+)  # fmt: skip
 """Columns of what holds a pair: attraction between centres and between surfaces [N]; the levers of
-the contact points outermost on either side of the line of centres [m]; that line's direction."""
+the contact points outermost on either side of the line of centres [m]; that line's direction and
+length [m]; the gap by which attraction goes at the outlines [m]; twice the energy of the contacts'
+normal springs [J]."""
+
+
+def stored(scene, work, row):
+    """Twice the energy of the normal spring of a contact [J]."""
+    if not has(scene, CONTACT_FORCE):
+        return 0.0
+    view = contact_view(scene, work, NOW, row)
+    normal, _ = contact_force(scene, pressed_view(view, view.overlap, 0.0))
+    return abs(normal * view.overlap)
 
 
 def measure_pulls(scene, work, time, pulls):
@@ -72,11 +101,13 @@ def measure_pulls(scene, work, time, pulls):
             return False
         turn_body(work, NOW, a)
         turn_body(work, NOW, b)
-        nx, ny, _ = centre_line(scene, work, NOW, a, b)
-        left, right = 0.0, 0.0
+        nx, ny, distance = centre_line(scene, work, NOW, a, b)
+        left, right, apart, springs = 0.0, 0.0, math.inf, 0.0
         for row in range(work.tally[CANDIDATES]):
             locate_polygons(scene, work, NOW, row)
+            apart = min(apart, work.geometry[NOW, row, GAP])
             if work.geometry[NOW, row, GAP] < 0.0:
+                springs += stored(scene, work, row)
                 x, y = contact_point(work, row, b)
                 left = max(left, nx * y - ny * x)
                 right = max(right, ny * x - nx * y)
@@ -89,6 +120,8 @@ def measure_pulls(scene, work, time, pulls):
             flag_near(scene, work, NOW, 0.0)
             view = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES])
             pulls[pair, SURFACES] = -surface_force(scene, view)
+            apart = view.gap
+        pulls[pair, DISTANCE], pulls[pair, APART], pulls[pair, SPRINGS] = distance, apart, springs
     return True
 
 
@@ -123,6 +156,8 @@ class BondGauge:
         self.settling, self.resistance = alone(swarm)
         self.shear = math.hypot(*swarm.fluid.gradient)
         self.spheres = swarm.system.spheres_only
+        found = thermal_in(swarm.forces)
+        self.kicked = KickedBonds(swarm, self.scene, found[0].energy) if found else None
 
     def bonds(
         self, time: float, motion: np.ndarray, touching: Neighbours,
@@ -141,22 +176,55 @@ class BondGauge:
         label = labels[held.pairs[:, 0]]
         load, drift, extent = load[label], drift[label], extent[label]
         pulls = self.pulls_of(time, motion, held.pairs)
-        along, shear, spin = relative(motion, held, pulls[:, NORMAL_OF:], self.sizes(held.pairs))
-        distance = np.hypot(*held.vector.T)
-        load = load + self.effective_masses(held.pairs) * spin**2 * distance
-        straight = pulls[:, CENTRES] + pulls[:, SURFACES] > SAFETY * load
-        pried = pulls[:, SURFACES] > SAFETY * load - np.minimum(pulls[:, CENTRES], 0.0)
-        if self.spheres:
-            pried |= True
-        lever = np.minimum(pulls[:, LEFT], pulls[:, RIGHT])
-        pried |= (pulls[:, CENTRES] * lever > SAFETY * load * extent) & (shear < CALM * drift)
-        kind = np.full(len(held.pairs), TOUCHING)
+        still = np.zeros(len(held.pairs), bool)
         if before is not None:
             still = self.kept_pose(time, motion, held, before) < STILL * drift * (time - before[0])
-            carried = pulls[:, CENTRES] + pulls[:, SURFACES] > load
-            kind[still] = np.where(carried, REST, HOOK)[still]
-        kind[straight & pried & (along < CALM * drift)] = CERTIFICATE
+        if self.kicked is None:
+            along, shear, spin = relative(motion, held, pulls, self.sizes(held.pairs))
+            distance = np.hypot(*held.vector.T)
+            load = load + self.effective_masses(held.pairs) * spin**2 * distance
+            certified = self.outweighs(pulls, load, extent, shear < CALM * drift)
+            certified &= along < CALM * drift
+        else:
+            certified, lasting = self.outlasts(
+                self.kicked, time, motion, held.pairs, pulls, load, extent
+            )
+            still &= lasting
+        carried = pulls[:, CENTRES] + pulls[:, SURFACES] > load
+        kind = np.where(still, np.where(carried, REST, HOOK), TOUCHING)
+        kind[certified] = CERTIFICATE
         return Bonds(held.pairs, kind)
+
+    def outweighs(
+        self, pulls: np.ndarray, load: np.ndarray, extent: np.ndarray, calm: np.ndarray
+    ) -> np.ndarray:
+        """Where attraction outweighs a load by the safety factor, also where it pries."""
+        straight = pulls[:, CENTRES] + pulls[:, SURFACES] > SAFETY * load
+        if self.spheres:
+            return straight
+        lever = np.minimum(pulls[:, LEFT], pulls[:, RIGHT])
+        pried = (pulls[:, CENTRES] * lever > SAFETY * load * extent) & calm
+        return straight & (pried | self.follows(pulls, load))
+
+    def follows(self, pulls: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """Where the surface force, which follows the contact, outweighs a load by itself."""
+        return pulls[:, SURFACES] > SAFETY * load - np.minimum(pulls[:, CENTRES], 0.0)
+
+    def outlasts(
+        self, kicked: KickedBonds, time: float, motion: np.ndarray, pairs: np.ndarray,
+        pulls: np.ndarray, load: np.ndarray, extent: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Where kicks have a bond certified, and where they let a pair rest."""
+        pull = SAFETY * load
+        if not self.spheres:
+            lever = np.minimum(pulls[:, LEFT], pulls[:, RIGHT])
+            pries = ~self.follows(pulls, load) & (load > 0.0)
+            with np.errstate(divide="ignore"):
+                pull = np.where(pries, pull * extent / lever, pull)
+        ways = pulls[:, [DISTANCE, APART]]
+        certified = kicked.certified(time, motion, pairs, ways, pull, pulls[:, SPRINGS])
+        attracted = (pulls[:, CENTRES] != 0.0) | (pulls[:, SURFACES] != 0.0)
+        return certified & attracted, kicked.resting(time, pairs, ways, load)
 
     def loads(
         self, labels: np.ndarray, places: np.ndarray, on_wall: np.ndarray
@@ -255,7 +323,7 @@ def turned(vectors: np.ndarray, angles: np.ndarray) -> np.ndarray:
 
 
 def relative(
-    motion: np.ndarray, held: Neighbours, normal: np.ndarray, sizes: np.ndarray
+    motion: np.ndarray, held: Neighbours, pulls: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of every pair as a rigid doublet the speed along its line of centres, of any kind [m/s], and
     its spin [rad/s]."""
@@ -264,4 +332,5 @@ def relative(
     rx, ry = held.vector.T
     spin = motion[b, SPIN]
     shear = np.hypot(ux + spin * ry, uy - spin * rx) + np.abs(motion[a, SPIN] - spin) * sizes
-    return np.abs(ux * normal[:, 0] + uy * normal[:, 1]), shear, np.abs(spin)
+    along = ux * pulls[:, NORMAL_OF] + uy * pulls[:, NORMAL_OF + 1]
+    return np.abs(along), shear, np.abs(spin)

@@ -8,11 +8,14 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon, Swarm, System
 from flocsim.arrays import NOW, work_of
+from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import bonds as of_two
-from flocsim.ensembles.collision.observed import DRIFT_X, DRIFT_Y, LOAD, OBSERVED_SIZE
-from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
+from flocsim.ensembles.collision.observed import DRIFT_X, DRIFT_Y, KICK_ENERGY, LOAD, OBSERVED_SIZE
+from flocsim.ensembles.collision.thermal.kicked import bond_in_kicks
+from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.modes import set_modes
 from flocsim.swarms.together.bonds import CERTIFICATE, HOOK, REST, TOUCHING, BondGauge, alone
 from tests.helpers.swarm_scenes import WATER, R
 
@@ -148,3 +151,78 @@ def test_walls_are_no_bonds():
     assert found.pairs.tolist() == [[1, 0]]
     # What lies on a wall carries all the weight.
     assert found.kind.tolist() == [CERTIFICATE]
+
+
+KICKS = Thermal(kick=1e-3)
+ENERGY = BOLTZMANN * 298.15
+
+
+def depth_of(hamaker, radii=(R, 1.7 * R), least=1e-9):
+    """How deep van der Waals attraction is where outlines touch [J]: as much as far as d_min, where
+    it is capped, as beyond."""
+    return hamaker * radii[0] * radii[1] / (radii[0] + radii[1]) / (3.0 * least)
+
+
+def floating():
+    """Discs of the density of water, so that nothing loads their bond, which is hardly pressed."""
+    return [
+        Body(body.shape, body.position, density=WATER.density)
+        for body in chain([R, 1.7 * R], -1e-12)
+    ]
+
+
+@pytest.mark.parametrize(("depth", "kind"), [(15.0, TOUCHING), (25.0, CERTIFICATE)])
+def test_kicks_open_what_is_shallow(depth, kind):
+    """Out of 15 k_B T kicks come, not out of 25; without kicks both hold."""
+    hamaker = depth * ENERGY / depth_of(1.0)
+    assert kinds(floating(), [*sticky(hamaker), KICKS]).kind.tolist() == [kind]
+
+
+def test_what_moves_fast_is_not_held_against_kicks():
+    hamaker = 25.0 * ENERGY / depth_of(1.0)
+    bodies = floating()
+    mass = bodies[0].mass * bodies[1].mass / (bodies[0].mass + bodies[1].mass)
+    flying = np.zeros((2, 3))
+    for energy, kind in ((4.0, CERTIFICATE), (6.0, TOUCHING)):
+        flying[1, 0] = math.sqrt(2.0 * energy * ENERGY / mass)
+        assert kinds(bodies, [*sticky(hamaker), KICKS], flying).kind.tolist() == [kind]
+
+
+@pytest.mark.parametrize("hamaker", [1e-23, 1e-22, 3e-22, 1e-21, 1e-20])
+def test_certificates_of_two_discs_in_kicks_are_those_of_a_pair(hamaker):
+    bodies, acting = chain([R, 1.7 * R]), [*sticky(hamaker), KICKS]
+    scene = System(bodies, acting, fluid=WATER).scene(jit=False)
+    position, velocity = System(bodies, acting, fluid=WATER).motion()
+    work = work_of(scene, position, velocity)
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    set_modes(scene, work)
+    gauge = gauge_of(bodies)
+    observed = np.zeros(OBSERVED_SIZE)
+    observed[[DRIFT_X, DRIFT_Y]] = gauge.settling[1] - gauge.settling[0]
+    observed[LOAD] = np.hypot(*observed[[DRIFT_X, DRIFT_Y]]) / np.sum(1.0 / gauge.resistance)
+    observed[KICK_ENERGY] = ENERGY
+    held = bond_in_kicks(scene, work, observed, 0.0, -1e-10, 1.0, 0.0, 2.7 * R - 1e-10)
+    [kind] = kinds(bodies, acting).kind
+    assert (kind == CERTIFICATE) == (held == of_two.CERTIFICATE)
+    known = {1e-23: False, 1e-20: True}
+    assert (kind == CERTIFICATE) == known.get(hamaker, kind == CERTIFICATE)
+
+
+CUPS = 0.3e-6
+"""The spheroradius of CUP, by which its hooks have to be lifted."""
+
+
+@pytest.mark.parametrize("temperature", [298.15, 3e8])
+def test_hooks_hold_where_kicks_cannot_lift_them(temperature):
+    """Two cups that lie in each other and have not moved."""
+    bodies = [Body(CUP, (0.0, 0.0), density=2650.0), Body(CUP, (0.0, -3.59e-6), density=5000.0)]
+    acting = [*SETTLING, Contact(), Thermal(temperature, kick=1e-3)]
+    position = np.array([[*body.position, 0.0] for body in bodies])
+    before = (0.05, np.hstack([position, np.zeros((2, 3))]))
+    gauge = gauge_of(bodies)
+    load, _, _ = BondGauge.loads(gauge, np.zeros(2, int), position[:, :2], np.zeros(2, bool))
+    lifts = load[0] * CUPS >= 20.0 * BOLTZMANN * temperature
+    assert lifts == (temperature < 1e3)
+    found = kinds(bodies, acting, before=before)
+    assert found.kind.tolist() == [HOOK if lifts else TOUCHING]

@@ -1,3 +1,3 @@
-"""Pairs under thermal motion: where they are let go (release), how far kicks let them climb
-(climb), and what becomes of them (kicked).
+"""Pairs under thermal motion: where they are let go (release), where kicks keep them apart (cage),
+and what becomes of them (kicked).
 """

@@ -13,7 +13,7 @@ against k_B T:
 - Certificate: to climb out of their attraction, against the load that a certificate asks for, takes
   the energy that they have, that of the springs in contact twice, and BARRIER k_B T besides: by
   Kramers' rate e^20 = 5e8 times as long as bodies take to relax. Whatever way shapes roll, what
-  they climb is their potential (climb.py).
+  they climb is their potential (integrators/rhs/climb.py).
 - Rest: spheres by such a climb against the load itself; shapes, whose hooks no potential tells of,
   where it takes BARRIER k_B T to lift one by its spheroradius against the load.
 - Held: by BARRIER k_B T on either side of a secondary minimum of spheres, or of surface forces.
@@ -69,14 +69,11 @@ from flocsim.ensembles.collision.observed import (
     MOBILITY_J,
 )
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED, look_at_pair
-from flocsim.ensembles.collision.thermal.climb import can_climb, repulsion_at
+from flocsim.integrators.rhs.climb import BARRIER, can_climb, repulsion_at
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
 
 RETURN_SHARE = 1e-4
 """Of the pairs that are said to have parted, so many may come back at most."""
-
-BARRIER = 20.0
-"""Thermal energies k_B T that hold a pair."""
 
 
 def drift_from(scene, work, observed, outer):
@@ -103,7 +100,7 @@ def return_bound(scene, work, observed, time):
         return 1.0
     half = 0.5 * (along - outer)
     mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
-    drift += mobility * min(repulsion_at(scene, time, outer + half, half), 0.0)
+    drift += mobility * min(repulsion_at(scene, time, BODY_J, BODY_I, outer + half, half), 0.0)
     relaxation = max(
         scene.bodies[BODY_I, MASS] * observed[MOBILITY_I],
         scene.bodies[BODY_J, MASS] * observed[MOBILITY_J],
@@ -141,12 +138,12 @@ def bond_in_kicks(scene, work, observed, time, gap, nx, ny, distance):
         if not spheres and load > 0.0 and surfaces <= load - min(centres, 0.0):
             pull = load * leverage(work, nx, ny, distance)
         needed = barrier + energy(scene, work)
-        if not can_climb(scene, time, distance, apart, pull, needed):
+        if not can_climb(scene, time, BODY_J, BODY_I, distance, apart, pull, needed):
             return CERTIFICATE
     if observed[LOAD] == 0.0 or not has_rested(scene, work, observed, time, gap, nx, ny, distance):
         return NO_BOND
     if spheres:
-        if can_climb(scene, time, distance, apart, observed[LOAD], barrier):
+        if can_climb(scene, time, BODY_J, BODY_I, distance, apart, observed[LOAD], barrier):
             return NO_BOND
     elif observed[LOAD] * min(scene.bodies[BODY_I, RADIUS], scene.bodies[BODY_J, RADIUS]) < barrier:
         return NO_BOND

@@ -18,6 +18,7 @@ from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.integrators.rhs.views import centre_line
 from tests.helpers.small_study import small_config
 
@@ -207,7 +208,7 @@ def test_shapes_hook_where_kicks_cannot_lift_them_by_their_rounding(tmp_path, te
     warm = {"thermal": {"temperature": temperature, "kick": "1 ms"}}
     pair = Pair(tmp_path, {}, warm, shapes, collided=1.0).put(0.0, -24e-6 + 1e-12, drifting=False)
     load = pair.observed[numbers.LOAD] * 1e-6 / (BOLTZMANN * temperature)
-    assert (load > kicked.BARRIER) == (kind == HOOK)
+    assert (load > BARRIER) == (kind == HOOK)
     pair.bond()
     assert pair.bond(time=1.1 * pair.observed[numbers.REST_TIME]) == kind
 

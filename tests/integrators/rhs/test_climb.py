@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from flocsim.body import Body
-from flocsim.ensembles.collision.meetings import GAPS, speeds_of
-from flocsim.ensembles.collision.thermal.climb import cage, can_climb
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.integrators.rhs.climb import can_climb
 from flocsim.system import System
 
 RADIUS, HAMAKER, D_MIN = 1e-6, 1e-20, 1e-9
@@ -28,7 +27,7 @@ def scene_of(*forces):
                                               (1e-8, 0.1 * PULL * D_MIN)])  # fmt: skip
 def test_the_climb_is_the_depth_of_the_potential(gap, place, depth):
     scene = scene_of(VanDerWaals(HAMAKER, D_MIN, gap))
-    known = scene, 0.0, 2.0 * RADIUS + place, place, 0.0
+    known = scene, 0.0, 1, 0, 2.0 * RADIUS + place, place, 0.0
     assert not can_climb(*known, 0.97 * depth)
     assert can_climb(*known, 1.03 * depth)
 
@@ -37,15 +36,15 @@ def test_a_load_helps_on_the_way_out():
     scene, load = scene_of(VanDerWaals(HAMAKER, D_MIN)), 0.01 * PULL
     # Attraction falls to the load at ten d_min.
     left = PULL * D_MIN * (1.0 + 0.9) - 10.0 * load * D_MIN
-    known = scene, 0.0, 2.0 * RADIUS, 0.0, load
+    known = scene, 0.0, 1, 0, 2.0 * RADIUS, 0.0, load
     assert not can_climb(*known, 0.97 * left)
     assert can_climb(*known, 1.03 * left)
-    assert can_climb(scene, 0.0, 2.0 * RADIUS, 0.0, math.inf, 0.0)
+    assert can_climb(scene, 0.0, 1, 0, 2.0 * RADIUS, 0.0, math.inf, 0.0)
 
 
 def test_without_attraction_nothing_is_to_be_climbed():
     for forces in ((), (DoubleLayer(15e-3, 1e-8),)):
-        assert can_climb(scene_of(*forces), 0.0, 2.0 * RADIUS, 0.0, 0.0, 1e-30)
+        assert can_climb(scene_of(*forces), 0.0, 1, 0, 2.0 * RADIUS, 0.0, 0.0, 1e-30)
 
 
 def test_a_barrier_is_part_of_the_climb():
@@ -58,36 +57,5 @@ def test_a_barrier_is_part_of_the_climb():
     climbs = np.cumsum(pull - push) * (gaps[1] - gaps[0])
     highest = climbs.max()
     assert highest > 1.2 * climbs[-1], "there is a barrier"
-    assert not can_climb(scene, 0.0, total, 0.0, 0.0, 0.95 * highest)
-    assert can_climb(scene, 0.0, total, 0.0, 0.0, 1.05 * highest)
-
-
-FORCES = (VanDerWaals(2e-19), DoubleLayer(50e-3, 20e-9))
-"""A secondary minimum of hundreds of k_B T behind a barrier."""
-
-
-def test_a_cage_has_the_barrier_on_both_sides():
-    radii, mobility = (5e-6, 5e-6), 1e7
-    speeds = speeds_of((*FORCES, StokesDrag()), None, radii, mobility)
-    potential = np.append(0.0, -np.cumsum(
-        0.5 * (speeds[1, 1:] + speeds[1, :-1]) * np.diff(GAPS)
-    )) / mobility  # fmt: skip
-    place = int(np.argmin(np.where(GAPS > 2e-8, potential, np.inf)))
-    depth = potential[-1] - potential[place]
-    low, high = cage(speeds, mobility, 0.0, 0.5 * depth)
-    assert low < GAPS[place] < high
-    for end in (low, high):
-        assert potential[-1] - potential[end == GAPS][0] >= 0.5 * depth
-    assert cage(speeds, mobility, 0.0, 1.1 * depth) == (0.0, 0.0)
-
-
-def test_a_load_may_open_a_cage():
-    speeds = speeds_of((*FORCES, StokesDrag()), None, (5e-6, 5e-6), 1e7)
-    strongest = -speeds[1][GAPS > 2e-8].min() / 1e7
-    assert cage(speeds, 1e7, 0.0, 1e-20)[1] > 0.0
-    assert cage(speeds, 1e7, 2.0 * strongest, 1e-20) == (0.0, 0.0)
-
-
-def test_what_attracts_everywhere_is_no_cage():
-    speeds = speeds_of((VanDerWaals(1e-18),), None, (5e-6, 5e-6), 1e7)
-    assert cage(speeds, 1e7, 0.0, 1e-21) == (0.0, 0.0)
+    assert not can_climb(scene, 0.0, 1, 0, total, 0.0, 0.0, 0.95 * highest)
+    assert can_climb(scene, 0.0, 1, 0, total, 0.0, 0.0, 1.05 * highest)

@@ -1,0 +1,56 @@
+"""How much energy it takes to leave an interaction: an attraction, or a secondary minimum.
+
+Bodies take whatever way they find. What they have to climb is their potential: of the distance of
+their centres, of the gap of their outlines, or of both, which widen alike here, as in pulling
+straight.
+"""
+
+import math
+
+from flocsim.arrays import EQUIVALENT_RADIUS
+from flocsim.integrators.rhs.views import pair_view
+from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+
+BARRIER = 20.0
+"""Thermal energies k_B T that hold a pair: by Kramers' rate kicks take e^20 = 5e8 times as long to
+lift it out as bodies take to relax."""
+
+RUNG, LEAST_RUNG = 0.125, 1e-11
+"""A step of the climb over the gap where it is taken, and the shortest one [m]."""
+
+
+def repulsion_at(scene, time, a, b, distance, gap):
+    """What the pair forces push bodies a and b apart with [N] at rest, at a distance of the centres
+    and a gap of the outlines."""
+    force = 0.0
+    sizes = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    if has(scene, CENTRE_FORCE):
+        force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
+    if scene.surface_reach > gap:
+        force += surface_force(scene, pair_view(scene, time, a, b, gap, 0.0, distance))
+    return force
+
+
+def can_climb(scene, time, a, b, distance, gap, load, needed):
+    """Whether less than the energy ``needed`` [J] leads out of the pair's attraction, a load [N]
+    helping: its work over the way out, at the highest place of it."""
+    if not load < math.inf:
+        return True
+    sizes = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    centres = has(scene, CENTRE_FORCE)
+    climbed, way = 0.0, 0.0
+    end = 2.0 * sizes + max(-gap, sizes - distance, 0.0)
+    while way < end:
+        # Forces change over as much as is left of the gap that they go by.
+        rung = end
+        if centres:
+            rung = min(rung, RUNG * abs(distance + way - sizes))
+        if scene.surface_reach > 0.0:
+            rung = min(rung, RUNG * abs(gap + way))
+        rung = max(rung, LEAST_RUNG)
+        middle = way + 0.5 * rung
+        climbed -= (repulsion_at(scene, time, a, b, distance + middle, gap + middle) + load) * rung
+        if climbed > needed:
+            return False
+        way += rung
+    return True
