@@ -248,6 +248,8 @@ def main():
         raise SystemExit("the two files are of other size classes: give both the same")
     last = swarm.scales["time"][-1] - 1e-3 * args.proof
     times = swarm.scales["time"][swarm.scales["time"] <= last * (1.0 + 1e-9)]
+    if not np.isin(swarm.groups["bonds"]["bond_kind"], STAYS).any():
+        raise SystemExit("no pair aggregated in these swarms: give them more time, or more flocs")
     contacts = contacts_of(swarm.groups["bonds"])
     clusters, made, chances = meetings(contacts, flocs, times)
     left = clusters / flocs.radius.shape[1]
