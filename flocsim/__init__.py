@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
     from flocsim.integrators.base import Status
+    from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
     from flocsim.swarms.swarm import Swarm
     from flocsim.swarms.trajectory import SwarmTrajectory
@@ -48,6 +49,7 @@ HOMES = {
     "System": "system",
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.studies.compare",
+    "curvilinear_factor": "io.results.curvilinear",
     "floor": "swarms.walls",
     "open": "ensembles.studies.sweep:open_any",
     "sweep": "ensembles.studies.sweep",
@@ -79,6 +81,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "compare",
+    "curvilinear_factor",
     "floor",
     "open",
     "sweep",

@@ -1,6 +1,7 @@
 """`flocsim export`: motion in a format of another program, rates as tables for other models."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from flocsim.errors import UsageError
 from flocsim.io.exchange.gsd_file import write_gsd
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.results.curvilinear import CORRECTIONS
 from flocsim.io.results.file import read_results
 from flocsim.io.results.kernel_tables import (
     MODELS,
@@ -41,6 +43,9 @@ def add_parser(subparsers: Any) -> None:
     add("--model", choices=MODELS, default="spheres",
         help="of matrices of efficiencies: whose kernels they multiply (default: %(default)s); "
         "flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
+    add("--curvilinear", choices=tuple(CORRECTIONS),
+        help="of matrices of efficiencies: times this factor of solid spheres, for the water that "
+        "they push aside; not known for flocs (default: none, an upper bound)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -49,6 +54,10 @@ def run(args: argparse.Namespace) -> int:
     """Write the files and print their paths; returns the exit code."""
     if args.format == "matrix":
         return run_matrices(args)
+    if args.curvilinear is not None:
+        raise UsageError(
+            f"--curvilinear is for matrices, not {args.format}: export matrix, or leave it out"
+        )
     path = named(args)
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.source])
@@ -82,21 +91,32 @@ def kernel_in(path):
 
 
 def run_matrices(args):
-    """Write a matrix for each mechanism, that the model has, and N."""
+    """Write a matrix for each mechanism, that the model and the factor have, and N."""
     kernel, rule = kernel_in(args.source), data_rule(args.overwrite)
     start = Path(args.output or Path(args.source).stem)
     start = start.with_suffix("") if start.suffix.lower() == ".csv" else start
-    ending = args.model if args.what == "efficiency" else ""
-    texts = {}
+    ending = (args.model, args.curvilinear) if args.what == "efficiency" else ()
+    texts, without = {}, []
     for mechanism in kernel.mechanisms:
         if args.what == "efficiency" and args.model not in REFERENCES.get(mechanism, {}):
             continue
+        if args.curvilinear and mechanism not in CORRECTIONS[args.curvilinear].mechanisms:
+            without.append(mechanism)
+            continue
         for count in kernel.vertices.tolist():
-            parts = (mechanism, f"N{count}", args.what, ending)
+            parts = (mechanism, f"N{count}", args.what, *ending)
             name = f"{start.name}-{'-'.join(filter(None, parts))}.csv"
             texts[start.with_name(name)] = kernel_matrix(
-                kernel, mechanism, count, args.what, args.model
+                kernel, mechanism, count, args.what, args.model, args.curvilinear
             )
+    if without:
+        words = (
+            f"{args.curvilinear} has no curvilinear factor for {', '.join(without)}: export "
+            "without --curvilinear for the upper bound"
+        )
+        if not texts:
+            raise UsageError(words)
+        print(f"flocsim: {words}", file=sys.stderr)
     if not texts:
         raise UsageError(f"{args.model} has no kernel for {', '.join(kernel.mechanisms)}")
     check_outputs([Output(path, rule) for path in texts], [args.source])

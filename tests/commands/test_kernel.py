@@ -39,8 +39,31 @@ def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
         "kernel-settling-N1-efficiency-flocmod.csv", "kernel-shear-N1-efficiency-flocmod.csv",
     ]  # fmt: skip
     assert all((folder / name).stat().st_size > 200 for name in printed)
+    assert main(["export", "matrix", "kernel.h5", "--curvilinear", "burd"]) == 0
+    printed = capsys.readouterr().out.split()
+    assert printed == [
+        "kernel-settling-N1-efficiency-spheres-burd.csv",
+        "kernel-shear-N1-efficiency-spheres-burd.csv",
+    ]
+    assert "1 - (1 + 5p + 2.5p^2)/(1 + p)^5" in (folder / printed[1]).read_text("utf-8")
+    assert main(["export", "csv", "kernel.h5", "--curvilinear", "burd"]) == 2
+    assert "--curvilinear is for matrices, not csv" in capsys.readouterr().err
+    words = ["export", "matrix", "kernel.h5", "--what", "beta3", "--curvilinear", "burd"]
+    assert main(words) == 2
+    assert "not beta3: take efficiency" in capsys.readouterr().err
     kernel = flocsim.open("kernel.h5").kernel
     assert kernel.arrays["width_c"][0, 0, 0, 1] == pytest.approx(6e-5, abs=0.0)
+
+
+def test_a_mechanism_without_a_factor_is_named(folder, capsys):
+    text = kernel_text(**SHEAR | {"meeting": '["shear", "extension"]'})
+    (folder / "kernel.toml").write_text(text, "utf-8")
+    assert main(["kernel", "kernel.toml", "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["export", "matrix", "kernel.h5", "--curvilinear", "hill"]) == 0
+    told = capsys.readouterr()
+    assert told.out.split() == ["kernel-shear-N1-efficiency-spheres-hill.csv"]
+    assert told.err.count("\n") == 1 and "hill has no curvilinear factor for extension" in told.err
 
 
 def test_more_points_extend_a_study_as_if_run_at_once(folder):

@@ -12,7 +12,12 @@ from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library
 
 SWARM = ROOT / "examples" / "swarm.toml"
-EXAMPLES = sorted(path for path in (ROOT / "examples").glob("*.toml") if path != SWARM)
+SWARMS = {
+    SWARM: "2 swarms of 60 bodies",
+    SWARM.with_name("settling_swarm.toml"): "30 swarms of 400",
+}
+"""Path → how its dry run begins."""
+EXAMPLES = sorted(path for path in (ROOT / "examples").glob("*.toml") if path not in SWARMS)
 
 
 def test_there_are_examples():
@@ -24,7 +29,8 @@ def examples(tmp_path):
     """A copy of the folder, with a library of stars where the user's real flocs would be."""
     leave_out = shutil.ignore_patterns("*.h5")
     folder = shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=leave_out)
-    write_star_library(folder / "real_flocs_shapes.h5", vertices=(4, 16, 32, 64))
+    sizes = (7.0, 8.0, 9.0, 11.0, 13.0, 15.0, 16.0, 18.0, 24.0)
+    write_star_library(folder / "real_flocs_shapes.h5", (4, 16, 32, 64), sizes)
     return folder
 
 
@@ -43,7 +49,7 @@ REDUCED = {
 """Name → (text, its replacement) where that saves compiling a scene of its own for spheres, or many
 conditions."""
 
-LEAST = {"kernel": 8}
+LEAST = {"kernel": 8, "settling_kernel": 8}
 """Name → replicates, where there may not be two."""
 
 
@@ -64,11 +70,13 @@ def test_a_reduced_example_runs(path, examples):
     assert table["n_collided"].sum() > 0
 
 
-def test_the_swarm_describes_itself(examples):
-    check_swarm(load_any_config(examples / SWARM.name))
-    done = run_command(examples.parent, f"examples/{SWARM.name}", "--dry-run")
+@pytest.mark.parametrize("path", SWARMS, ids=lambda path: path.stem)
+def test_a_swarm_describes_itself(path, examples):
+    check_swarm(load_any_config(examples / path.name))
+    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "2 swarms of 60 bodies, N = 16" in done.stdout and "nothing was run" in done.stdout
+    assert SWARMS[path] in done.stdout and "N = 16" in done.stdout
+    assert "nothing was run" in done.stdout
 
 
 @pytest.mark.slow

@@ -1,20 +1,14 @@
 """The population balance of examples/: what it keeps, and a case that is known in closed form."""
 
-import importlib.util
-
 import numpy as np
 import pytest
 
-from tests.helpers.small_study import ROOT
+from tests.helpers.example_script import example_script
 
 
 @pytest.fixture(scope="module")
 def balance():
-    path = ROOT / "examples" / "population_balance.py"
-    spec = importlib.util.spec_from_file_location("population_balance", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return example_script("population_balance")
 
 
 def test_two_flocs_become_one_of_their_volume(balance):

@@ -9,6 +9,9 @@ kernels of two models:
   ROMS/COAWST and fm_flocmod): in shear the same, 1/6 G (D_i + D_j)³; in settling
   π/4 (D_i + D_j)² g/µ |Δρ_i D_i² − Δρ_j D_j²|, which lacks the 1/18 of Stokes's law and so is 18
   times the rectilinear one: what it is multiplied by is 1/18 of the above.
+
+All of these are rectilinear. On request an efficiency is handed over times the curvilinear factor
+of solid spheres (`curvilinear`), and the matrix says so.
 """
 
 import csv
@@ -18,6 +21,7 @@ import math
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.io.results.curvilinear import about_factor, curvilinear_factor
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, Kernel
 
 REFERENCES = {
@@ -82,15 +86,28 @@ def efficiency_for(kernel: Kernel, mechanism: str, vertices: int, model: str) ->
 
 def kernel_matrix(
     kernel: Kernel, mechanism: str, vertices: int, quantity: str = "efficiency",
-    model: str = "spheres",
+    model: str = "spheres", curvilinear: str | None = None,
 ) -> str:  # fmt: skip
     """A square matrix as CSV, radii [m] in its first row and column, behind lines that start with #
-    and say what it holds and what it multiplies."""
+    and say what it holds and what it multiplies. ``curvilinear``: the name of a factor that
+    efficiencies are multiplied by, element by element."""
     m, v = kernel.place_of(mechanism, vertices)
+    bound = ["without hydrodynamic interaction: an upper bound"]
+    if curvilinear is not None and quantity != "efficiency":
+        raise UsageError(
+            f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: take "
+            "efficiency, or leave it out"
+        )
     if quantity == "efficiency":
         values = efficiency_for(kernel, mechanism, vertices, model)
+        held = "efficiency"
+        if curvilinear is not None:
+            rows = kernel.radii[:, np.newaxis]
+            values = values * curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
+            held = "efficiency times curvilinear factor"
+            bound = about_factor(curvilinear, mechanism)
         what = [
-            f"efficiency in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
+            f"{held} in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
             "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
         ]
     elif quantity in ESTIMATES:
@@ -101,7 +118,7 @@ def kernel_matrix(
     lines = [
         *what,
         f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",
-        "without hydrodynamic interaction: an upper bound",
+        *bound,
     ]
     text = io.StringIO()
     text.writelines(f"# {line}\n" for line in lines)

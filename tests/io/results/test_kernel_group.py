@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim.errors import UsageError
+from flocsim.io.results.curvilinear import curvilinear_factor
 from flocsim.io.results.kernel_group import Kernel, check_kernel
 from flocsim.io.results.kernel_tables import efficiency_for, kernel_csv, kernel_matrix
 from tests.helpers.small_rates import some_kernel
@@ -60,6 +61,35 @@ def test_a_matrix_names_what_it_multiplies():
     assert [float(each) for each in rows[0][1:]] == [5e-6, 1e-5]
     values = np.array([[float(each) for each in row[1:]] for row in rows[1:]])
     assert np.array_equal(values, some_kernel().arrays["efficiency3"][1, 1])
+
+
+def numbers_of(text):
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return np.array([[float(each) for each in row[1:]] for row in csv.reader(lines[1:])])
+
+
+@pytest.mark.parametrize("mechanism", ["settling", "shear"])
+@pytest.mark.parametrize("model", ["spheres", "flocmod"])
+def test_a_matrix_has_the_factor_that_was_asked_for_and_says_so(mechanism, model):
+    kernel = some_kernel()
+    text = kernel_matrix(kernel, mechanism, 32, model=model, curvilinear="hill")
+    plain = efficiency_for(kernel, mechanism, 32, model)
+    factor = curvilinear_factor("hill", mechanism, kernel.radii[:, None], kernel.radii)
+    assert numbers_of(text) == pytest.approx(plain * factor, rel=1e-15, abs=0.0)
+    assert np.array_equal(numbers_of(text), numbers_of(text).T)
+    told = [line for line in text.splitlines() if line.startswith("#")]
+    assert told[0].startswith(f"# efficiency times curvilinear factor in {mechanism}: multiplies")
+    assert "upper bound" not in text and "Hill (1992)" in text
+    assert any("solid spheres" in line and "not known" in line for line in told)
+    assert "curvilinear" not in kernel_matrix(kernel, mechanism, 32, model=model)
+
+
+def test_a_factor_multiplies_efficiencies_alone():
+    kernel = some_kernel()
+    with pytest.raises(UsageError, match="multiplies the kernels of spheres, not alpha"):
+        kernel_matrix(kernel, "shear", 32, "alpha", curvilinear="hill")
+    with pytest.raises(UsageError, match="are those of hill, burd"):
+        kernel_matrix(kernel, "shear", 32, curvilinear="nobody")
 
 
 def test_flocmods_settling_kernel_lacks_an_eighteenth():
