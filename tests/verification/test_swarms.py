@@ -34,8 +34,11 @@ def test_momentum_of_a_settling_swarm_is_weight_less_drag():
     impulse[:, 1] -= weight * run.t
     assert len(run.neighbours().pairs) > 2
     # Contacts alone leave 1e-15. Corrections of the last Newton step that turn a cluster keep its
-    # momentum, and not its drag: they leave some 1e-12.
-    assert np.abs(changes - impulse).max() < 1e-11 * weight * run.t[-1]
+    # momentum, and not its drag: what they leave moves the centre by a hundred-thousandth of the
+    # tolerance at most.
+    tolerance = swarm.integrator.tolerance
+    assert np.abs(changes - impulse).max() < 1e-5 * tolerance * drag.sum()
+    assert np.abs(changes - impulse).max() < 1e-9 * weight * run.t[-1]
 
 
 def test_energy_never_grows_where_contacts_are_damped():
