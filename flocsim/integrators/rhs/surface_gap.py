@@ -117,9 +117,10 @@ def soften(scene, work, state, row, end):
         if work.candidates[each, NEAR] == 1:
             least = min(least, geometry[state, each, GAP])
     least = measure_of(scene, least)
+    reach = gap_of(scene, least + RANGE)
     for each in range(row, end):
         share = 0.0
-        if work.candidates[each, NEAR] == 1:
+        if work.candidates[each, NEAR] == 1 and geometry[state, each, GAP] <= reach:
             share = math.exp(least - measure_of(scene, geometry[state, each, GAP]))
         geometry[state, each, SHARE] = share
         total += share

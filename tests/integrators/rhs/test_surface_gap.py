@@ -108,6 +108,27 @@ def test_the_smooth_gap_and_its_force_are_close_to_those_of_the_least(force):
     assert 0.0 < worst <= LARGEST_BIAS == 0.03
 
 
+def test_what_is_flagged_far_off_has_no_share_and_changes_none():
+    """Every pair flagged, as before a long step: shares are those of the sum over all."""
+    far = 0
+    for pair, place in random_pairs(ATTRACTION, 10):
+        pair.loads(*place)
+        end = int(pair.work.tally[CANDIDATES])
+        pair.work.candidates[:end, NEAR] = 1
+        soft, _ = soften(pair.scene, pair.work, NOW, 0, end)
+        gaps, shares = pair.work.geometry[NOW, :end, GAP], pair.work.geometry[NOW, :end, SHARE]
+        measures = np.array([measure_of(pair.scene, gap) for gap in gaps])
+        parts = np.exp(measures.min() - measures)
+        own = np.array([length_at(pair.scene, gap) for gap in gaps])
+        expected = gap_of(pair.scene, measures.min() - math.log(parts.sum()))
+        assert soft == pytest.approx(expected, rel=1e-12, abs=1e-20)
+        parts *= length_at(pair.scene, expected) / (own * parts.sum())
+        assert shares == pytest.approx(parts, rel=1e-9, abs=1e-16)
+        assert not shares[measures > measures.min() + 41.0].any()
+        far += np.count_nonzero(measures > measures.min() + 41.0)
+    assert far > 10
+
+
 @FORCES
 def test_of_two_features_at_one_distance_both_count_in_full(force):
     """A box that lies level over a floor: g̃ is ℓ ln 2 below the gap of its two corners."""
