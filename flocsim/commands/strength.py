@@ -59,7 +59,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: Namespace) -> int:
     """Survey, write as it goes, and print; the exit code."""
     from flocsim.ensembles.strength.distribution import table_of
-    from flocsim.ensembles.strength.survey import survey
+    from flocsim.ensembles.strength.survey import OtherSurvey, survey
     from flocsim.ensembles.studies.opened import open_results
     from flocsim.io.plots.strength import over_rate
     from flocsim.io.plots.style import checked_format, save
@@ -87,9 +87,7 @@ def run(args: Namespace) -> int:
         except KeyboardInterrupt:
             tell(f"flocsim: stopped by {stop.name}: {file.words}", sys.stderr)
             return INTERRUPTED
-        except UsageError as error:
-            if known is None:
-                raise
+        except OtherSurvey as error:
             raise UsageError(
                 f"{output} cannot be gone on with: {error}; name another output, or add "
                 "--overwrite in the place of --resume"

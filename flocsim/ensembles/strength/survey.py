@@ -32,6 +32,10 @@ TESTING = ("ensembles/strength/opening.py",)
 without which no replicate is run again."""
 
 
+class OtherSurvey(UsageError):
+    """What is to be gone on with is of another study, flow, precision or flocsim."""
+
+
 class Bound(NamedTuple):
     """Where a bound doublet stands in a file: places of type, N and δ, the replicate, its bond."""
 
@@ -94,8 +98,8 @@ def survey(
     survey of the same has found, which is not tested again. ``tell`` takes a line about each;
     ``keep`` what has been tested so far, whenever a doublet is done ``every`` [s] or more after the
     last time, at the end, and where anything, such as a KeyboardInterrupt, ends it early.
-    UsageError where the file holds no bound doublet, where its replicates cannot be run again, or
-    where ``known`` is of something else.
+    UsageError where the file holds no bound doublet, and where its replicates cannot be run again;
+    OtherSurvey where ``known`` is of something else.
     """
     found = checked(results, flow, count, precision, jobs)
     chosen = set(chosen_of(found, count))
@@ -200,18 +204,18 @@ UNLIKE = {
 
 
 def taken_over(known: Strengths, about: dict[str, Any], found: list[Bound]) -> dict[Bound, Opening]:
-    """The Openings of an earlier survey; UsageError where it is not of the same."""
+    """The Openings of an earlier survey; OtherSurvey where it is not of the same."""
     for name, words in UNLIKE.items():
         if known.about.get(name) != about[name]:
             there = known.about.get(name, "unknown")
-            raise UsageError(words.format(there=there, here=about[name], study=about["study"]))
+            raise OtherSurvey(words.format(there=there, here=about[name], study=about["study"]))
     columns = [known.column(name).tolist() for name in Bound._fields]
     places = [Bound(*row) for row in zip(*columns, strict=True)]
     fields = [each.name for each in attrs.fields(Opening)]
     rows = zip(*(known.column(name).tolist() for name in fields), strict=True)
     openings = {each: Opening(*row) for each, row in zip(places, rows, strict=True)}
     if len(openings) < len(places) or not set(openings) <= set(found):
-        raise UsageError("it has doublets that the study does not have, or one of them twice")
+        raise OtherSurvey("it has doublets that the study does not have, or one of them twice")
     return openings
 
 
