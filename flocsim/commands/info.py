@@ -30,7 +30,7 @@ from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io import trajectory
 from flocsim.io.opening import kind_of
-from flocsim.io.results import swarm_file, sweep_file
+from flocsim.io.results import strength_file, swarm_file, sweep_file
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview, read_results
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import BONDS, Results
@@ -89,6 +89,8 @@ def text_of(path):
         return sweep_text(path)
     if kind == swarm_file.FORMAT:
         return swarm_text(path)
+    if kind == strength_file.FORMAT:
+        return strength_text(path)
     if kind != FORMAT and is_library(path):
         return library_text(path)
     return results_text(path, *read_overview(path))
@@ -235,6 +237,27 @@ def sweep_text(path):
                  for each in names]  # fmt: skip
         rows.append((*words, str(n), *told))
     return "\n".join([*lines, "", *aligned(rows)])
+
+
+def strength_text(path):
+    """What a file of `flocsim strength` holds, also while it is not complete."""
+    from flocsim.ensembles.strength.distribution import table_of
+
+    found = strength_file.read_strengths(path)
+    told = found.progress if found.complete else f"{found.progress} so far; go on with --resume"
+    statuses = Counter(found.column("status").tolist())
+    ends = [f"{count} {strength_file.STATUS[code].replace('_', ' ')}"
+            for code, count in sorted(statuses.items())]  # fmt: skip
+    used = Counter(found.column("tolerance").tolist())
+    needed = [f"{count} at {tolerance:g} m" for tolerance, count in sorted(used.items())]
+    facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
+    for name, value in found.about.items():
+        if name not in ("asked", "complete"):
+            facts.append((visible(name.replace("_", " "), ""), visible(str(value), "")))
+    width = max(len(name) for name, _ in facts)
+    lines = [f"{name:<{width}}  {value}" for name, value in facts]
+    kind = "strengths of bonds" + ("" if found.complete else ", unfinished")
+    return "\n".join([f"{path}: {kind}", "", *lines, "", table_of(found)])
 
 
 def unfinished_text(found):

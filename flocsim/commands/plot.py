@@ -156,7 +156,9 @@ def read_content(path):
     if kind == sweep_file.FORMAT:
         return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
     if kind == strength_file.FORMAT:
-        return strength_file.read_strengths(path), STRENGTH_FIGURES, ""
+        strengths = strength_file.read_strengths(path)
+        remark = "" if strengths.complete else f"unfinished: {strengths.progress}"
+        return strengths, STRENGTH_FIGURES, remark
     if kind == swarm_file.FORMAT:
         found = swarm_file.read_swarm(path)
         many = len(found.scales["class"]) > 1

@@ -1,7 +1,11 @@
 """`flocsim info` tells what a file holds."""
 
-from flocsim.commands.info import results_text
+import pytest
+
+from flocsim.commands.info import results_text, text_of
 from flocsim.io.results.file import read_overview, write_results
+from flocsim.io.results.strength_file import write_strengths
+from tests.helpers.small_rates import mixed
 from tests.helpers.synthetic_results import make_results
 
 
@@ -19,3 +23,17 @@ def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
     row = lines[-4].replace("[", "").replace("]", "").split()
     assert "hang" in heads
     assert f"{share:.3f}"[1:] in row
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
+    found = mixed(complete)
+    found.about["asked"] = 4 if complete else 9
+    write_strengths(tmp_path / "s.h5", found)
+    text = text_of(tmp_path / "s.h5")
+    assert ("unfinished" in text.splitlines()[0]) is not complete
+    told = "4 of 4 doublets" if complete else "4 of 9 doublets so far; go on with --resume"
+    assert f"tested     {told}\n" in text
+    assert "2 at 1e-11 m, 1 at 1e-10 m, 1 at 1e-09 m" in text
+    assert "1 opened, 1 opens at least rate, 1 holds at most rate, 1 failed" in text
+    assert text.splitlines()[-1].split()[:5] == ["III", "1", "0.5", "6", "4"]

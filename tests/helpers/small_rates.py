@@ -25,13 +25,14 @@ def some_kernel():
     )
 
 
-def mixed():
+def mixed(complete=True):
     """One doublet of each kind in one condition."""
     openings = [
-        Opening(1.0, 2.0, OPENED, 9), Opening(math.nan, 0.5, OPENS_AT_LEAST, 1),
-        Opening(64.0, math.nan, HOLDS, 21), Opening(4.0, math.nan, FAILED, 3),
+        Opening(1.0, 2.0, OPENED, 9, 1e-11), Opening(math.nan, 0.5, OPENS_AT_LEAST, 1, 1e-11),
+        Opening(64.0, math.nan, HOLDS, 21, 1e-10), Opening(4.0, math.nan, FAILED, 3, 1e-9),
     ]  # fmt: skip
     places = np.array([[1, 0, 1, k, 2] for k in range(4)])
     bound = np.zeros((2, 2, 2), dtype=np.int64)
     bound[1, 0, 1] = 6
-    return strengths_of(AXES, bound, places, openings, {"flow": "shear", "precision": 0.005})
+    about = {"flow": "shear", "precision": 0.005, "asked": 4, "complete": complete}
+    return strengths_of(AXES, bound, places, openings, about)

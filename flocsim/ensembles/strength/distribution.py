@@ -42,6 +42,7 @@ def strengths_of(
     columns |= {
         "holds": np.array([each.holds for each in openings]), "opens": opens, "status": status,
         "runs": np.array([each.runs for each in openings]),
+        "tolerance": np.array([each.tolerance for each in openings]),
     }  # fmt: skip
     shape = bound.shape
     counts = {name: np.zeros(shape, dtype=np.int64)

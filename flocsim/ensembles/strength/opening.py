@@ -43,8 +43,11 @@ LONGEST = 60.0
 LEAST, MOST = -12, 8
 """The ladder of rates: from 2^LEAST to 2^MOST times the rate that would open two spheres."""
 
-TOLERANCE = 1e-11
-"""[m] of the runs: far below the gap at which attraction gives way."""
+TRIES = ((1e-11, 2_000), (1e-10, 2_000), (1e-9, 8_000), (1e-8, 20_000))
+"""(tolerance [m], steps tried at most) of a run, and of those made in its place where it has not
+ended by then. The first is far below the gap at which attraction gives way, and most runs try a few
+hundred steps. Edges that slide over each other near the rate at which they open may bounce by
+1e-15 m, tens of thousands of times; coarser steps go over that (docs/strength.md)."""
 
 OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(4)
 """What was found: see io.results.strength_file.STATUS."""
@@ -54,13 +57,15 @@ OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(4)
 class Opening:
     """Between which rates a doublet opens: it ``holds`` at one and ``opens`` at the next [1/s].
 
-    NaN where there is none; ``status``: a code of STATUS; ``runs`` made.
+    NaN where there is none; ``status``: a code of STATUS; ``runs`` made, each at one rate, at
+    whatever tolerances; ``tolerance``: the largest [m] that one of them needed, NaN for unknown.
     """
 
     holds: float
     opens: float
     status: int
     runs: int
+    tolerance: float = math.nan
 
 
 def strongest(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
@@ -112,13 +117,16 @@ class Watch:
 class Doublet:
     """Two bodies as a run has left them bound, to be put into flows.
 
-    Weight and thermal motion are left out, and inertia is, too, unless ``integrator`` is another
-    method than Overdamped: what is tested is the bond, at both bodies' drag.
+    Weight and thermal motion are left out, and inertia is, too, unless the methods are others than
+    Overdamped: what is tested is the bond, at both bodies' drag. ``tries``: methods with the steps
+    that each may try; a run that has not ended by then is made again by the next.
     """
 
     start: Trajectory
     flow: str = "shear"
-    integrator: Integrator = attrs.field(factory=lambda: Overdamped(TOLERANCE))
+    tries: tuple[tuple[Integrator, int], ...] = tuple(
+        (Overdamped(tolerance), most_steps) for tolerance, most_steps in TRIES
+    )
     jit: bool = True
 
     @property
@@ -139,7 +147,20 @@ class Doublet:
         return found if found > 0.0 else 1.0
 
     def opens_at(self, rate: float) -> bool | None:
-        """Whether a flow of a rate [1/s] opens the doublet; None where the run fails."""
+        """Whether a flow of a rate [1/s] opens the doublet; None where every run fails."""
+        return self.answer(rate)[0]
+
+    def answer(self, rate: float) -> tuple[bool | None, float]:
+        """The same by the first of the tries that ends, and the tolerance [m] of the last made."""
+        found, tolerance = None, math.nan
+        for method, most_steps in self.tries:
+            found, tolerance = self.opened_by(method, most_steps, rate), float(method.tolerance)
+            if found is not None:
+                break
+        return found, tolerance
+
+    def opened_by(self, method: Integrator, most_steps: int, rate: float) -> bool | None:
+        """Whether the doublet opens in a run by one method; None where that does not end."""
         bodies, origin = self.bodies, self.start.known()
         places = self.start.position[-1, :, :2]
         gradient, before = FLOWS[self.flow]
@@ -149,13 +170,13 @@ class Doublet:
         matrix = rate * turning @ np.reshape(gradient, (2, 2)) @ turning.T
         velocity = -matrix @ places.mean(axis=0)
         fluid = attrs.evolve(origin.fluid, velocity=velocity, gradient=matrix.ravel())
-        system = System(bodies, self.forces, self.integrator, fluid)
+        system = System(bodies, self.forces, method, fluid)
         watch = Watch(bodies, turns=self.flow == "shear")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlausibilityWarning)
             run = system.run(
                 self.start.t[-1] + LONGEST / rate, start=self.start, watch=watch, record=False,
-                jit=self.jit,
+                jit=self.jit, max_steps=most_steps,
             )  # fmt: skip
         if run.status not in (Status.STOPPED, Status.FINISHED):
             return None
@@ -167,7 +188,15 @@ class Doublet:
 
         A doublet may hold again at higher rates: it is the first rung that counts.
         """
-        return first_opening(self.opens_at, self.rate_of_spheres(), precision)
+        used = []
+
+        def opens_at(rate: float) -> bool | None:
+            found, tolerance = self.answer(rate)
+            used.append(tolerance)
+            return found
+
+        found = first_opening(opens_at, self.rate_of_spheres(), precision)
+        return attrs.evolve(found, tolerance=max(used))
 
 
 def first_opening(

@@ -1,5 +1,6 @@
 """The figure of `flocsim strength`: what share of the bonds a flow has opened, over its rate."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +12,9 @@ from flocsim.io.results.strength_file import STATUS, Strengths
 
 OPENED = [STATUS.index(name) for name in ("opened", "opens_at_least_rate")]
 FAILED = STATUS.index("failed")
+
+WIDE = 5.0
+"""Rates that differ by so much have two labels or more at 1, 2 and 5 of a decade."""
 
 
 def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tuple:
@@ -42,11 +46,24 @@ def over_rate(found: Strengths) -> Figure:
             axes.set_xscale("log")
             note_if_empty(axes, np.array([1.0] if any_opened else [np.nan]), "no bond opened")
             axes.set_title(type_title(number, types[number]))
+        label_rates(panels[0])
         for axes in panels[::PANELS_PER_ROW]:
             axes.set_ylabel("share of bonds opened")
         words = [f"{n}" for n in vertices]
         add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "N")
         return figure
+
+
+def label_rates(axes: Any) -> None:
+    """Labels at 1, 2 and 5 of a decade, where there are enough of them: more would overlap."""
+    from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+
+    low, high = axes.get_xlim()
+    if high > WIDE * low:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        formatter = LogFormatterSciNotation(minor_thresholds=(math.inf, math.inf))
+        axes.xaxis.set_major_formatter(formatter)
+        axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 STRENGTH_FIGURES: dict[str, Callable[[Any], Figure]] = {"strength": over_rate}

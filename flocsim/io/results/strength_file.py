@@ -5,7 +5,9 @@ HDF5 with a checksum behind, groups with dimension scales:
 - ``doublets``    every doublet that was tested: where it stands in the study, and what was found
 - ``conditions``  how many of a condition were found bound, tested and opened, and quantiles
 
-The attribute ``about`` (JSON) has the flow, the precision, and where it came from.
+The attribute ``about`` (JSON) has the flow, the precision, where it came from, and whether all that
+was asked for has been tested: the file of a survey that still runs, or was stopped, holds what
+there is so far.
 """
 
 import io
@@ -26,7 +28,7 @@ from flocsim.io.results.groups import write_labelled
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
 FORMAT = "flocsim strength"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 ROOT = {"format": "text", "schema_version": "i8", "about": "text"}
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
@@ -42,7 +44,8 @@ DOUBLETS = {
     "holds": ("f8", "s-1", "highest rate below the first opening at which it held; NaN: none"),
     "opens": ("f8", "s-1", "first rate found at which it opens; NaN: none"),
     "status": ("u1", "1", "what was found"),
-    "runs": ("i8", "1", "runs made"),
+    "runs": ("i8", "1", "rates at which it was run"),
+    "tolerance": ("f8", "m", "largest tolerance that one of its runs needed; NaN: unknown"),
 }
 """Columns (doublet,): {name: (type, units, long name)}."""
 
@@ -73,6 +76,18 @@ class Strengths:
     about: dict[str, Any]
     doublets: Labelled
     conditions: Labelled
+
+    @property
+    def complete(self) -> bool:
+        """Whether all doublets that were asked for have been tested."""
+        return self.about.get("complete") is True
+
+    @property
+    def progress(self) -> str:
+        """How many have been, in words."""
+        asked = self.about.get("asked")
+        of = f" of {asked}" if isinstance(asked, int) else ""
+        return f"{len(self.column('status'))}{of} doublets"
 
     def column(self, name: str) -> np.ndarray:
         """A column of the doublets (k,)."""
