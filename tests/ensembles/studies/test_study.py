@@ -152,7 +152,8 @@ def test_scripts_get_no_words_of_the_command():
     assert "killed" in str(error_of(-9, []))
 
 
-def test_a_quiet_run_still_warns(tmp_path):
+def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     study = flocsim.Study(write_small(tmp_path)).with_(
         {"shapes.vertices": [1], "fluid.viscosity": "0.5 Pa s", "replicates": 1}
     )
