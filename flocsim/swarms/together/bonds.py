@@ -26,6 +26,7 @@ from flocsim.arrays import (
     CANDIDATES,
     EARLIER,
     GAP,
+    INERTIA,
     LATER,
     NOW,
     PAIRS,
@@ -222,7 +223,8 @@ class BondGauge:
             with np.errstate(divide="ignore"):
                 pull = np.where(pries, pull * extent / lever, pull)
         ways = pulls[:, [DISTANCE, APART]]
-        certified = kicked.certified(time, motion, pairs, ways, pull, pulls[:, SPRINGS])
+        energy = pulls[:, SPRINGS] + self.moving(motion, pairs)
+        certified = kicked.certified(time, pairs, ways, pull, energy)
         attracted = (pulls[:, CENTRES] != 0.0) | (pulls[:, SURFACES] != 0.0)
         return certified & attracted, kicked.resting(time, pairs, ways, load)
 
@@ -273,6 +275,14 @@ class BondGauge:
     def effective_masses(self, pairs: np.ndarray) -> np.ndarray:
         mass = np.array([body.mass for body in self.bodies])[pairs]
         return mass.prod(axis=1) / mass.sum(axis=1)
+
+    def moving(self, motion: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """The energy [J] of two bodies' motion against each other, and of their spins."""
+        a, b = pairs.T
+        against = motion[a][:, [VX, VY]] - motion[b][:, [VX, VY]]
+        turning = 0.5 * self.scene.bodies[:, INERTIA] * motion[:, SPIN] ** 2
+        reduced = self.effective_masses(pairs)
+        return 0.5 * reduced * (against**2).sum(axis=1) + turning[a] + turning[b]
 
     def sizes(self, pairs: np.ndarray) -> np.ndarray:
         """The smaller bounding radius of every pair [m]."""

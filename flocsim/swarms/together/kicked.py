@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import INERTIA, MASS, RADIUS, SPIN, VX, VY
+from flocsim.arrays import RADIUS
 from flocsim.compiler.composer import compose
 from flocsim.integrators.rhs.climb import BARRIER, can_climb
 from flocsim.laws import compiled_calls
@@ -49,14 +49,12 @@ class KickedBonds:
         return held
 
     def certified(
-        self, time: float, motion: np.ndarray, pairs: np.ndarray, ways: np.ndarray,
-        loads: np.ndarray, springs: np.ndarray,
+        self, time: float, pairs: np.ndarray, ways: np.ndarray, loads: np.ndarray,
+        energy: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
-        """Which pairs not even the energy that they have, of ``motion`` (n, 6) and ``springs`` (m,)
-        [J], and the barrier lead out of their attraction."""
-        return self.held(
-            time, pairs, ways, loads, self.barrier + springs + self.moving(motion, pairs)
-        )
+        """Which pairs not even the ``energy`` that they have (m,) [J] and the barrier lead out of
+        their attraction."""
+        return self.held(time, pairs, ways, loads, self.barrier + energy)
 
     def resting(
         self, time: float, pairs: np.ndarray, ways: np.ndarray, loads: np.ndarray
@@ -65,12 +63,3 @@ class KickedBonds:
         if self.spheres:
             return self.held(time, pairs, ways, loads, np.full(len(pairs), self.barrier))
         return loads * self.scene.bodies[pairs, RADIUS].min(axis=1) >= self.barrier
-
-    def moving(self, motion: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        """The energy [J] of two bodies' motion against each other, and of their spins."""
-        a, b = pairs.T
-        mass, inertia = self.scene.bodies[pairs, MASS].T, self.scene.bodies[:, INERTIA]
-        against = motion[a][:, [VX, VY]] - motion[b][:, [VX, VY]]
-        turning = 0.5 * inertia * motion[:, SPIN] ** 2
-        reduced = mass[0] * mass[1] / (mass[0] + mass[1])
-        return 0.5 * reduced * (against**2).sum(axis=1) + turning[a] + turning[b]
