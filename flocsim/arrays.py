@@ -49,9 +49,17 @@ change of the start [N, N, N m], in the columns of velocities."""
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
-SLIP_OFFSET, KEPT_SLIP, KEPT_OFFSET, SLIP_ROWS = range(2 * STATES, 2 * STATES + 4)
+(
+    SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
+    HELD,
+    KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, SLIP_ROWS,
+) = range(2 * STATES, 2 * STATES + 13)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
-along the tangent; displacements and such offsets that are set aside while the list is made anew."""
+along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
+begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
+held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
+that was next to nothing, and 1 where it stays closed though it is apart (integrators.events.grazes).
+Displacements, offsets, forces and gaps that are set aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
@@ -83,9 +91,13 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     CANDIDATE_COLUMNS,
 ) = range(10)  # fmt: skip
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
-point of the edge; 1 where the pair is closed in this step, 1 where it may have a share of a surface
-force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of the two
-bodies in ``Work.pairs``."""
+point of the edge; how the pair touches in this step, see OPEN; 1 where it may have a share of a
+surface force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of
+the two bodies in ``Work.pairs``."""
+
+OPEN, TOUCHES, GRAZES = range(3)
+"""What ``CLOSED`` says: the pair is apart; it touches, with the whole contact law; it grazes, borne
+by a share of it (flocsim.integrators.rhs.grazing)."""
 
 LATER, EARLIER, ACTING, PAIR_COLUMNS = range(4)
 """Columns of ``Work.pairs``: two bodies, the later one first; 1 where they act on each other in
@@ -100,18 +112,21 @@ this step."""
     EDGE_ARM_N,
     EDGE_ARM_T,
     TURNING,
+    FOOT,
+    SIDE,
     SHARE,
     GEOMETRY_COLUMNS,
-) = range(10)
+) = range(12)
 """Columns of ``Work.geometry``: unit normal from the foot on the edge to the vertex; gap [m]; arms
 [m], which are the moments of unit forces along n and t, applied at the middle of the overlap, about
 the centroid of the vertex's body and about that of the edge's; the angle by which the normal turns
-for every metre of the vertex along t [1/m]; the share of a surface force that
-acts through it.  See flocsim.geometry.contact.points."""
+for every metre of the vertex along t [1/m]; how far along the edge the foot
+lies [m], and ±1 where t goes along the edge or against it; the share of a surface force that acts
+through it.  See flocsim.geometry.contact.points."""
 
-KEPT_LATER, KEPT_EARLIER, KEPT_VERTEX, KEPT_EDGE, KEPT_COLUMNS = range(5)
+KEPT_LATER, KEPT_EARLIER, KEPT_VERTEX, KEPT_EDGE, KEPT_MODE, KEPT_COLUMNS = range(6)
 """Columns of ``Work.kept``: the two bodies, the later one first; core point of the vertex, first
-core point of the edge."""
+core point of the edge; how the pair touched."""
 
 DAMPING, STIFFNESS = range(2)
 """Matrices in ``Work.jacobian``: minus the derivatives of the forces by velocity and by place."""
@@ -282,7 +297,7 @@ class Work(NamedTuple):
     ``motion`` (14, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION,
     CARRIED, FORCING.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (21, capacity): tangential displacements in the states, their rates there, then see
+    ``slip`` (30, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
     ``bodies`` (n, 41): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
@@ -290,8 +305,8 @@ class Work(NamedTuple):
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.
     ``system`` (2, 3 n, 3 n), complex: few bodies' factorised systems, and ``pivots`` (2, 3 n),
     which rows have changed places; ``elimination``: those of many.
-    ``candidates`` (capacity, 9): see VERTEX_BODY.  ``geometry`` (9, capacity, 9): see NORMAL_X.
-    ``kept`` (capacity, 4): the pairs whose displacements are set aside.
+    ``candidates`` (capacity, 9): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
+    ``kept`` (capacity, 5): the pairs whose displacements are set aside.
     ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
     (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),
     ``order`` (n,) and ``starts`` (n + 1,): what the sweep for them works on.

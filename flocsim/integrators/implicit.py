@@ -23,10 +23,13 @@ from flocsim.fields import quantity
 from flocsim.hooks import end_within, skin_factor
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
+from flocsim.integrators.events.grazes import leave_early, settle
+from flocsim.integrators.events.modes import leave_at_once, settle_grazes
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
 from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.grazing import any_grazes, hold_gaps, release_gaps
 from flocsim.integrators.radau.overlap_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve_for_free
@@ -91,7 +94,7 @@ def is_tried_again(scene, clock):
 
 def wide_skin():
     """Few long steps: longer lists, which last longer."""
-    return 4.0
+    return 8.0
 
 
 @attrs.frozen
@@ -114,10 +117,20 @@ class Implicit(Integrator):
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where Newton's method fails."""
         time = clock[TIME]
-        if not is_tried_again(scene, clock):
+        remaining = max(end_of_run(clock) - time, step)
+        grazes = any_grazes(work)
+        if grazes:
+            release_gaps(work)
+        if grazes or not is_tried_again(scene, clock):
             evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
             gather_clusters(scene, work)
-            assemble_jacobian(scene, work, time, max(end_of_run(clock) - time, step))
+            assemble_jacobian(scene, work, time, remaining)
+        if grazes:
+            if not factorise_systems(scene, work, step):
+                return -1.0
+            if hold_gaps(scene, work):
+                evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
+            assemble_jacobian(scene, work, time, remaining)
         if not factorise_systems(scene, work, step):
             return -1.0
         if not solve_stages(scene, work, clock, step):
@@ -140,6 +153,8 @@ class Implicit(Integrator):
         return {
             interpolate: collocate,
             end_within: end_on_the_cubic,
+            settle_grazes: settle,
+            leave_at_once: leave_early,
             skin_factor: wide_skin,
             carry_vector: carry_error,
             overlap_error: step_overlap_error,

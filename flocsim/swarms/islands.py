@@ -22,13 +22,16 @@ from flocsim.arrays import (
     KEPT,
     KEPT_EARLIER,
     KEPT_EDGE,
+    KEPT_GAP,
     KEPT_LATER,
+    KEPT_MODE,
     KEPT_OFFSET,
     KEPT_SLIP,
     KEPT_VERTEX,
     MOTION_COLUMNS,
     MOTION_ROWS,
     NOW,
+    OPEN,
     PAIRS,
     REJECTED,
     STATES,
@@ -166,6 +169,8 @@ def put_slips(swarm, scene, work, members, first):
             work.kept[count, KEPT_EDGE] = local_point(
                 swarm, scene, members, first, size, swarm.links[link, AT_EDGE], body, other
             )
+            work.kept[count, KEPT_MODE] = OPEN
+            work.slip[KEPT_GAP, count] = 0.0
             work.slip[KEPT_SLIP, count] = swarm.slips[link, SLIP]
             work.slip[KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
             count += 1

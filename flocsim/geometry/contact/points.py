@@ -21,12 +21,15 @@ from flocsim.arrays import (
     EDGE_BODY,
     EDGE_END,
     EDGE_START,
+    FOOT,
     GAP,
+    GAP_OFFSET,
     NEAR,
     NORMAL_X,
     NORMAL_Y,
     NOW,
     RADIUS,
+    SIDE,
     SINE,
     TURNING,
     VERTEX,
@@ -67,17 +70,19 @@ def turned(scene, work, body, point):
     return c * x - s * y, s * x + c * y
 
 
-def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning):
+def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side):
     """Write one geometry row from the normal and the two arms of the contact point."""
     geometry = work.geometry
     geometry[state, row, NORMAL_X] = nx
     geometry[state, row, NORMAL_Y] = ny
-    geometry[state, row, GAP] = gap
+    geometry[state, row, GAP] = gap - work.slip[GAP_OFFSET, row]
     geometry[state, row, VERTEX_ARM_N] = ax * ny - ay * nx
     geometry[state, row, VERTEX_ARM_T] = ax * nx + ay * ny
     geometry[state, row, EDGE_ARM_N] = bx * ny - by * nx
     geometry[state, row, EDGE_ARM_T] = bx * nx + by * ny
     geometry[state, row, TURNING] = turning
+    geometry[state, row, FOOT] = foot
+    geometry[state, row, SIDE] = side
 
 
 @hook
@@ -115,7 +120,9 @@ def locate_polygons(scene, work, state, row):
     by = fy + middle * ny
     gap = distance - radius_a - radius_b
     turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
-    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning)
+    foot = share * length_of(ex - sx, ey - sy)
+    side = 1.0 if (ey - sy) * nx - (ex - sx) * ny >= 0.0 else -1.0
+    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, foot, side)
 
 
 def locate_spheres(scene, work, state, row):
@@ -131,7 +138,7 @@ def locate_spheres(scene, work, state, row):
     gap = distance - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
     bx, by = middle * nx, middle * ny
     turning = 1.0 / max(distance, TINY)
-    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning)
+    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
 
 
 def locate_contacts(scene, work, state):

@@ -12,11 +12,21 @@ from flocsim.arrays import (
     EDGE_BODY,
     EDGE_END,
     EDGE_START,
+    FLIGHT,
+    FLIGHTS,
+    FRESH,
     GAP,
+    GAP_OFFSET,
+    GRAZES,
+    GRAZING_FORCE,
+    HELD,
     KEPT,
     KEPT_EARLIER,
     KEPT_EDGE,
+    KEPT_FORCE,
+    KEPT_GAP,
     KEPT_LATER,
+    KEPT_MODE,
     KEPT_OFFSET,
     KEPT_SLIP,
     KEPT_VERTEX,
@@ -27,6 +37,7 @@ from flocsim.arrays import (
     RADIUS,
     SLIDING,
     SLIP_OFFSET,
+    TOUCHES,
     VERTEX,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
@@ -36,9 +47,13 @@ from flocsim.arrays import (
 )
 from flocsim.hooks import hook
 
+STAYS = 3
+"""KEPT_MODE of a pair that is HELD."""
+
 
 def keep_slips(work):
-    """Set aside the tangential displacements of the listed pairs; how many there are.
+    """Set aside the tangential displacements, and the grazing, of the listed pairs; how many there
+    are.
 
     Those that an earlier attempt has set aside, whose list found no room, are still the ones.
     """
@@ -46,12 +61,18 @@ def keep_slips(work):
         return work.tally[KEPT] - 1
     count = 0
     for row in range(work.tally[CANDIDATES]):
-        if work.slip[NOW, row] != 0.0:
+        mode = work.candidates[row, CLOSED]
+        if work.slip[HELD, row] != 0.0:
+            mode = STAYS
+        if work.slip[NOW, row] != 0.0 or mode == GRAZES:
             a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
             work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = max(a, b), min(a, b)
             work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
             work.kept[count, KEPT_EDGE] = work.candidates[row, EDGE_START]
+            work.kept[count, KEPT_MODE] = mode
             work.slip[KEPT_SLIP, count] = work.slip[NOW, row]
+            work.slip[KEPT_FORCE, count] = work.slip[GRAZING_FORCE, row]
+            work.slip[KEPT_GAP, count] = work.slip[GAP_OFFSET, row]
             work.slip[KEPT_OFFSET, count] = work.slip[SLIP_OFFSET, row]
             count += 1
     work.tally[KEPT] = count + 1
@@ -70,7 +91,8 @@ def restore_slips(work, count):
     their bodies."""
     first = 0
     for row in range(work.tally[CANDIDATES]):
-        work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = 0.0
+        work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = work.slip[GAP_OFFSET, row] = 0.0
+        work.slip[FLIGHT, row] = work.slip[FLIGHTS, row] = work.slip[HELD, row] = 0.0
         a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
         later, earlier = max(a, b), min(a, b)
         while first < count and comes_before(work, first, later, earlier):
@@ -82,6 +104,14 @@ def restore_slips(work, count):
             if same and work.kept[k, KEPT_EDGE] == work.candidates[row, EDGE_START]:
                 work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
                 work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
+                work.slip[GAP_OFFSET, row] = work.slip[KEPT_GAP, k]
+                if work.kept[k, KEPT_MODE] == STAYS:
+                    work.candidates[row, CLOSED] = TOUCHES
+                    work.slip[HELD, row] = 1.0
+                if work.kept[k, KEPT_MODE] == GRAZES:
+                    work.candidates[row, CLOSED] = GRAZES
+                    work.slip[GRAZING_FORCE, row] = work.slip[KEPT_FORCE, k]
+                    work.slip[FRESH, row] = 0.0
     work.tally[KEPT] = 0
 
 
@@ -159,7 +189,8 @@ def hand_over(scene, work):
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[CANDIDATES]):
-        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0:
+        stays = work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
+        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0 and not stays:
             heir = heir_of(scene, work, row)
             if heir >= 0:
                 own, given = work.slip[NOW, heir], work.slip[NOW, row]
@@ -187,7 +218,7 @@ def forget_offsets(work):
     """Of pairs that are open, or slide, no displacement knows of the error that there is already:
     ξ counts from where they will stick."""
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 0 or work.candidates[row, SLIDING] != 0:
+        if work.candidates[row, CLOSED] != TOUCHES or work.candidates[row, SLIDING] != 0:
             work.slip[SLIP_OFFSET, row] = -slip_error(work, row)
 
 

@@ -3,10 +3,15 @@
 The motion in the step is interpolated; the integrator then takes a shorter step that ends there.
 """
 
+import math
+
 from flocsim.arrays import (
     CANDIDATES,
+    CLOSED,
     EDGE_BODY,
     GAP,
+    GRAZES,
+    HELD,
     NEW,
     NOW,
     TRIAL,
@@ -41,16 +46,25 @@ def interpolate(work, step, share, body):
         motion[TRIAL, body, VELOCITY + axis] = slope / step
 
 
+def stays(work, row):
+    """Whether no step ends where a pair touches or parts: it grazes, or is held."""
+    return work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
+
+
 def margin(work, state, row):
     """What must not become negative while the flags hold [m]: the gap of a pair that is open now,
-    the overlap of a closed one."""
+    the overlap of a closed one; nothing of one that grazes or is held."""
     gap = work.geometry[state, row, GAP]
+    if stays(work, row):
+        return math.inf
     return -gap if work.geometry[NOW, row, GAP] < 0.0 else gap
 
 
 def margin_rate(work, state, row):
     """Rate of change of the margin [m/s]."""
     rate = normal_rate(work, state, row)
+    if stays(work, row):
+        return 0.0
     return -rate if work.geometry[NOW, row, GAP] < 0.0 else rate
 
 

@@ -12,6 +12,7 @@ from flocsim.arrays import CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import NEVER, first_switch
+from flocsim.integrators.events.grazes import grazing_share
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
 from flocsim.integrators.rhs.friction import beyond
@@ -94,7 +95,7 @@ def friction_share(scene, work, share, step, resolution):
 def law_share(scene, work, clock, step):
     """The share of the step at which the first closed contact passes a kink of its law, or begins
     or ends to slide; above 1 where none does. Expects the geometry of all pairs in NEW."""
-    share = law_event_share(scene, work, NEVER)
+    share = grazing_share(scene, work, clock, step, law_event_share(scene, work, NEVER))
     if has(scene, SLIP_LIMIT):
         resolution, _ = resolutions_of(work, clock)
         share = friction_share(scene, work, share, step, resolution)

@@ -4,7 +4,9 @@ Inside a step the flags stay as they are, so that the forces are smooth function
 driver ends the step where a flag would change (see crossings.py).
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, NOW
+from flocsim.arrays import CANDIDATES, CLOSED, GAP, NOW, OPEN, TOUCHES
+from flocsim.hooks import hook
+from flocsim.integrators.events.crossings import stays
 from flocsim.integrators.rhs.friction import set_sliding
 
 SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
@@ -13,13 +15,30 @@ which pairs touch."""
 
 
 def set_closed(work, state=NOW):
-    """Flag every listed pair by its gap in a state; whether any has changed."""
+    """Flag every listed pair by its gap in a state, but for those that graze or
+    are held; whether any has
+    changed."""
     changed = False
     for row in range(work.tally[CANDIDATES]):
-        closed = 1 if work.geometry[state, row, GAP] < 0.0 else 0
+        if stays(work, row):
+            continue
+        closed = TOUCHES if work.geometry[state, row, GAP] < 0.0 else OPEN
         changed = changed or work.candidates[row, CLOSED] != closed
         work.candidates[row, CLOSED] = closed
     return changed
+
+
+@hook
+def leave_at_once(scene, work, clock, step):
+    """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
+    return False
+
+
+@hook
+def settle_grazes(scene, work, clock, step):
+    """Let pairs begin and cease to graze, or to be held, behind a step, where a method has that;
+    whether any has."""
+    return False
 
 
 def set_modes(scene, work):

@@ -20,24 +20,40 @@ from flocsim.arrays import (
     RECORD_TIME,
     RECORDED,
     REJECTED,
+    STEP,
     STEPS,
     STILL,
     TIME,
     TOLERANCE,
+    TOUCHES,
     UNTIL,
 )
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts, row_radii
+from flocsim.geometry.contact.rolling import rolled
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
 from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
-from flocsim.integrators.events.modes import SAME, set_modes
+from flocsim.integrators.events.modes import (
+    OTHER_FRICTION,
+    SAME,
+    leave_at_once,
+    set_modes,
+    settle_grazes,
+)
 from flocsim.integrators.loop.kicks import meet_kick, renew_kicks
-from flocsim.integrators.loop.step_size import choose_step, moves, plan, reject, room_for_time
-from flocsim.integrators.rhs.friction import hold_slides
+from flocsim.integrators.loop.step_size import (
+    choose_step,
+    moves,
+    plan,
+    reject,
+    room_for_time,
+    shortest_needed,
+)
+from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
@@ -89,8 +105,10 @@ def accept(scene, work, clock, counts, step, lists):
         _, depth = resolutions_of(work, clock)
         add_switch_errors(scene, work, clock, step, depth)
         forget_offsets(work)
+    grazes = clock[TOLERANCE] < math.inf and settle_grazes(scene, work, clock, step)
     hand_over(scene, work)
-    return set_modes(scene, work)
+    switched = set_modes(scene, work)
+    return OTHER_FRICTION if grazes and switched == SAME else switched
 
 
 def stands_still(clock, counts, step):
@@ -138,6 +156,14 @@ def went_too_far(scene, work, clock):
     return scene.surface_reach > 0.0 and clock[TOLERANCE] < math.inf and overlooked(scene, work)
 
 
+def roll_slips(scene, work):
+    """Tangential displacements of the closed pairs in NEW, which is located."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == TOUCHES:
+            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row)
+            work.slip[NEW, row] = slip_in(scene, work, NEW, row, stuck)
+
+
 def ends_early(scene, work, clock, step, ratio, share):
     """End a step at a share of it, where a pair touches or parts; False where it has to be taken
     anew: its motion is not known well enough in between, or a law has a kink in it as well."""
@@ -146,7 +172,7 @@ def ends_early(scene, work, clock, step, ratio, share):
     if not end_within(scene, work, step, ratio, share):
         return False
     locate_contacts(scene, work, NEW)
-    hold_slides(scene, work, NEW)
+    roll_slips(scene, work)
     # A long step may have run through a body: what came first is seen from a nearer end alone.
     resolution, depth = resolutions_of(work, clock)
     return not may_switch(scene, work, share * step, resolution, depth)
@@ -191,6 +217,10 @@ def advance(scene, work, observed, clock, counts, record):
             if not reject(clock, counts, step, ratio, too_far):
                 return STALLED
             continue
+        if lists and trials < MOST_TRIALS and leave_at_once(scene, work, clock, step):
+            counts[LOCATED] += 1
+            trials += 1
+            continue
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
@@ -201,6 +231,8 @@ def advance(scene, work, observed, clock, counts, record):
             step *= share
         switched = accept(scene, work, clock, counts, step, lists)
         plan(clock, step, ratio, trials > 0, switched)
+        if switched != SAME:
+            clock[STEP] = max(clock[STEP], shortest_needed(scene, work))
         limit, trials = math.inf, 0
         status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:

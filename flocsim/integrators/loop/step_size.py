@@ -5,6 +5,7 @@ import math
 from flocsim.arrays import (
     BEARABLE_STEP,
     CANDIDATES,
+    FREE,
     GAP,
     LARGEST_STEP,
     NOW,
@@ -17,6 +18,7 @@ from flocsim.arrays import (
     SETTLING,
     STAGED_STEP,
     STEP,
+    STIFFNESS,
     TIME,
     TOLERANCE,
     UNTIL,
@@ -27,7 +29,7 @@ from flocsim.integrators.events.first_event import resolutions_of
 from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
-from flocsim.integrators.rhs.views import normal_rate
+from flocsim.integrators.rhs.views import inertia, normal_rate
 
 SAFETY = 0.9
 """Aim that far below the step at which the error would meet the tolerance."""
@@ -76,6 +78,12 @@ SMALLEST_STEP = 1e-14
 LEAST_ADVANCE = 2.3e-16
 """A step of this share of the time takes it to another number at least: what switches within that
 switches together."""
+
+RESOLVED = 0.02
+"""A step of this share of 1/ω0 resolves a vibration."""
+
+TINY = 1e-300
+"""Stands for no inertia."""
 
 IMMINENT = 0.05
 """A switch within this share of the step is run up to by a step of its own."""
@@ -144,6 +152,17 @@ def reject(clock, counts, step, ratio, too_far):
     if ratio < 0.0:
         clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
     return moves(clock, step)
+
+
+def shortest_needed(scene, work):
+    """The step behind a switch that resolves the fastest vibration there is; 0 without any [s]."""
+    stiffest = 0.0
+    for body in range(work.bodies.shape[0]):
+        if scene.bodies[body, FREE] == 1.0:
+            for axis in range(3):
+                mass = max(inertia(scene, body, axis), TINY)
+                stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
+    return RESOLVED / math.sqrt(stiffest) if stiffest > 0.0 else 0.0
 
 
 def plan(clock, step, ratio, was_cut, switched):

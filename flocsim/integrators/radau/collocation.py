@@ -22,6 +22,7 @@ from flocsim.arrays import (
     TRIAL,
     VELOCITY,
 )
+from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.views import inertia
 
@@ -107,17 +108,11 @@ def end_on_the_cubic(scene, work, step, ratio, share):
     estimated: only a step that is well within what is allowed may end so. Nor may a stiff one: only
     at the stages is a stiff force at rest, and contacts would hum.
     """
-    if ratio > GOOD_CUBIC or stiffness_of(scene, work, step) > STIFF:
+    if ratio > GOOD_CUBIC or any_grazes(work) or stiffness_of(scene, work, step) > STIFF:
         return False
-    weights, slip = stage_weights(share), work.slip
+    weights = stage_weights(share)
     for body in range(work.motion.shape[1]):
         write_cubic(work, weights, NEW, body)
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
-            slip[NEW, row] = cubic(
-                weights, slip[NOW, row], slip[FIRST_STAGE, row], slip[SECOND_STAGE, row],
-                slip[THIRD_STAGE, row],
-            )  # fmt: skip
     return True
 
 

@@ -34,6 +34,7 @@ from flocsim.arrays import (
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    OPEN,
     PAIR,
     PAIRS,
     SHARE,
@@ -61,7 +62,7 @@ def acts(work, row):
 
 def leads(work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
-    return work.candidates[row, CLOSED] == 1 or (
+    return work.candidates[row, CLOSED] != OPEN or (
         work.candidates[row, NEAR] == 1 and work.geometry[NOW, row, SHARE] > LEADING_SHARE
     )
 

@@ -12,24 +12,29 @@ from flocsim.arrays import (
     CHANGE,
     CLOSED,
     FIRST_STAGE,
+    GRAZES,
+    GRAZING_RESISTANCE,
     MEMORY,
     NOW,
     PACE,
     SEEN_PACE,
     SEEN_STEP,
-    SLIP_RATES,
     SOLVES,
     TIME,
+    TOUCHES,
     VELOCITY,
 )
+from flocsim.geometry.contact.rolling import rolled
+from flocsim.integrators.events.resolution import memory_of
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
-from flocsim.integrators.rhs.forces import locate_and_rate, rate_slips, sum_forces, take_stage
+from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_stage
 from flocsim.integrators.rhs.friction import slip_in
-from flocsim.integrators.rhs.views import lever
+from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
+from flocsim.integrators.rhs.views import along_normal, lever
 
 MOST_ITERATIONS = 10
 """Newton steps before a step is given up and made smaller."""
@@ -43,6 +48,13 @@ NEWTON_SHARE = 1e-3
 DOUBTED_PACE = 10.0
 """The second iteration is expected to shrink the first one's change by so many times less than it
 did when it was last made, its pace going with the square of the step, …"""
+
+GRAZING_SHARE, LEAST_EFFECT = 0.02, 0.1
+"""Forces of pairs that graze are found to this share of themselves, or until what they move is this
+share of what places are found to."""
+
+TINY = 1e-300
+"""Keeps a quotient finite."""
 
 LEAST_PACE = 1e-3
 """… and to this share at least: what it is not needed for changes places by no more than the
@@ -61,33 +73,41 @@ def place_stages(work, step):
                 motion[FIRST_STAGE + stage, body, axis] = motion[NOW, body, axis] + step * mean
 
 
-def slip_stages(scene, work, step):
-    slip = work.slip
+def slip_stage(scene, work, stage):
+    """Tangential displacements of the closed pairs in a stage, which is located."""
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
-            for stage in range(3):
-                first, second, third = MATRIX[stage]
-                mean = first * slip[SLIP_RATES + FIRST_STAGE, row]
-                mean += second * slip[SLIP_RATES + SECOND_STAGE, row]
-                mean += third * slip[SLIP_RATES + THIRD_STAGE, row]
-                stuck = slip[NOW, row] + step * mean
-                slip[FIRST_STAGE + stage, row] = slip_in(
-                    scene, work, FIRST_STAGE + stage, row, stuck
-                )
+        if work.candidates[row, CLOSED] == TOUCHES:
+            stuck = work.slip[NOW, row] + rolled(scene, work, stage, row)
+            work.slip[stage, row] = slip_in(scene, work, stage, row, stuck)
 
 
 def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
-        locate_and_rate(scene, work, state)
-    if first == FIRST_STAGE:
-        slip_stages(scene, work, step)
-    for state in range(first, last):
+        locate_touching(scene, work, state)
+        if state != NOW:
+            slip_stage(scene, work, state)
         node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
 
 
-def correct_stages(scene, work, step):
+def change_of_grazes(scene, work, step, stage, goal):
+    """What the changes of a stage's velocities alter in the forces of pairs that graze, over what
+    may be wrong of them, in terms of the goal for places [m]."""
+    largest = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES:
+            resistance, memory = work.slip[GRAZING_RESISTANCE, row], memory_of(work, row)
+            change = abs(resistance * along_normal(work, row, CHANGE, VELOCITY))
+            force = abs(grazing_force(work, FIRST_STAGE + stage, row))
+            # A force that moves nothing by more than a share of the goal does not count.
+            lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
+            allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
+            largest = max(largest, goal * change / allowed)
+    return largest
+
+
+def correct_stages(scene, work, step, goal):
     """Add the solutions to the stages' velocities; the largest change it makes in place [m]."""
     largest = 0.0
     for stage in range(3):
@@ -100,10 +120,11 @@ def correct_stages(scene, work, step):
                     return math.inf
                 work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
+        largest = max(largest, change_of_grazes(scene, work, step, stage, goal))
     return largest
 
 
-def newton_step(scene, work, time, step):
+def newton_step(scene, work, time, step, goal):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
     evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
@@ -111,21 +132,14 @@ def newton_step(scene, work, time, step):
     write_loads(scene, work, step)
     solve_both(work)
     work.tally[SOLVES] += 1
-    return correct_stages(scene, work, step)
+    return correct_stages(scene, work, step, goal)
 
 
-def finish_stages(scene, work, step, located):
-    """Places and tangential displacements that go with the last correction; the end is NEW.
-
-    ``located``: whether the last correction was so small that contacts lie where they did before.
-    """
+def finish_stages(scene, work, step):
+    """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
-    for state in range(FIRST_STAGE, FIRST_STAGE + 3):
-        if located:
-            rate_slips(work, state)
-        else:
-            locate_and_rate(scene, work, state)
-    slip_stages(scene, work, step)
+    locate_touching(scene, work, THIRD_STAGE)
+    slip_stage(scene, work, THIRD_STAGE)
     take_stage(work, THIRD_STAGE)
 
 
@@ -145,14 +159,14 @@ def solve_stages(scene, work, clock, step):
     # Turning makes every other iteration worse, so that the pace is taken over two of them.
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
-        change = newton_step(scene, work, clock[TIME], step)
+        change = newton_step(scene, work, clock[TIME], step, NEWTON_SHARE * allowed)
         goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         first = before == math.inf
         if first:
             pace = expected
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
-            finish_stages(scene, work, step, not first)
+            finish_stages(scene, work, step)
             clock[PACE] = 0.0 if first else pace
             if not first:
                 clock[SEEN_PACE], clock[SEEN_STEP] = pace, step

@@ -11,15 +11,19 @@ from flocsim.arrays import (
     EVALUATIONS,
     FORCE,
     GEOMETRY_COLUMNS,
+    GRAZES,
     LATER,
     MOTION_COLUMNS,
     NEW,
+    OPEN,
     PAIRS,
     SHARE,
     SLIP_RATES,
+    TOUCHES,
     VELOCITY,
 )
 from flocsim.geometry.contact.points import locate_acting
+from flocsim.integrators.rhs.grazing import grazing_force
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
 from flocsim.integrators.rhs.views import (
     add_force,
@@ -48,8 +52,9 @@ def take_stage(work, stage):
         for axis in range(MOTION_COLUMNS):
             work.motion[NEW, body, axis] = work.motion[stage, body, axis]
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+        if work.candidates[row, CLOSED] == TOUCHES:
             work.slip[NEW, row] = work.slip[stage, row]
+        if work.candidates[row, CLOSED] != OPEN:
             for column in range(GEOMETRY_COLUMNS):
                 work.geometry[NEW, row, column] = work.geometry[stage, row, column]
 
@@ -85,23 +90,30 @@ def add_surface_forces(scene, work, time, state):
 
 def add_contact_forces(scene, work, state):
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+        if work.candidates[row, CLOSED] == TOUCHES:
             view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(scene, view)
             push_pair(work, state, row, normal, tangential)
+        elif work.candidates[row, CLOSED] == GRAZES:
+            push_pair(work, state, row, 0.0, grazing_force(work, state, row))
 
 
 def rate_slips(work, state):
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+        if work.candidates[row, CLOSED] == TOUCHES:
             work.slip[SLIP_RATES + state, row] = tangential_rate(work, state, row)
+
+
+def locate_touching(scene, work, state):
+    """Contact geometry of a state, of the pairs through which forces act."""
+    if has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0:
+        locate_acting(scene, work, state)
 
 
 def locate_and_rate(scene, work, state):
     """Contact geometry of a state, and the rates of its tangential displacements."""
-    if has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0:
-        locate_acting(scene, work, state)
-        rate_slips(work, state)
+    locate_touching(scene, work, state)
+    rate_slips(work, state)
 
 
 def sum_forces(scene, work, time, state):

@@ -23,6 +23,9 @@ from flocsim.arrays import (
     FORCING,
     FREE,
     GAP,
+    GRAZES,
+    GRAZING_FORCE,
+    GRAZING_RESISTANCE,
     LATER,
     NORMAL_X,
     NORMAL_Y,
@@ -33,6 +36,7 @@ from flocsim.arrays import (
     SLIDING,
     SLIP_OFFSET,
     STIFFNESS,
+    TOUCHES,
     TURNING,
     VELOCITY,
     VERTEX_ARM_N,
@@ -207,6 +211,15 @@ def add_contact(scene, work, row):
         add_forcing(work, a, b, across, found[7] * offset)
 
 
+def add_grazing(scene, work, row):
+    """Derivatives of the force of a pair that grazes, which falls with the rate of the gap."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    pair, resistance = work.candidates[row, PAIR], work.slip[GRAZING_RESISTANCE, row]
+    along, across = normal_rows(work, row), tangent_rows(work, row)
+    add_product(scene, work, DAMPING, pair, a, b, across, along, resistance)
+    add_turning(scene, work, row, 0.0, work.slip[GRAZING_FORCE, row])
+
+
 def add_forcing(work, a, b, out, size):
     """Add a force of a size along a direction, by which the error is carried otherwise."""
     out_a, out_b = out
@@ -220,8 +233,10 @@ def add_contacts(scene, work):
         for axis in range(VELOCITY, VELOCITY + 3):
             work.motion[FORCING, body, axis] = 0.0
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+        if work.candidates[row, CLOSED] == TOUCHES:
             add_contact(scene, work, row)
+        elif work.candidates[row, CLOSED] == GRAZES:
+            add_grazing(scene, work, row)
 
 
 def add_body(work, which, body, derivatives):

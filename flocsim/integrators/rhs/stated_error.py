@@ -35,12 +35,15 @@ from flocsim.arrays import (
     ESTIMATE_SHARE,
     FREE,
     GAP,
+    GRAZES,
+    HELD,
     INERTIA,
     MASS,
     MOTION_COLUMNS,
     NORMAL_X,
     NORMAL_Y,
     NOW,
+    OPEN,
     RELAXATION,
     SHORTENED,
     SLIP_OFFSET,
@@ -51,6 +54,7 @@ from flocsim.arrays import (
     SWITCH_PLACE,
     SWITCH_SPEED,
     TOLERANCE,
+    TOUCHES,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
@@ -194,12 +198,12 @@ def kick_pair(scene, work, row, normal, tangential):
 
 def is_closed(work, row):
     """Whether a pair is flagged as one that touches."""
-    return work.candidates[row, CLOSED] == 1
+    return work.candidates[row, CLOSED] == TOUCHES
 
 
 def has_switched(work, row):
     """Whether a pair touches, or no longer does, other than it is flagged."""
-    closed = 1 if work.geometry[NOW, row, GAP] < 0.0 else 0
+    closed = TOUCHES if work.geometry[NOW, row, GAP] < 0.0 else OPEN
     return closed != work.candidates[row, CLOSED]
 
 
@@ -236,6 +240,8 @@ def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0:
+            continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
         late = doubtful_time(work, row, step, depth, doubt)
         signed = signed_time(work, row, step, depth, doubt)

@@ -1,0 +1,53 @@
+"""How far the bodies of a pair have rolled and slid over each other between two states.
+
+The rate v_t of the tangential displacement is the rate of a sum of lengths: of the foot along its
+edge, of the normal's turn about an end of it, and of what the vertex's disk rolls off,
+
+    dξ = ± ds + D (dφ − dθ_b) + r (dθ_b − dθ_a),
+
+s the foot's place on the edge, φ the direction of the normal, D = r_a + r_b + gap, and
+r = r_a + gap/2 the radius at which the disk of the vertex rolls. On the edge's inside the normal
+turns with the edge, and at its end the foot stays, so that one formula serves both. Between two
+states the displacement is therefore known from where the bodies are, whatever a method makes of the
+motion in between: a doublet that turns as one has none, however long its steps.
+"""
+
+import math
+
+from flocsim.arrays import (
+    ANGLE,
+    EDGE_BODY,
+    FOOT,
+    GAP,
+    NORMAL_X,
+    NORMAL_Y,
+    NOW,
+    SIDE,
+    TURNING,
+    VERTEX_BODY,
+)
+from flocsim.geometry.contact.points import row_radii
+
+
+def turn_of_normal(work, state, row):
+    """The angle by which the normal of a pair has turned since now, within half a turn [rad]."""
+    g = work.geometry
+    ox, oy = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    nx, ny = g[state, row, NORMAL_X], g[state, row, NORMAL_Y]
+    return math.atan2(ox * ny - oy * nx, ox * nx + oy * ny)
+
+
+def rolled(scene, work, state, row):
+    """How far the tangential displacement of a pair has grown from now to a state [m]; both are
+    located."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    g = work.geometry
+    radius_a, radius_b = row_radii(scene, work, row)
+    gap = 0.5 * (g[NOW, row, GAP] + g[state, row, GAP])
+    turn_a = work.motion[state, a, ANGLE] - work.motion[NOW, a, ANGLE]
+    turn_b = work.motion[state, b, ANGLE] - work.motion[NOW, b, ANGLE]
+    inside = NOW if g[NOW, row, TURNING] == 0.0 else state
+    along = g[inside, row, SIDE] * (g[state, row, FOOT] - g[NOW, row, FOOT])
+    about = turn_of_normal(work, state, row) - turn_b
+    rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
+    return along + (radius_a + radius_b + gap) * about + rolling

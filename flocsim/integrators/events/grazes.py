@@ -1,0 +1,334 @@
+"""When pairs begin and cease to graze (rhs/grazing.py): decided by forces at the end of a step.
+
+A pair that has just parted goes on grazing, instead of being apart, where its own tangential force
+has lifted it and all that comes of it is far below the tolerance: how far it parts before drag has
+used that speed up, and the displacement that its tangential spring would lose. Where the tolerance
+resolves these, the cycles of the law are followed instead.
+"""
+
+import math
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FLIGHT,
+    FLIGHTS,
+    FRESH,
+    GAP,
+    GAP_OFFSET,
+    GRAZES,
+    GRAZING_FORCE,
+    GRAZING_RESISTANCE,
+    HELD,
+    NEW,
+    NOW,
+    OPEN,
+    PAIR,
+    SLIDING,
+    TOLERANCE,
+    TOUCHES,
+    VERTEX_BODY,
+)
+from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.integrators.events.crossings import NEVER
+from flocsim.integrators.events.resolution import above_rounding, memory_of, pressed
+from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.laws import contact_derivatives, contact_force
+
+SHARE_OF_FLIGHT = 0.1
+"""The speed with which a pair parts may lift it by this share of the tolerance, where it has done
+so before, …"""
+
+SHARE_OF_FIRST = 1e-3
+"""… and by this one where it has not, …"""
+
+MANY = 5
+"""So often a pair has parted by no more than that and touched again that it hums."""
+
+SHARE_OF_SLIP = 1.0
+"""… and the displacement that is lost with its tangential spring be this share of it."""
+
+LEAST_COUPLING = 0.1
+"""A tangential force is taken to accelerate the gap by this share of what a normal one does, at
+least: through other contacts, if not by itself."""
+
+LEAST_PULL = 1e-3
+"""A contact force that pulls at no overlap with more than this share of T holds by itself."""
+
+SAME_PLACE = 1e-9
+"""Contact points nearer than this [m] may be one."""
+
+FAR = 1e3
+"""A gap so many times as large as the one that counted as none is far from it."""
+
+LATE = 0.1
+"""A step may go on behind the end of grazing where that leads to less than this share of the
+tolerance; …"""
+
+BEHIND = 1.01
+"""… one that may not ends that little behind it."""
+
+AT_ONCE = 0.02
+"""What ceases within this share of a step ceases at its start."""
+
+SETTLED = 5.0
+"""A step of so many times 1/ω0 leaves a vibration at rest."""
+
+TOUCHING_GAP = -1e-30
+"""The gap of a pair that touches without overlap [m]: its sign tells."""
+
+
+def pull_of(scene, work, row):
+    """About by how much a newton along the tangent of a pair accelerates the gap [1/kg]."""
+    least = LEAST_COUPLING * normal_mobility(scene, work, row)
+    return max(abs(coupling(scene, work, row)), least)
+
+
+def begins(scene, work, clock, row):
+    """Whether a pair that has just parted grazes from now on."""
+    if work.candidates[row, SLIDING] != 0:
+        return False
+    view = contact_view(scene, work, NOW, row)
+    _, force = contact_force(scene, view)
+    speed, pull = normal_rate(work, NOW, row), abs(force) * pull_of(scene, work, row)
+    share = SHARE_OF_FLIGHT if hums(work, row) else SHARE_OF_FIRST
+    if speed * speed > 2.0 * pull * share * clock[TOLERANCE]:
+        return False
+    pull, _ = contact_force(scene, pressed_view(view, 0.0, 0.0))
+    if abs(pull) > LEAST_PULL * abs(force):
+        return False
+    spring = spring_of(scene, view)
+    return spring == 0.0 or abs(force) <= SHARE_OF_SLIP * clock[TOLERANCE] * spring
+
+
+def spring_of(scene, view):
+    """By how much the tangential force of a contact falls with its displacement [N/m]."""
+    return max(-contact_derivatives(scene, view)[7], 0.0)
+
+
+def shares_point(work, row, other):
+    """Whether two rows of the same two bodies have one contact point and gap: two corners that
+    touch are up to four rows, of both bodies' edges."""
+    if work.candidates[row, PAIR] != work.candidates[other, PAIR]:
+        return False
+    if abs(work.geometry[NOW, row, GAP] - work.geometry[NOW, other, GAP]) > above_rounding(
+        work, NOW, 0.0
+    ):
+        return False
+    body = work.candidates[row, VERTEX_BODY]
+    x, y = contact_point(work, row, body)
+    other_x, other_y = contact_point(work, other, body)
+    return math.hypot(other_x - x, other_y - y) < SAME_PLACE
+
+
+def enter(scene, work, row):
+    """Let a pair graze."""
+    _, force = contact_force(scene, contact_view(scene, work, NOW, row))
+    work.candidates[row, CLOSED] = GRAZES
+    work.slip[GRAZING_FORCE, row] = force
+    work.slip[FRESH, row] = 1.0
+
+
+def share_forces(work):
+    """Rows of one contact point bear the same force."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES:
+            total, count = 0.0, 0
+            for other in range(work.tally[CANDIDATES]):
+                if work.candidates[other, CLOSED] == GRAZES and shares_point(work, row, other):
+                    total, count = total + work.slip[GRAZING_FORCE, other], count + 1
+            work.slip[GRAZING_RESISTANCE, row] = total / max(count, 1)
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES:
+            work.slip[GRAZING_FORCE, row] = work.slip[GRAZING_RESISTANCE, row]
+
+
+def hold_gap(work, row, gap):
+    """Count the gap that a pair has now as another one."""
+    work.slip[GAP_OFFSET, row] += work.geometry[NOW, row, GAP] - gap
+    work.geometry[NOW, row, GAP] = gap
+
+
+def sliding_speed(work, row):
+    """How fast the bodies of a pair that grazes slide against its force [m/s]."""
+    speed = tangential_rate(work, NOW, row)
+    return -speed if work.slip[GRAZING_FORCE, row] > 0.0 else speed
+
+
+def sticks(scene, work, row):
+    """Whether a pair that grazes has ceased to slide; its spring takes the force over then, as far
+    as it held that before. Without a spring the law's whole force is what it needs then."""
+    view = contact_view(scene, work, NOW, row)
+    force, spring = work.slip[GRAZING_FORCE, row], spring_of(scene, view)
+    if spring == 0.0:
+        _, whole = contact_force(scene, view)
+        return whole * force <= force * force
+    if sliding_speed(work, row) >= 0.0:
+        return False
+    needed, held = -force / spring, work.slip[NOW, row]
+    if needed * held <= 0.0:
+        work.slip[NOW, row] = 0.0
+    elif abs(needed) < abs(held):
+        work.slip[NOW, row] = needed
+    return True
+
+
+def leave(work, row, mode, gap):
+    """Let a pair cease to graze."""
+    work.candidates[row, CLOSED] = mode
+    hold_gap(work, row, gap)
+
+
+def go_on(scene, work, row):
+    """Whether a pair goes on grazing behind a step."""
+    if work.slip[FRESH, row] != 0.0:
+        # Its first step takes what is left of the gap's rate away, of which no load tells.
+        work.slip[FRESH, row] = 0.0
+        return True
+    before, rate = work.slip[GRAZING_FORCE, row], normal_rate(work, NOW, row)
+    after = before - work.slip[GRAZING_RESISTANCE, row] * rate
+    work.slip[GRAZING_FORCE, row] = after
+    if after * before <= 0.0:
+        leave(work, row, OPEN, 0.0)
+        return False
+    if sticks(scene, work, row):
+        leave(work, row, TOUCHES, TOUCHING_GAP)
+        return False
+    return True
+
+
+def forget_gap(work, row):
+    """The gap of a pair that has gone far from where it grazed counts as it is."""
+    offset = work.slip[GAP_OFFSET, row]
+    if offset != 0.0 and work.geometry[NOW, row, GAP] > FAR * abs(offset):
+        work.geometry[NOW, row, GAP] += offset
+        work.slip[GAP_OFFSET, row] = 0.0
+
+
+def hums(work, row):
+    """Whether a pair has parted and touched again and again, by far less than the tolerance."""
+    return work.slip[FLIGHTS, row] >= MANY
+
+
+def count_flight(work, clock, row):
+    """Count how often a pair, which has touched, was apart by far less than the tolerance."""
+    flight = work.slip[FLIGHT, row]
+    if flight > SHARE_OF_FLIGHT * clock[TOLERANCE]:
+        work.slip[FLIGHTS, row] = 0.0
+    elif flight > 0.0:
+        work.slip[FLIGHTS, row] += 1.0
+    work.slip[FLIGHT, row] = 0.0
+
+
+def note_flight(work, row):
+    """Keep how far a pair that is apart has been since it parted."""
+    gap = work.geometry[NOW, row, GAP]
+    work.slip[FLIGHT, row] = max(work.slip[FLIGHT, row], gap)
+
+
+def is_settled(scene, work, clock, row, step):
+    """Whether a step was long against the vibrations of a contact, which has come to rest in it."""
+    view = contact_view(scene, work, NOW, row)
+    stiffness = pressed(scene, view, clock[TOLERANCE], 0.0) / clock[TOLERANCE]
+    return step * step * stiffness > SETTLED * SETTLED * view.effective_mass
+
+
+def hold(scene, work, clock, row, step):
+    """Whether a pair that has parted stays closed: it was apart before by far less than the
+    tolerance, and has not yet come to rest with a pull that nothing gives it."""
+    gap = work.geometry[NOW, row, GAP]
+    if not hums(work, row) or gap > SHARE_OF_FLIGHT * clock[TOLERANCE]:
+        return False
+    if work.candidates[row, SLIDING] != 0:
+        return False
+    return work.slip[HELD, row] == 0.0 or not is_settled(scene, work, clock, row, step)
+
+
+def part(scene, work, clock, row, step):
+    """What becomes of a closed pair that has parted; whether it begins to graze."""
+    if hold(scene, work, clock, row, step):
+        if work.slip[HELD, row] == 0.0:
+            work.slip[NOW, row] = 0.0  # as wherever a contact parts
+        work.slip[HELD, row] = 1.0
+        return False
+    work.slip[HELD, row] = 0.0
+    if begins(scene, work, clock, row):
+        for other in range(work.tally[CANDIDATES]):
+            if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
+                work.slip[HELD, other] = 0.0
+                enter(scene, work, other)
+        return True
+    return False
+
+
+def settle(scene, work, clock, step):
+    """Let pairs begin and cease to graze, or to be held, at the end of a step; whether any has."""
+    changed, entered = False, False
+    for row in range(work.tally[CANDIDATES]):
+        mode = work.candidates[row, CLOSED]
+        if mode == GRAZES:
+            changed = not go_on(scene, work, row) or changed
+        elif mode == OPEN:
+            forget_gap(work, row)
+            note_flight(work, row)
+            if work.geometry[NOW, row, GAP] < 0.0:
+                count_flight(work, clock, row)
+        elif work.geometry[NOW, row, GAP] < 0.0:
+            work.slip[HELD, row] = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == TOUCHES and work.geometry[NOW, row, GAP] >= 0.0:
+            entered = part(scene, work, clock, row, step) or entered
+    if entered:
+        share_forces(work)
+        for row in range(work.tally[CANDIDATES]):
+            if work.candidates[row, CLOSED] == GRAZES:
+                hold_gap(work, row, 0.0)
+    return changed or entered
+
+
+def share_left(scene, work, clock, step, row):
+    """The share of the step at which a pair that grazes ceases to; above 1 where it does not, or
+    where it matters little: its force goes through nothing there.
+
+    T and the speed of sliding go along lines.
+    """
+    resistance = abs(work.slip[GRAZING_RESISTANCE, row])
+    if work.slip[FRESH, row] != 0.0 or resistance == 0.0:
+        return NEVER
+    before, after = work.slip[GRAZING_FORCE, row], grazing_force(work, NEW, row)
+    # What a newton does to the gap in a step, and later.
+    lever = STIFFER / resistance * (step + memory_of(work, row))
+    if abs(after) * lever < LATE * clock[TOLERANCE]:
+        return NEVER
+    share = before / (before - after) if before * after < 0.0 else NEVER
+    side = 1.0 if before > 0.0 else -1.0
+    slow = -side * tangential_rate(work, NOW, row)
+    slower = -side * tangential_rate(work, NEW, row)
+    if slow > 0.0 > slower:
+        share = min(share, slow / (slow - slower))
+    return share
+
+
+def leave_early(scene, work, clock, step):
+    """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
+    changed = False
+    for row in range(work.tally[CANDIDATES]):
+        if (
+            work.candidates[row, CLOSED] == GRAZES
+            and share_left(scene, work, clock, step, row) < AT_ONCE
+        ):
+            if work.slip[GRAZING_FORCE, row] * grazing_force(work, NEW, row) < 0.0:
+                leave(work, row, OPEN, 0.0)
+            else:
+                leave(work, row, TOUCHES, TOUCHING_GAP)
+            changed = True
+    return changed
+
+
+def grazing_share(scene, work, clock, step, share):
+    """The share of the step at which the first pair ceases to graze, or the given one before."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES:
+            share = min(share, BEHIND * share_left(scene, work, clock, step, row))
+    return share

@@ -1,0 +1,71 @@
+"""How pairs that graze are held in an implicit step: how stiffly, and whether at all.
+
+What a tangential force does to the gap hangs on the other contacts, too: it is found by the step's
+own system, without what holds the gap. Where the force that a pair had as it parted drives the gap
+shut instead of open, the load drives it open, and the pair is apart.
+"""
+
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    EDGE_BODY,
+    FRESH,
+    GRAZES,
+    GRAZING_FORCE,
+    GRAZING_RESISTANCE,
+    NOW,
+    OPEN,
+    VERTEX_BODY,
+)
+from flocsim.integrators.radau.systems import solve_for_free
+from flocsim.integrators.radau.tableau import REAL
+from flocsim.integrators.rhs.grazing import STIFFER
+from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
+
+
+def any_grazes(work):
+    """Whether a pair grazes."""
+    for row in range(work.tally[CANDIDATES]):  # noqa: SIM110
+        if work.candidates[row, CLOSED] == GRAZES:
+            return True
+    return False
+
+
+def release_gaps(work):
+    """Hold no gap."""
+    for row in range(work.tally[CANDIDATES]):
+        work.slip[GRAZING_RESISTANCE, row] = 0.0
+
+
+def response(scene, work, row):
+    """The rate of the gap for every newton along the tangent of a pair, by the factorised system
+    [m/(N s)]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    across, along = tangent_rows(work, row), normal_rows(work, row)
+    for each in range(work.loads.shape[1]):
+        work.loads[REAL, each] = 0.0
+    for axis in range(3):
+        work.loads[REAL, 3 * a + axis] = across[0][axis]
+        work.loads[REAL, 3 * b + axis] = across[1][axis]
+    solve_for_free(scene, work)
+    total = 0.0
+    for axis in range(3):
+        total += along[0][axis] * work.loads[REAL, 3 * a + axis].real
+        total += along[1][axis] * work.loads[REAL, 3 * b + axis].real
+    return total
+
+
+def hold_gaps(scene, work):
+    """Say how stiffly the gaps of pairs that graze are held, by the system without that; let those
+    go that their own force does not lift. Whether any has been let go."""
+    opened = False
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == GRAZES:
+            found = response(scene, work, row)
+            fresh = work.slip[FRESH, row] != 0.0
+            if found == 0.0 or (fresh and found * work.slip[GRAZING_FORCE, row] <= 0.0):
+                work.candidates[row, CLOSED], opened = OPEN, True
+                work.slip[NOW, row] = 0.0
+            else:
+                work.slip[GRAZING_RESISTANCE, row] = STIFFER / found
+    return opened
