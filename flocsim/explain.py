@@ -14,7 +14,7 @@ import numpy as np
 
 from flocsim.arrays import ContactView, PairView
 from flocsim.compiler.reads import reached
-from flocsim.forces.base import BodyForce, ContactForce, PairForce
+from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     SAMPLE_CONTACTS,
@@ -92,14 +92,13 @@ def heading(system):
 def force_lines(system):
     """ "in: …" or "out: …" for every force object, two of one class each by itself."""
     implicit = differentiates(system)
+    named = [*zip(names_of(system.forces), system.forces, strict=True)]
     lines = [
         f"in:  {force}: {'; '.join(about(system, force, implicit))}"
-        for force in system.forces
+        for _, force in named
         if not force.absent
     ]
-    lines += [
-        f"out: {type(force).__name__}: {force.absent}" for force in system.forces if force.absent
-    ]
+    lines += [f"out: {name}: {force.absent}" for name, force in named if force.absent]
     return lines or ["out: forces: none is given, bodies fly free"]
 
 
@@ -195,9 +194,10 @@ def search_line(system, touching):
 
 
 def spin_line(system):
-    turning = [type(force).__name__ for force in system.forces if exerts_torque(system, force)]
+    named = zip(names_of(system.forces), system.forces, strict=True)
+    turning = [name for name, force in named if exerts_torque(system, force)]
     if turning:
-        return f"in:  rotation of bodies: torques come from {', '.join(dict.fromkeys(turning))}"
+        return f"in:  rotation of bodies: torques come from {', '.join(turning)}"
     if system.spheres_only:
         return "idle: rotation of spheres: no force exerts a torque, spins stay as they are"
     return "in:  rotation of bodies: no force exerts a torque, but outlines turn with their spin"

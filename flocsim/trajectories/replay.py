@@ -35,7 +35,7 @@ from flocsim.arrays import (
     with_capacity,
 )
 from flocsim.body import Body, Fluid
-from flocsim.forces.base import Force
+from flocsim.forces.base import Force, names_of
 from flocsim.forces.codegen import laws_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -158,14 +158,9 @@ class Replay:
     @functools.cached_property
     def single_scenes(self) -> dict[str, Scene]:
         """{name of a force: the scene with it alone}."""
-        names: list[str] = []
-        for force in self.origin.forces:
-            name = type(force).__name__
-            names.append(name if name not in names else f"{name} {1 + names.count(name)}")
-        return {
-            name: self.scene_of([force])
-            for name, force in zip(names, self.origin.forces, strict=True)
-        }
+        forces = self.origin.forces
+        named = zip(names_of(forces), forces, strict=True)
+        return {name: self.scene_of([force]) for name, force in named}
 
     def to_step(self, step: int) -> None:
         """Go on until so many steps of the trajectory have been taken."""
