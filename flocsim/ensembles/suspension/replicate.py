@@ -1,5 +1,6 @@
 """One replicate of a swarm study, from its start or from where it was left, to its end."""
 
+import math
 import time
 from collections.abc import Callable
 
@@ -135,16 +136,23 @@ def moment_part(
 
 
 def summary_of(clusters: Clusters) -> dict[str, float]:
-    """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first two."""
+    """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first
+    three; over the mass of those that have the quantity."""
     if not len(clusters):
-        return {"clusters": 0, "largest": 0}
+        return {"clusters": 0, "largest": 0, "percolating": 0}
     share = clusters.mass / clusters.mass.sum()
+
+    def mean(values: np.ndarray) -> float:
+        known = np.isfinite(values)
+        return float(share[known] @ values[known] / share[known].sum()) if known.any() else math.nan
+
     return {
         "clusters": len(clusters),
         "largest": int(clusters.size.max()),
+        "percolating": int(clusters.percolates.sum()),
         "mean_size": clusters.mean_size,
-        "gyration": float(share @ clusters.gyration),
-        "porosity": float(share @ clusters.porosity),
+        "gyration": mean(clusters.gyration),
+        "porosity": mean(clusters.porosity),
         "fractal_dimension": clusters.fractal_dimension(),
         "settling": float(-share @ clusters.velocity[:, 1]),
     }
