@@ -56,7 +56,7 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
         about_weight(first.fluid, bodies, forces, names.buoyancy),
         beyond_the_law(settled, forces),
         about_kicks(forces),
-        about_contacts(max(len(system.bodies) for system in systems), forces, names.drop),
+        about_contacts(max(map(meeting, systems)), forces, names.drop),
     ]
     return [line for line in dict.fromkeys(lines) if line]
 
@@ -114,6 +114,11 @@ def about_kicks(forces: dict[str, Any]) -> str:
                     "rates of meeting as lower bounds"
                 )
     return ""
+
+
+def meeting(system: Any) -> int:
+    """How many bodies can meet others: fixed ones alone do not act on each other."""
+    return 0 if all(body.fixed for body in system.bodies) else len(system.bodies)
 
 
 def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:

@@ -41,6 +41,7 @@ from flocsim.arrays import (
     VY,
     X,
     Y,
+    all_counting,
 )
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
@@ -278,7 +279,7 @@ def run_islands(
         for pair in range(work.budget.shape[0]):
             work.budget[pair] = -1.0
         if watches_all(work):
-            work.tally[PAIRS] = work.pairs.shape[0]
+            work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
             work.tally[FULL] = CANDIDATES_FULL
             return island

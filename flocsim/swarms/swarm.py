@@ -135,7 +135,8 @@ class Swarm:
                 raise UsageError(FLOW_ADVICE.format(axis=axis))
 
     def check_overlaps(self, gauge: Gauge) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap."""
+        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
+        may, and are no neighbours."""
         position, _ = self.system.motion()
         near = gauge.neighbours(position)
         for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):

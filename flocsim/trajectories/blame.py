@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of
+from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of, counts_as_pair
 from flocsim.compiler.composer import compose
 from flocsim.compiler.reads import where
 from flocsim.forces.check import asked_at
@@ -50,6 +50,7 @@ def views_of(system, scene, work, time):
             centre_view(scene, work, time, NOW, a, b)
             for a in range(len(system.bodies))
             for b in range(a)
+            if counts_as_pair(scene.bodies, a, b)
         ],
     }
     if compose(locate, system.fillings(), jit=False)(scene, work):
