@@ -56,6 +56,7 @@ from flocsim.swarms.arrays import (
     ERROR_COLUMNS,
     FORCES_SUMMED,
     FURTHEST,
+    HALT,
     HORIZON_AT,
     LATER_BODY,
     METHOD,
@@ -74,7 +75,8 @@ from flocsim.swarms.methods import ACROSS, LOCATES, advance_island
 
 
 def watch_paths(scene, work, observed, time):
-    """Note how far bodies stray from the paths on which others count."""
+    """Note how far bodies stray from the paths on which others count; 1 where the island is to
+    stop."""
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, FREE] == 1.0:
             since = time - observed[body, SINCE]
@@ -89,7 +91,7 @@ def watch_paths(scene, work, observed, time):
                 - since * observed[body, PATH_VY]
             )
             observed[body, FURTHEST] = max(observed[body, FURTHEST], math.hypot(x, y))
-    return 0
+    return 1 if observed[0, HALT] != 0.0 else 0
 
 
 def put_scene(swarm, scene, members, first):

@@ -19,6 +19,9 @@ from flocsim.swarms.together.bonds import Bonds
 from flocsim.swarms.together.clusters import Clusters
 from flocsim.swarms.together.contacts import Gauge
 
+Going = Callable[[float, int], None]
+"""Is told how far a replicate is: the time [s] of its window, the steps tried in that so far."""
+
 
 @attrs.frozen(eq=False)
 class Left:
@@ -30,12 +33,13 @@ class Left:
 
 def run_replicate(
     study: SwarmStudy, replicate: int, keep: Callable[[Part], None], left: Left | None = None,
-    halted: Callable[[], bool] | None = None,
+    halted: Callable[[], bool] | None = None, going: Going | None = None,
 ) -> bool:  # fmt: skip
     """Run a replicate; whether it has come to its end.
 
-    ``keep`` takes its Parts as they come. ``halted()``, looked at between windows, makes it leave
-    off, its state kept.
+    ``keep`` takes its Parts as they come. ``halted()``, looked at between windows and now and then
+    within long ones, makes it leave off, its state kept. ``going(time, tried)`` is told as often
+    how far it is: the time [s] of the window, and the steps that were tried in it.
     """
     swarm, drawn, box = study.swarm(replicate)
     gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
@@ -45,6 +49,12 @@ def run_replicate(
         leaving=study.leaving(replicate, swarm, box),
     )  # fmt: skip
     stops = study.stops
+
+    def look(tried: int) -> bool:
+        if going is not None:
+            going(progress.time, tried)
+        return halted is not None and halted()
+
     if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
         seen = progress.swarm.motion.copy()
@@ -56,9 +66,9 @@ def run_replicate(
         moments, seen = left.moments, left.state["seen"]
     kept_at, status = time.monotonic(), Status.FINISHED
     for place in range(moments, len(stops)):
-        while (status := progress.advance(stops[place])) == Status.PAUSED:
+        while (status := progress.advance(stops[place], look)) in (Status.PAUSED, Status.STOPPED):
             late = time.monotonic() - kept_at > study.scene.checkpoint
-            stopped = halted is not None and halted()
+            stopped = status == Status.STOPPED or look(0)
             if late or stopped:
                 keep(state_part(replicate, place, progress, seen))
                 kept_at = time.monotonic()
