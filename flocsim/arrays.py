@@ -335,13 +335,30 @@ class Work(NamedTuple):
 
 
 ALL_PAIRS = 12
-"""Of so many bodies at most, all pairs are watched; of more, those that may come near."""
+"""Of so many bodies at most, all pairs that count are watched; of more, those that may come
+near."""
 
 DENSE = 6
 """Of so many bodies at most, the linear systems are dense."""
 
 PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
 """Room at first for the pairs of bodies, and for the blocks of sparse systems, of a body."""
+
+
+def counts_as_pair(bodies: np.ndarray, a: int, b: int) -> bool:
+    """Whether two bodies can act on each other: one of them is free."""
+    return bool(bodies[a, FREE] + bodies[b, FREE] > 0.0)
+
+
+def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
+    """Write all (later, earlier) that can act on each other, sorted; how many there are."""
+    count = 0
+    for later in range(bodies.shape[0]):
+        for earlier in range(later):
+            if counts_as_pair(bodies, later, earlier):
+                pairs[count, LATER], pairs[count, EARLIER] = later, earlier
+                count += 1
+    return count
 
 
 def elimination_of(n: int, pairs: int, room: int, dense: int = DENSE) -> Elimination:
@@ -406,8 +423,7 @@ def work_of(
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
     if n <= ALL_PAIRS and all_pairs:
-        work.pairs[:, LATER], work.pairs[:, EARLIER] = np.tril_indices(n, -1)
-        work.tally[PAIRS] = pairs
+        work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
     return work
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from flocsim.arrays import ContactView, PairView
 from flocsim.compiler.reads import reached
-from flocsim.forces.base import BodyForce, ContactForce, PairForce
+from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     SAMPLE_CONTACTS,
@@ -92,14 +92,13 @@ def heading(system):
 def force_lines(system):
     """ "in: …" or "out: …" for every force object, two of one class each by itself."""
     implicit = differentiates(system)
+    named = [*zip(names_of(system.forces), system.forces, strict=True)]
     lines = [
         f"in:  {force}: {'; '.join(about(system, force, implicit))}"
-        for force in system.forces
+        for _, force in named
         if not force.absent
     ]
-    lines += [
-        f"out: {type(force).__name__}: {force.absent}" for force in system.forces if force.absent
-    ]
+    lines += [f"out: {name}: {force.absent}" for name, force in named if force.absent]
     return lines or ["out: forces: none is given, bodies fly free"]
 
 
@@ -107,8 +106,8 @@ def about(system, force, implicit):
     """Where a force acts and, for an implicit method, whence its derivatives come."""
     if isinstance(force, BodyForce):
         parts, derivative = ["on every body"], body_derivative(system, force)
-    elif len(system.bodies) == 1:
-        return ["never called, a single body has no partner"]
+    elif not counting(system.bodies):
+        return [f"never called, {no_partner(system)}"]
     elif isinstance(force, ContactForce):
         parts = ["at every overlapping pair", sliding(system, force)]
         derivative = "derivatives from differences of its kernel"
@@ -119,6 +118,13 @@ def about(system, force, implicit):
         derivative = pair_derivative(system, force)
     parts += force.remarks(system.fluid)
     return [*parts, derivative] if implicit else parts
+
+
+def no_partner(system):
+    """Why no two bodies act on each other."""
+    if len(system.bodies) == 1:
+        return "a single body has no partner"
+    return "fixed bodies do not act on each other"
 
 
 def body_derivative(system, force):
@@ -151,7 +157,12 @@ def reach_words(system, force):
 def least_gap(bodies, force):
     """The least gap [m] at the start: of equivalent spheres, or of bounding circles."""
     size = "equivalent_radius" if force.acts_on == "centres" else "bounding_radius"
-    return min((gap_between(a, b, size) for a, b in combinations(bodies, 2)), default=math.inf)
+    return min((gap_between(a, b, size) for a, b in counting(bodies)), default=math.inf)
+
+
+def counting(bodies):
+    """Every two bodies that can act on each other: one of them is free."""
+    return [(a, b) for a, b in combinations(bodies, 2) if not (a.fixed and b.fixed)]
 
 
 def gap_between(a, b, size):
@@ -187,17 +198,18 @@ def machinery_lines(system):
 def search_line(system, touching):
     if not touching:
         return "out: contact search: no force acts at contacts or between outlines"
-    far = [gap_between(a, b, "bounding_radius") for a, b in combinations(system.bodies, 2)]
+    far = [gap_between(a, b, "bounding_radius") for a, b in counting(system.bodies)]
     if not far:
-        return "out: contact search: a single body has no partner"
+        return f"out: contact search: {no_partner(system)}"
     words = "in:  contact search, left out for every two bodies whose bounding circles are apart"
     return f"{words} (at the start {sum(gap > 0.0 for gap in far)} of {len(far)} pairs)"
 
 
 def spin_line(system):
-    turning = [type(force).__name__ for force in system.forces if exerts_torque(system, force)]
+    named = zip(names_of(system.forces), system.forces, strict=True)
+    turning = [name for name, force in named if exerts_torque(system, force)]
     if turning:
-        return f"in:  rotation of bodies: torques come from {', '.join(dict.fromkeys(turning))}"
+        return f"in:  rotation of bodies: torques come from {', '.join(turning)}"
     if system.spheres_only:
         return "idle: rotation of spheres: no force exerts a torque, spins stay as they are"
     return "in:  rotation of bodies: no force exerts a torque, but outlines turn with their spin"
@@ -224,7 +236,7 @@ def exerts_torque(system, force):
     if isinstance(force, BodyForce):
         kernel = force.kernel_in(system.fluid)
         return any(result[2] != 0.0 for result in tried(system, force, kernel, SAMPLE_BODIES))
-    if len(system.bodies) == 1:
+    if not counting(system.bodies):
         return False
     if isinstance(force, PairForce):
         return force.acts_on == "surfaces" and not system.spheres_only
@@ -293,10 +305,8 @@ def all_scales(system):
 
 def pairs_of(system):
     """(bodies a, b, M of the pair) for every two bodies of which one is free."""
-    for a, b in combinations(system.bodies, 2):
-        inverse = sum(1.0 / body.mass for body in (a, b) if not body.fixed)
-        if inverse > 0.0:
-            yield a, b, 1.0 / inverse
+    for a, b in counting(system.bodies):
+        yield a, b, 1.0 / sum(1.0 / body.mass for body in (a, b) if not body.fixed)
 
 
 def slope_of(force, view, field, size, parameters, part=None):

@@ -215,8 +215,11 @@ class System:
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit)
 
     def check_overlaps(self) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap."""
+        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
+        may: they do not act on each other."""
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
+            if a.fixed and b.fixed:
+                continue
             fault = overlap_fault(
                 a.shape.placed_parts(*a.position, a.angle),
                 b.shape.placed_parts(*b.position, b.angle),

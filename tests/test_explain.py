@@ -36,9 +36,9 @@ def test_every_force_object_gets_its_line():
     assert sum(line.startswith("VanDerWaals(") for line in inside) == 2
     assert sum(line.startswith("Gravity(") for line in inside) == 1
     for name, why in (
-        ("VanDerWaals", "hamaker"),
+        ("VanDerWaals (3)", "hamaker"),
         ("DoubleLayer", "potential"),
-        ("Gravity", "g is"),
+        ("Gravity (2)", "g is"),
     ):
         assert has(outside, f"{name}: {why}")
 

@@ -7,7 +7,7 @@ it runs uncompiled for debugging and compiled at the speed of hand-written code.
 values never recompile.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -116,3 +116,18 @@ class ContactForce(Force):
     def has_events(self) -> bool:
         """Whether the law has kinks with these parameters."""
         return self.events is not None
+
+
+def told_apart(names: Iterable[str]) -> list[str]:
+    """The names in their order, each once: "Pull", "Pull (2)", "Pull (3)"."""
+    found: list[str] = []
+    counts: dict[str, int] = {}
+    for name in names:
+        counts[name] = counts.get(name, 0) + 1
+        found.append(name if counts[name] == 1 else f"{name} ({counts[name]})")
+    return found
+
+
+def names_of(forces: Sequence[Any]) -> list[str]:
+    """What the forces of a scene are called, by their classes and their places: no two alike."""
+    return told_apart(type(force).__name__ for force in forces)

@@ -12,8 +12,8 @@ import attrs
 
 from flocsim.arrays import PairView
 from flocsim.body import Fluid
-from flocsim.errors import UsageError
-from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.errors import KernelError, UsageError
+from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
 from flocsim.forces.check import (
     SAMPLE_BODIES,
     check_kernel,
@@ -47,7 +47,8 @@ class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
     gap of outlines is smoothed (smoothing.py), how many events its contact forces have, and which
-    forces are used and left out."""
+    forces are used and left out, {name: force} and {name: why}, each by a name of its own
+    (base.names_of)."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
@@ -230,14 +231,14 @@ def sort_forces(pieces, forces, fluid):
     UsageError for what is no force, KernelError for a force whose kernel cannot be used.
     """
     kinds = {"body": [], "centre": [], "surface": [], "contact": []}
-    for force in forces:
+    forces = list(forces)
+    for name, force in zip(names_of(forces), forces, strict=True):
         if not isinstance(force, Force):
             raise UsageError(f"a force must be a flocsim Force object, found {force!r}")
-        name = type(force).__name__
         if force.absent:
             pieces.left_out[name] = force.absent
             continue
-        check_kernel(force, fluid)
+        check_named(force, fluid, name)
         pieces.used[name] = force
         if isinstance(force, BodyForce):
             kinds["body"].append(force)
@@ -250,6 +251,14 @@ def sort_forces(pieces, forces, fluid):
                 f"{name} must subclass BodyForce, CentreForce, SurfaceForce or ContactForce"
             )
     return kinds
+
+
+def check_named(force, fluid, name):
+    """KernelError, which names the force, where its kernel cannot be used."""
+    try:
+        check_kernel(force, fluid)
+    except KernelError as error:
+        raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
 
 
 def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:

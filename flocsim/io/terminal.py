@@ -23,6 +23,9 @@ LINE_SECONDS = 5.0
 BAR_SECONDS = 0.2
 """Seconds between two renewals on a terminal."""
 
+WIDTH = 78
+"""Letters of a line that renews itself: one that goes on in the next line would stay there."""
+
 
 def duration(seconds: float) -> str:
     """Seconds in words: 42 s, 3 min 10 s, 2 h 05 min."""
@@ -156,7 +159,7 @@ def renew(text: str, stream: Any, end: str = "") -> None:
     """Write a line over the last one of a terminal."""
     write = stream.put if isinstance(stream, PlainStream) else stream.write
     with contextlib.suppress(OSError):
-        write(f"\r{visible(text, keep=''):<70}{end}")
+        write(f"\r{visible(text, keep='')[:WIDTH]:<{WIDTH}}{end}")
         stream.flush()
 
 
@@ -188,15 +191,17 @@ class Progress:
         self.todo = todo
         self.began = self.printed = time.monotonic()
 
-    def report(self, missing: int) -> None:
+    def report(self, missing: int, going: str = "") -> None:
+        """So much is missing; ``going``: how far what runs now is."""
         share = (self.todo - missing) / self.todo if self.todo else 1.0
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
             return
         self.printed = now
         left = (now - self.began) * (1.0 - share) / share if share > 0.0 else 0.0
-        text = f"{share:4.0%}  {self.total - missing} of {self.total} {self.noun}, "
-        text += f"{duration(left)} left"
+        text = f"{share:4.0%}  {self.total - missing} of {self.total} {self.noun}"
+        text += f", {duration(left)} left" if share > 0.0 else ""
+        text += f"; {going}" if going else ""
         if self.tty:
             renew(text, self.stream)
         else:

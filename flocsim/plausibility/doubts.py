@@ -8,7 +8,7 @@ import attrs
 
 from flocsim.body import Body
 from flocsim.errors import PlausibilityWarning
-from flocsim.forces.base import ContactForce
+from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
@@ -33,13 +33,9 @@ class Names:
 
     def thermal_in(self, forces: Sequence[Any]) -> dict[str, Any]:
         """{name: force} of those forces that act, two of one name told apart."""
-        found: dict[str, Any] = {}
-        names = self.forces or tuple(type(force).__name__ for force in forces)
-        for name, force in zip(names, forces, strict=True):
-            if not force.absent:
-                count = sum(each.partition(" (")[0] == name for each in found)
-                found[f"{name} ({count + 1})" if count else name] = force
-        return found
+        names = told_apart(self.forces or [type(force).__name__ for force in forces])
+        named = zip(names, forces, strict=True)
+        return {name: force for name, force in named if not force.absent}
 
 
 def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
@@ -60,7 +56,7 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
         about_weight(first.fluid, bodies, forces, names.buoyancy),
         beyond_the_law(settled, forces),
         about_kicks(forces),
-        about_contacts(max(len(system.bodies) for system in systems), forces, names.drop),
+        about_contacts(max(map(meeting, systems)), forces, names.drop),
     ]
     return [line for line in dict.fromkeys(lines) if line]
 
@@ -118,6 +114,11 @@ def about_kicks(forces: dict[str, Any]) -> str:
                     "rates of meeting as lower bounds"
                 )
     return ""
+
+
+def meeting(system: Any) -> int:
+    """How many bodies can meet others: fixed ones alone do not act on each other."""
+    return 0 if all(body.fixed for body in system.bodies) else len(system.bodies)
 
 
 def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:

@@ -29,10 +29,11 @@ STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
 """Columns of ``costs``, of every island."""
 
 (
-    START_X, START_Y, PATH_VX, PATH_VY, SINCE, FURTHEST, TRACK_COLUMNS,
-) = range(7)  # fmt: skip
+    START_X, START_Y, PATH_VX, PATH_VY, SINCE, FURTHEST, HALT, TRACK_COLUMNS,
+) = range(8)  # fmt: skip
 """Columns of what an island's observer sees, of every body: the straight path that it is expected
-to go, and from when; how far it has strayed from it [m]."""
+to go, and from when; how far it has strayed from it [m]; of the first one, 1 where the island is
+to stop at once, which another thread says."""
 
 
 class Swarm(NamedTuple):

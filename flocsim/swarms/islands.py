@@ -44,6 +44,7 @@ from flocsim.arrays import (
     VY,
     X,
     Y,
+    all_counting,
 )
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
@@ -58,6 +59,7 @@ from flocsim.swarms.arrays import (
     ERROR_COLUMNS,
     FORCES_SUMMED,
     FURTHEST,
+    HALT,
     HORIZON_AT,
     LATER_BODY,
     METHOD,
@@ -76,7 +78,8 @@ from flocsim.swarms.methods import ACROSS, LOCATES, advance_island
 
 
 def watch_paths(scene, work, observed, time):
-    """Note how far bodies stray from the paths on which others count."""
+    """Note how far bodies stray from the paths on which others count; 1 where the island is to
+    stop."""
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, FREE] == 1.0:
             since = time - observed[body, SINCE]
@@ -91,7 +94,7 @@ def watch_paths(scene, work, observed, time):
                 - since * observed[body, PATH_VY]
             )
             observed[body, FURTHEST] = max(observed[body, FURTHEST], math.hypot(x, y))
-    return 0
+    return 1 if observed[0, HALT] != 0.0 else 0
 
 
 def put_scene(swarm, scene, members, first):
@@ -283,7 +286,7 @@ def run_islands(
         for pair in range(work.budget.shape[0]):
             work.budget[pair] = -1.0
         if watches_all(work):
-            work.tally[PAIRS] = work.pairs.shape[0]
+            work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
             work.tally[FULL] = CANDIDATES_FULL
             return island

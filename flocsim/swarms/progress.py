@@ -26,7 +26,7 @@ from flocsim.swarms.arrays import (
 )
 from flocsim.swarms.finished import Finished
 from flocsim.swarms.leaving import REMOVE, Leaving
-from flocsim.swarms.runner import Islands, Runner
+from flocsim.swarms.runner import Islands, Look, Runner
 
 LEAST_WANDER = 0.05
 """A body may stray by so many bounding radii at least."""
@@ -164,10 +164,26 @@ class Progress:
         self.stated[...] = state["stated"]
         self.forget(state["gone"] == 1)
 
-    def advance(self, stop: float) -> Status:
+    def advance(self, stop: float, look: Look | None = None) -> Status:
         """Go on to the next common time, ``stop`` at the latest: PAUSED, FINISHED where that is
         ``stop``, or the Status with which an island ended for good, ``failed`` being its bodies.
+
+        ``look(tried)`` is called now and then within the window, with the steps that its islands
+        have tried so far, and leaves off where it returns what counts as true: STOPPED, everything
+        being as before.
         """
+        before = self.swarm.wander.copy(), self.span, attrs.evolve(self.effort)
+        status = Status.STOPPED
+        try:
+            status = self.advance_window(stop, look)
+        finally:
+            # Also where an interrupt has come in between.
+            if status == Status.STOPPED:
+                self.swarm.wander[:], self.span, self.effort = before
+        return status
+
+    def advance_window(self, stop: float, look: Look | None) -> Status:
+        """The same, with what trying has changed left as it is."""
         if not self.free.any():
             self.time = stop
             return Status.FINISHED
@@ -187,7 +203,7 @@ class Progress:
                 self.span = span = 0.5 * length
                 finished = Finished(self.free)
                 continue
-            status = self.run_fresh(fresh, finished)
+            status = self.run_fresh(fresh, finished, look)
             if status != Status.FINISHED:
                 return status
         self.take_over(finished)
@@ -196,10 +212,13 @@ class Progress:
             self.choose_span(span, islands.work / clusters.work)
         return Status.FINISHED if whole else Status.PAUSED
 
-    def run_fresh(self, fresh: Islands, finished: Finished) -> Status:
+    def run_fresh(self, fresh: Islands, finished: Finished, look: Look | None) -> Status:
         """Run islands to the window's end, and let their bodies stray as far as they have: FINISHED
         or the Status with which one of them ended."""
-        finished.add(fresh, *self.runner.run(self.swarm, fresh))
+        contacts = self.runner.run(self.swarm, fresh, look)
+        if contacts is None:
+            return Status.STOPPED
+        finished.add(fresh, *contacts)
         self.effort.add(fresh)
         for each in np.flatnonzero(fresh.codes != Status.FINISHED).tolist():
             self.failed = fresh.members_of(each)

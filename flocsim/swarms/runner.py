@@ -1,8 +1,12 @@
-"""Islands of a window as arrays, and how threads run them."""
+"""Islands of a window as arrays, and how threads run them.
+
+The thread that calls waits for the others and looks, every now and then, at how far they are and at
+whether to go on: compiled code hears nothing by itself, and one window may take minutes.
+"""
 
 import itertools
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 import attrs
 import numpy as np
@@ -12,6 +16,8 @@ from flocsim.arrays import (
     FULL,
     MASS,
     NOTHING_FULL,
+    REJECTED,
+    STEPS,
     Scene,
     Work,
     elimination_of,
@@ -20,13 +26,37 @@ from flocsim.arrays import (
 )
 from flocsim.integrators.backward_euler.driver import EULER_SIZE
 from flocsim.integrators.base import Integrator
-from flocsim.swarms.arrays import COST_COLUMNS, TRACK_COLUMNS, Found, Swarm, found_of
+from flocsim.swarms.arrays import (
+    COST_COLUMNS,
+    HALT,
+    STEPS_REJECTED,
+    STEPS_TAKEN,
+    TRACK_COLUMNS,
+    Found,
+    Swarm,
+    found_of,
+)
 
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
 """Room at first for pairs of features, for every body of so few, and of more."""
 
 CHUNK = 64
 """Bodies of islands that a thread takes at once."""
+
+LOOK_SECONDS = 0.1
+"""Seconds between two looks at islands that run."""
+
+FULL_BUDGET = 50
+"""Islands of so many bodies may try as many steps in a window as one may: more of them, so many
+fewer, as each costs so much more."""
+
+Look = Callable[[int], bool]
+"""Is given the steps tried in a window so far; whether to leave off."""
+
+
+def budget_of(max_steps: int, bodies: int) -> int:
+    """How many steps an island of so many bodies may try in a window."""
+    return max(1, max_steps * FULL_BUDGET // max(bodies, FULL_BUDGET))
 
 
 @attrs.define
@@ -48,6 +78,27 @@ class ThreadArrays:
         self.template, self.most_points = template, int(np.diff(template.first).max())
         self.by_size: dict[int, IslandArrays] = {}
         self.found: Found = found_of(256)
+        self.running: IslandArrays | None = None
+        self.halted = False
+
+    @property
+    def tried(self) -> int:
+        """Steps tried in the island that runs."""
+        running = self.running
+        return 0 if running is None else int(running.counts[STEPS] + running.counts[REJECTED])
+
+    def halt(self) -> None:
+        """Let the islands that run stop at their next steps."""
+        self.halted = True
+        for each in [*self.by_size.values()]:
+            each.observed[0, HALT] = 1.0
+
+    def begin(self) -> None:
+        """Begin a window."""
+        self.halted, self.running = False, None
+        self.found.filled[0] = 0
+        for each in self.by_size.values():
+            each.observed[0, HALT] = 0.0
 
     def of_size(self, size: int, integrator: Integrator) -> IslandArrays:
         """Arrays for islands of so many bodies."""
@@ -139,10 +190,10 @@ class Runner:
     pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
     pool: ThreadPoolExecutor | None = None
 
-    def helpers(self) -> ThreadPoolExecutor:
-        """The threads beside the one that calls."""
+    def workers(self) -> ThreadPoolExecutor:
+        """The threads that run islands."""
         if self.pool is None:
-            self.pool = ThreadPoolExecutor(len(self.threads) - 1)
+            self.pool = ThreadPoolExecutor(len(self.threads))
         return self.pool
 
     def islands_of(
@@ -164,11 +215,12 @@ class Runner:
         self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int
     ) -> None:
         """Run islands of one size."""
-        place = own.of_size(int(islands.sizes[first]), self.integrator)
+        size = int(islands.sizes[first])
+        own.running = place = own.of_size(size, self.integrator)
         start_clock = self.integrator.fresh_clock()
-        start_counts = self.integrator.fresh_counts(self.max_steps)
+        start_counts = self.integrator.fresh_counts(budget_of(self.max_steps, size))
         record = np.zeros((0, 1))
-        while True:
+        while not own.halted:
             first = self.driver(
                 swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
                 place.euler, start_clock, start_counts, islands.members, islands.starts,
@@ -181,34 +233,68 @@ class Runner:
             else:
                 place.work = with_room(place.work)
 
-    def run(self, swarm: Swarm, islands: Islands) -> tuple[np.ndarray, np.ndarray]:
+    def run(
+        self, swarm: Swarm, islands: Islands, look: Look | None = None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Run islands, those of a size one after another, in all threads: the contacts that they
-        leave behind (links and slips), in any order."""
+        leave behind (links and slips), in any order; None where a look at them said to leave off.
+        """
         chunks = chunks_of(islands.sizes)
         largest = int(islands.sizes.max(initial=0))
 
         def work_off(own: ThreadArrays) -> None:
-            own.found.filled[0] = 0
             own.forget_above(largest)
-            while chunks:
+            while chunks and not own.halted:
                 try:
                     first, last = chunks.pop()
                 except IndexError:
-                    return
+                    break
                 self.run_chunk(own, swarm, islands, first, last)
+            own.running = None
 
+        def tried() -> int:
+            done = islands.costs[:, [STEPS_TAKEN, STEPS_REJECTED]].sum()
+            return int(done) + sum(own.tried for own in self.threads)
+
+        for own in self.threads:
+            own.begin()
+        if self.pool is None:
+            # Compiled here, by one thread, and where an interrupt is answered.
+            self.run_chunk(self.threads[0], swarm, islands, 0, 0)
+        at_work = [self.workers().submit(work_off, own) for own in self.threads]
         try:
-            others = [self.helpers().submit(work_off, own) for own in self.threads[1:]]
-            work_off(self.threads[0])
+            halted = self.watched(at_work, tried, look)
         finally:
-            # Where this one is interrupted, the others end with what they have begun.
-            chunks.clear()
-        for other in others:
-            other.result()
+            # Where this one is interrupted, the others stop as well.
+            if any(not each.done() for each in at_work):
+                self.halt(at_work)
+        for each in at_work:
+            each.result()
+        if halted:
+            return None
         counts = [int(own.found.filled[0]) for own in self.threads]
         both = list(zip(self.threads, counts, strict=True))
         links = np.concatenate([own.found.links[:count] for own, count in both])
         return links, np.concatenate([own.found.slips[:count] for own, count in both])
+
+    def watched(
+        self, at_work: list["Future[None]"], tried: Callable[[], int], look: Look | None
+    ) -> bool:
+        """Wait for all threads, and look at them meanwhile; whether they are to leave off."""
+        while wait(at_work, LOOK_SECONDS).not_done:
+            if any(each.done() and each.exception() for each in at_work):
+                return True
+            if look is not None and look(tried()):
+                return True
+        return False
+
+    def halt(self, at_work: list["Future[None]"]) -> None:
+        """Let all threads stop, and wait until they have."""
+        while True:
+            for own in self.threads:
+                own.halt()
+            if not wait(at_work, LOOK_SECONDS).not_done:
+                return
 
 
 def larger(found: Found) -> Found:

@@ -31,11 +31,14 @@ from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.together.bonds import BondGauge
 from flocsim.swarms.together.contacts import Gauge
 from flocsim.swarms.trajectory import SwarmTrajectory
-from flocsim.system import System, check_bodies, check_forces, read_seed
+from flocsim.system import System, check_bodies, check_forces, check_limits, read_seed
 
 LEAST_BOX = 3.0
 """A box that repeats itself is so many times as wide as the largest body at least: two bodies must
 not meet in two places at once."""
+
+MOST_STEPS = 200_000
+"""Steps that an island may try in a window by default, as in studies."""
 
 MANY = 200
 """Of more bodies than that, forces without a reach are refused: all of them would act on all."""
@@ -135,7 +138,8 @@ class Swarm:
                 raise UsageError(FLOW_ADVICE.format(axis=axis))
 
     def check_overlaps(self, gauge: Gauge) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap."""
+        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
+        may, and are no neighbours."""
         position, _ = self.system.motion()
         near = gauge.neighbours(position)
         for (i, j), vector in zip(near.pairs.tolist(), near.vector, strict=True):
@@ -147,7 +151,7 @@ class Swarm:
                 raise UsageError(f"bodies {j} and {i} start {fault}; move them apart")
 
     def begin(
-        self, until: float, *, threads: int = 1, max_steps: int = 10_000_000,
+        self, until: float, *, threads: int = 1, max_steps: int = MOST_STEPS,
         leaving: Leaving | None = None,
     ) -> Progress:  # fmt: skip
         """A Progress to a time [s] that has yet to begin; ``leaving``: what becomes of bodies that
@@ -168,17 +172,20 @@ class Swarm:
 
     def run(
         self, until: float | str, *, every: float | str | None = None,
-        times: Sequence[float] | None = None, threads: int = 1, max_steps: int = 10_000_000,
+        times: Sequence[float] | None = None, threads: int = 1, max_steps: int = MOST_STEPS,
         watch: Callable[[float], bool] | None = None,
     ) -> SwarmTrajectory:  # fmt: skip
         """Move the bodies until a time, in s or as "10 s", and return the SwarmTrajectory.
 
         Its times: ``times`` [s], or one ``every`` so long; without either, start and end.
-        ``threads`` may run at once, which changes no number. ``max_steps`` of an island in a
-        window. ``watch(time)`` is called at every common time, and ends the run where it returns
-        what counts as true. A run that ends early says why in ``status``.
+        ``threads`` may run at once, which changes no number. ``max_steps`` may be tried from one
+        common time to the next by an island of up to 50 bodies, by one of n 50/n times as many: a
+        run that needs more ends as STEP_BUDGET, with the island's bodies in ``failed``.
+        ``watch(time)`` is called at every common time, and ends the run where it returns what
+        counts as true. A run that ends early says why in ``status``.
         """
         end: float = in_unit(until, "s", "until")
+        check_limits(end, max_steps)
         stops = stops_of(end, every, times)
         if not is_whole(threads) or threads < 1:
             raise UsageError(f"threads must be a whole number from 1, found {threads!r}")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of
+from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of, counts_as_pair
 from flocsim.compiler.composer import compose
 from flocsim.compiler.reads import where
 from flocsim.forces.check import asked_at
@@ -50,6 +50,7 @@ def views_of(system, scene, work, time):
             centre_view(scene, work, time, NOW, a, b)
             for a in range(len(system.bodies))
             for b in range(a)
+            if counts_as_pair(scene.bodies, a, b)
         ],
     }
     if compose(locate, system.fillings(), jit=False)(scene, work):
@@ -133,13 +134,15 @@ def force_to_blame(system: Any, run: Run) -> str:
     if not np.isfinite(start).all():
         return ""
     work = copy_of(run.work)
-    pieces = [(force, laws_of([force], system.fluid)) for force in system.pieces.used.values()]
+    used = system.pieces.used
+    pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
+    classes = [type(force) for force in used.values()]
     for ahead in AHEAD:
         work.motion[NOW] = start
         work.motion[NOW, :, :VELOCITY] += ahead * start[:, VELOCITY:]
         views = views_of(system, scene, work, run.clock[TIME] + ahead)
-        for force, own in pieces:
+        for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)
             if words:
-                return words
+                return f"{name}: {words}" if classes.count(type(force)) > 1 else words
     return ""

@@ -32,11 +32,12 @@ from flocsim.arrays import (
     Scene,
     Work,
     copy_of,
-    with_capacity,
+    with_room,
 )
 from flocsim.body import Body, Fluid
-from flocsim.forces.base import Force
+from flocsim.forces.base import Force, names_of
 from flocsim.forces.codegen import laws_of
+from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import contact_point
@@ -158,14 +159,9 @@ class Replay:
     @functools.cached_property
     def single_scenes(self) -> dict[str, Scene]:
         """{name of a force: the scene with it alone}."""
-        names: list[str] = []
-        for force in self.origin.forces:
-            name = type(force).__name__
-            names.append(name if name not in names else f"{name} {1 + names.count(name)}")
-        return {
-            name: self.scene_of([force])
-            for name, force in zip(names, self.origin.forces, strict=True)
-        }
+        forces = self.origin.forces
+        named = zip(names_of(forces), forces, strict=True)
+        return {name: self.scene_of([force]) for name, force in named}
 
     def to_step(self, step: int) -> None:
         """Go on until so many steps of the trajectory have been taken."""
@@ -219,9 +215,11 @@ class Replay:
         """The Instant of a motion (n, 6) near where the run is now."""
         work = copy_of(self.run.work)
         work.motion[NOW] = motion
-        if has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0:
+        touching = has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0
+        if touching or not watches_all(work):
             while not work.tally[CANDIDATES] and not list_candidates(self.scene, work):
-                work = with_capacity(work, 2 * len(work.candidates))
+                work = with_room(work)
+        if touching:
             locate_contacts(self.scene, work, NOW)
             set_closed(work)
             for row in range(work.tally[CANDIDATES]):

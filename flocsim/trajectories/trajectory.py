@@ -186,11 +186,12 @@ class Trajectory:
         return next(Replay(self.known()).instants(wanted, self.all_steps[0])).contacts()
 
     def forces(self, t: Any = None) -> dict[str, np.ndarray]:
-        """{force: (k, n, 3)} force and torque of each kind on every body [N, N, N m].
+        """{force: (k, n, 3)} force and torque of each one on every body [N, N, N m].
 
-        At times (k,) [s], by default ``t``; (n, 3) at a single one. Kinds are named by their
-        classes. At steps they are those that the run was driven by; between two, those of `at`'s
-        state, which of stiff contacts are no better than that.
+        At times (k,) [s], by default ``t``; (n, 3) at a single one. Forces are named by their
+        classes, further ones of a class as "Pull (2)". At steps they are those that the run was
+        driven by; between two, those of `at`'s state, which of stiff contacts are no better than
+        that.
         """
         wanted = self.checked_times(self.t if t is None else t)
         replay, order = Replay(self.known()), np.argsort(wanted, kind="stable")

@@ -46,8 +46,9 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
     position = np.zeros((*shape, bodies, 3))
     position[..., :2] = 1e-5 * rng.random((replicates, 1, bodies, 2))
     position[..., 1] -= 1e-6 * np.arange(times)[:, None]
-    numbers = ("clusters", "largest", "mean_size", "gyration", "porosity", "fractal_dimension",
-               "settling", "bonds_certificate", "bonds_hook", "bonds_rest", "bonds_touching",
+    numbers = ("clusters", "largest", "percolating", "mean_size", "gyration", "porosity",
+               "fractal_dimension", "settling", "bonds_certificate", "bonds_hook", "bonds_rest",
+               "bonds_touching",
                "removed", "reentered", "median_error", "error")  # fmt: skip
     counts = {name: np.full(shape, 2.0) for name in numbers}
     each = {name: np.full((replicates, bodies), 1e-6) for name in ("r_eq", "spheroradius", "mass")}

@@ -62,7 +62,7 @@ def test_a_terminal_has_one_line_that_is_cleared_at_the_end(clock):
         "60%  120 of 200 replicates, 0 s left",
     ]
     assert text.endswith("\r")
-    assert {len(part) for part in text.split("\r") if part} == {70}
+    assert {len(part) for part in text.split("\r") if part} == {78}
 
 
 def test_quiet_is_quiet(clock):
@@ -80,7 +80,25 @@ def test_nothing_done_yet_divides_by_nothing(clock):
     report = Progress(10, False, stream)
     clock[0] = 6.0
     report.report(10)
-    assert stream.getvalue() == "  0%  0 of 10 replicates, 0 s left\n"
+    assert stream.getvalue() == "  0%  0 of 10 replicates\n"
+
+
+def test_what_runs_is_said_and_a_line_on_a_terminal_stays_one(clock):
+    lines, bar = io.StringIO(), Terminal()
+    going = "swarm 3 at 0.5 s, 1000000 steps on"
+    for stream in (lines, bar):
+        clock[0] = 0.0
+        report = Progress(1000, False, stream, "snapshots")
+        clock[0] = 60.0
+        report.report(500, going)
+        clock[0] = 70.0
+        report.report(500, going * 3)
+    assert lines.getvalue().splitlines() == [
+        f" 50%  500 of 1000 snapshots, 60 s left; {going}",
+        f" 50%  500 of 1000 snapshots, 70 s left; {going * 3}",
+    ]
+    assert {len(part) for part in bar.getvalue().split("\r") if part} == {78}
+    assert bar.getvalue().startswith(f"\r 50%  500 of 1000 snapshots, 60 s left; {going}")
 
 
 def test_other_things_than_replicates_are_counted(clock):

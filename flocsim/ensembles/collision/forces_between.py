@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.forces.base import PairForce
+from flocsim.forces.base import PairForce, told_apart
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators.rhs.views import pair_view
 from flocsim.plausibility.settling import lone_view, no_force
@@ -20,10 +20,19 @@ a step, is its own error."""
 def outline_name(encounter: Encounter) -> str:
     """The name of what acts at the outlines: contact, and the forces of the surface gap that add up
     with it there, by their names."""
-    acting = encounter.system.pieces.used.values()
-    pairs = [each for each in acting if isinstance(each, PairForce)]
-    surface = [type(each).__name__ for each in pairs if each.acts_on == "surfaces"]
-    return " + ".join([OUTLINES, *(NAMES.get(name, name) for name in surface)])
+    system = encounter.system
+    surface = [
+        name
+        for name, each in zip(plain_names(system.forces), system.forces, strict=True)
+        if isinstance(each, PairForce) and not each.absent and each.acts_on == "surfaces"
+    ]
+    return " + ".join([OUTLINES, *surface])
+
+
+def plain_names(forces):
+    """What forces are called in a figure, no two alike."""
+    classes = [type(each).__name__ for each in forces]
+    return told_apart(NAMES.get(each, each) for each in classes)
 
 
 def geometry(position, velocity, shapes):
@@ -39,7 +48,7 @@ def centre_forces(encounter, times, geometry):
     """{name: (k,) force [N]}, above 0 where it pushes apart, of every force between the centres."""
     system, (_, distance, gap, rate) = encounter.system, geometry
     found = {}
-    for force in system.forces:
+    for name, force in zip(plain_names(system.forces), system.forces, strict=True):
         pieces = laws_of([force], system.fluid)
         kernel = pieces.laws.get("centre_force")
         if kernel is not None:
@@ -47,8 +56,7 @@ def centre_forces(encounter, times, geometry):
                 pair_view(encounter.scene, *now[:1], 1, 0, *now[1:])
                 for now in zip(times, gap, rate, distance, strict=True)
             )
-            name = type(force).__name__
-            found[NAMES.get(name, name)] = np.array([kernel(v, pieces.parameters) for v in views])
+            found[name] = np.array([kernel(v, pieces.parameters) for v in views])
     return found
 
 

@@ -645,7 +645,9 @@ class IntegratorConfig:
         MOST_STEPS,
         default=200_000,
         beside_class=True,
-        help="steps after which a replicate ends undecided",
+        help="steps after which a replicate ends undecided; of a swarm, those that an island may "
+        "try from one common time to the next, of more than 50 bodies 50 times so many over its "
+        "bodies",
     )
     step: float | None = quantity(
         "s", above=0.0, default=None, help="for methods with a fixed step"

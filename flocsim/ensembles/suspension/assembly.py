@@ -176,6 +176,7 @@ def table_of(results: SwarmResults) -> str:
         "clusters": (mean(counts["clusters"]), "{:.1f}"),
         "largest": (mean(counts["largest"]), "{:.1f}"),
         "mean size": (mean(counts["mean_size"]), "{:.2f}"),
+        "percolating": (mean(counts["percolating"]), "{:.1f}"),
         "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
         "porosity": (mean(counts["porosity"]), "{:.3f}"),
         "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
@@ -184,6 +185,8 @@ def table_of(results: SwarmResults) -> str:
         "error of half [m]": (mean(counts["median_error"]), "{:.1e}"),
         "largest [m]": (mean(counts["error"]), "{:.1e}"),
     }
+    if not np.any(counts["percolating"] > 0.0):
+        del columns["percolating"]
     rows = [list(columns)]
     for place in range(len(results.scales["time"])):
         rows.append([form.format(values[place]) for values, form in columns.values()])

@@ -1,9 +1,10 @@
 """Replicates of a swarm study dealt to the ranks of a job, one at a time.
 
-Rank 0 has the journal. It runs replicates like the others, and between its windows takes in what
-they have kept and hands out what is left: what runs for hours can wait for the length of a window.
+Rank 0 has the journal. It runs replicates like the others, and between its windows, and now and
+then within long ones, takes in what they have kept and hands out what is left.
 """
 
+import functools
 import time
 from collections.abc import Callable
 
@@ -38,6 +39,18 @@ class Task:
 
 
 @attrs.frozen
+class Alive:
+    """How far a replicate is: the time [s] of its window, and the steps tried in that so far."""
+
+    replicate: int
+    time: float
+    tried: int
+
+    def __str__(self) -> str:
+        return f"swarm {self.replicate} at {self.time:.4g} s, {self.tried} steps on"
+
+
+@attrs.frozen
 class Halt:
     """Leave off, keeping the state."""
 
@@ -46,16 +59,20 @@ def kept_of(part: Part) -> Kept:
     return Kept(part.encoded(), part.of == MOMENT)
 
 
+ALIVE_SECONDS = 1.0
+"""Seconds between two messages of a rank that say how far it is."""
+
+
 class Dealer:
     """Rank 0's: hands out replicates, and keeps what comes in.
 
-    ``append`` takes records; ``told(kept)`` is called for each. ``todo``: replicates that are
-    missing, each with where it was left.
+    ``append`` takes records; ``told(message)`` is called for each, as Kept, and where a replicate
+    goes on, as Alive. ``todo``: replicates that are missing, each with where it was left.
     """
 
     def __init__(
         self, comm: Communicator, todo: dict[int, Left | None], append: Callable[[bytes], object],
-        told: Callable[[Kept], None],
+        told: Callable[[Kept | Alive], None],
     ) -> None:  # fmt: skip
         self.comm, self.todo, self.append, self.told = (
             comm,
@@ -77,6 +94,9 @@ class Dealer:
         self.append(kept.record)
         self.told(kept)
 
+    def going(self, replicate: int, at: float, tried: int) -> None:
+        self.told(Alive(replicate, at, tried))
+
     def serve(self) -> bool:
         """Take in what has come; whether a signal has asked to stop."""
         if stop_requested() and not self.halted:
@@ -86,6 +106,8 @@ class Dealer:
         for source, message in self.comm.messages():
             if isinstance(message, Kept):
                 self.keep(message)
+            elif isinstance(message, Alive):
+                self.told(message)
             elif isinstance(message, Ask):
                 task = self.next()
                 if task.replicate is None:
@@ -96,9 +118,11 @@ class Dealer:
     def run(self, study: SwarmStudy) -> None:
         """Run replicates here, and see that all others are done."""
         while (task := self.next()).replicate is not None:
+            replicate = task.replicate
             run_replicate(
-                study, task.replicate, lambda part: self.keep(kept_of(part)), task.left, self.serve
-            )
+                study, replicate, lambda part: self.keep(kept_of(part)), task.left, self.serve,
+                functools.partial(self.going, replicate),
+            )  # fmt: skip
             self.serve()
         while self.waiting:
             self.serve()
@@ -107,7 +131,13 @@ class Dealer:
 
 def follow_dealer(study: SwarmStudy, comm: Communicator) -> None:
     """What every other rank does: run replicates until there are none."""
-    halted = False
+    halted, said = False, time.monotonic()
+
+    def going(replicate: int, at: float, tried: int) -> None:
+        nonlocal said
+        if time.monotonic() - said > ALIVE_SECONDS:
+            said = time.monotonic()
+            comm.send(0, Alive(replicate, at, tried))
 
     def is_halted() -> bool:
         nonlocal halted
@@ -121,5 +151,6 @@ def follow_dealer(study: SwarmStudy, comm: Communicator) -> None:
         if task.replicate is None:
             return
         run_replicate(
-            study, task.replicate, lambda part: comm.send(0, kept_of(part)), task.left, is_halted
-        )
+            study, task.replicate, lambda part: comm.send(0, kept_of(part)), task.left, is_halted,
+            functools.partial(going, task.replicate),
+        )  # fmt: skip

@@ -1,5 +1,6 @@
 """One replicate of a swarm study, from its start or from where it was left, to its end."""
 
+import math
 import time
 from collections.abc import Callable
 
@@ -18,6 +19,9 @@ from flocsim.swarms.together.bonds import Bonds
 from flocsim.swarms.together.clusters import Clusters
 from flocsim.swarms.together.contacts import Gauge
 
+Going = Callable[[float, int], None]
+"""Is told how far a replicate is: the time [s] of its window, the steps tried in that so far."""
+
 
 @attrs.frozen(eq=False)
 class Left:
@@ -29,12 +33,13 @@ class Left:
 
 def run_replicate(
     study: SwarmStudy, replicate: int, keep: Callable[[Part], None], left: Left | None = None,
-    halted: Callable[[], bool] | None = None,
+    halted: Callable[[], bool] | None = None, going: Going | None = None,
 ) -> bool:  # fmt: skip
     """Run a replicate; whether it has come to its end.
 
-    ``keep`` takes its Parts as they come. ``halted()``, looked at between windows, makes it leave
-    off, its state kept.
+    ``keep`` takes its Parts as they come. ``halted()``, looked at between windows and now and then
+    within long ones, makes it leave off, its state kept. ``going(time, tried)`` is told as often
+    how far it is: the time [s] of the window, and the steps that were tried in it.
     """
     swarm, drawn, box = study.swarm(replicate)
     gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
@@ -44,6 +49,12 @@ def run_replicate(
         leaving=study.leaving(replicate, swarm, box),
     )  # fmt: skip
     stops = study.stops
+
+    def look(tried: int) -> bool:
+        if going is not None:
+            going(progress.time, tried)
+        return halted is not None and halted()
+
     if left is None or not fits(left, swarm):
         keep(bodies_part(replicate, swarm, drawn, box))
         seen = progress.swarm.motion.copy()
@@ -55,9 +66,9 @@ def run_replicate(
         moments, seen = left.moments, left.state["seen"]
     kept_at, status = time.monotonic(), Status.FINISHED
     for place in range(moments, len(stops)):
-        while (status := progress.advance(stops[place])) == Status.PAUSED:
+        while (status := progress.advance(stops[place], look)) in (Status.PAUSED, Status.STOPPED):
             late = time.monotonic() - kept_at > study.scene.checkpoint
-            stopped = halted is not None and halted()
+            stopped = status == Status.STOPPED or look(0)
             if late or stopped:
                 keep(state_part(replicate, place, progress, seen))
                 kept_at = time.monotonic()
@@ -135,16 +146,23 @@ def moment_part(
 
 
 def summary_of(clusters: Clusters) -> dict[str, float]:
-    """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first two."""
+    """Numbers on all clusters: of a body's cluster in the mean over mass, but for the first
+    three; over the mass of those that have the quantity."""
     if not len(clusters):
-        return {"clusters": 0, "largest": 0}
+        return {"clusters": 0, "largest": 0, "percolating": 0}
     share = clusters.mass / clusters.mass.sum()
+
+    def mean(values: np.ndarray) -> float:
+        known = np.isfinite(values)
+        return float(share[known] @ values[known] / share[known].sum()) if known.any() else math.nan
+
     return {
         "clusters": len(clusters),
         "largest": int(clusters.size.max()),
+        "percolating": int(clusters.percolates.sum()),
         "mean_size": clusters.mean_size,
-        "gyration": float(share @ clusters.gyration),
-        "porosity": float(share @ clusters.porosity),
+        "gyration": mean(clusters.gyration),
+        "porosity": mean(clusters.porosity),
         "fractal_dimension": clusters.fractal_dimension(),
         "settling": float(-share @ clusters.velocity[:, 1]),
     }

@@ -26,7 +26,7 @@ from flocsim.ensembles.storage.resume import REMEDY, RESUME, claim
 from flocsim.ensembles.storage.stored_json import is_session, stored
 from flocsim.ensembles.suspension.assembly import Found, found_in, results_of, table_of
 from flocsim.ensembles.suspension.checks import Form
-from flocsim.ensembles.suspension.dealing import Dealer, Kept, follow_dealer
+from flocsim.ensembles.suspension.dealing import Alive, Dealer, Kept, follow_dealer
 from flocsim.ensembles.suspension.identity import identity_of
 from flocsim.ensembles.suspension.study import SwarmStudy, flocs_of
 from flocsim.errors import ConfigError, FileError, UsageError
@@ -159,9 +159,13 @@ class Lead:
         self.comm.barrier()
         progress.start(replicates * moments - self.done)
 
-        def told(kept: Kept) -> None:
-            self.done += kept.is_moment
-            progress.report(replicates * moments - self.done)
+        def told(message: Kept | Alive) -> None:
+            going = ""
+            if isinstance(message, Alive):
+                going = str(message)
+            else:
+                self.done += message.is_moment
+            progress.report(replicates * moments - self.done, going)
 
         dealer = Dealer(self.comm, missing, self.journal.append, told)
         dealer.run(self.study)

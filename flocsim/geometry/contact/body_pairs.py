@@ -1,8 +1,9 @@
 """Which bodies may come near each other before they have moved much: the pairs that are watched.
 
-Few bodies are all watched; of many, those whose bounding circles are near (sweep.py). A pair that
-is not listed lies further apart than what acts on it reaches, and than two bodies may go until the
-next listing.
+A pair counts where one of its bodies is free: fixed ones do not act on each other, however many
+there are, and may overlap. Of few bodies all such pairs are watched; of many, those whose bounding
+circles are near (sweep.py). A pair that counts and is not listed lies further apart than what acts
+on it reaches, and than two bodies may go until the next listing.
 """
 
 import math
@@ -37,7 +38,7 @@ anew."""
 
 
 def watches_all(work):
-    """Whether all pairs are watched."""
+    """Whether all pairs that count are watched."""
     return work.bodies.shape[0] <= ALL_PAIRS
 
 

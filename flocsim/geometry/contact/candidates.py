@@ -143,12 +143,12 @@ def moved(scene, work, state, a, b, enough):
 
 def spent(scene, work, state):
     """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
-    worst, pairs = 0.0, work.pairs.shape[0]
+    worst = 0.0
     if not watches_all(work):
         if work.tally[REBUILDS] == 0:
             return math.inf
-        worst, pairs = wandered(scene, work, state), work.tally[PAIRS]
-    for pair in range(pairs):
+        worst = wandered(scene, work, state)
+    for pair in range(work.tally[PAIRS]):
         budget = work.budget[pair]
         if budget <= 0.0:
             return math.inf

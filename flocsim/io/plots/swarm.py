@@ -63,10 +63,12 @@ def snapshots(results: SwarmResults) -> Figure:
 def clusters(results: SwarmResults) -> Figure:
     """Clusters over time: their number, sizes, radius of gyration and settling, of all swarms."""
     counts, times = results.groups["counts"], results.scales["time"]
+    endless = np.any(counts["percolating"] > 0.0)
+    finite = ",\nof those that do not percolate" if endless else ""
     shown = [
         ("clusters", 1.0, "clusters"),
         ("mean_size", 1.0, "bodies of a body's cluster"),
-        ("gyration", MICRO, "radius of gyration [µm]"),
+        ("gyration", MICRO, f"radius of gyration [µm]{finite}"),
         ("settling", 1e3, "settling [mm/s]"),
     ]
     with house_style():

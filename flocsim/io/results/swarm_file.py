@@ -26,7 +26,7 @@ from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 ROOT = {"format": "text", "schema_version": "i8"}
 
 WALL = -2
@@ -37,8 +37,11 @@ COUNTS = {
     "clusters": ("f8", "1", "clusters, single bodies among them"),
     "largest": ("f8", "1", "bodies of the largest cluster"),
     "mean_size": ("f8", "1", "bodies of a body's cluster, in the mean over bodies"),
-    "gyration": ("f8", "m", "radius of gyration of a cluster, in the mean over mass"),
-    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass"),
+    "percolating": ("f8", "1", "clusters that hang together with their images round the box"),
+    "gyration": ("f8", "m", "radius of gyration of a cluster, in the mean over mass; of those "
+                 "that do not percolate"),
+    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass; "
+                 "of those that do not percolate"),
     "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
     "settling": ("f8", "m s-1", "downward velocity of clusters, in the mean over mass"),
     "bonds_certificate": ("f8", "1", "touching pairs that no later load can part"),
@@ -49,7 +52,7 @@ COUNTS = {
     "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
     "median_error": ("f8", "m", "stated error of position that half of the bodies keep below"),
     "error": ("f8", "m", "largest stated error of position of a body"),
-}
+}  # fmt: skip
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
 
 BY_CLASS = {"n_class": ("f8", "1", "clusters of each size class")}

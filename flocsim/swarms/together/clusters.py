@@ -8,10 +8,15 @@ import numpy as np
 from flocsim.body import Body
 from flocsim.swarms.together.contacts import Neighbours
 
+ROUNDING = 1e-6
+"""Ways round a cluster that differ by less than this share of its extent differ by rounding: the
+others by a whole box."""
+
 
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
     """(label of every body's cluster (n,), the body's place (n, 2) [m] as seen from the cluster's
-    first one, along the contacts): clusters are whole across the seams of a box."""
+    first one, along the contacts): clusters are whole across the seams of a box, but for those that
+    percolate."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -33,6 +38,19 @@ def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.
     return labels, places
 
 
+def percolating(neighbours: Neighbours, labels: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Whether every body's cluster percolates (n,), of what `placed_together` gives: round a box
+    that repeats itself it hangs together with its own images, so that another way along the
+    contacts leads to another place."""
+    endless = np.zeros(len(labels), bool)
+    if len(neighbours.pairs):
+        later, earlier = neighbours.pairs.T
+        astray = np.hypot(*(places[later] - places[earlier] - neighbours.vector).T)
+        extent = np.hypot(*places.T).max() + np.hypot(*neighbours.vector.T).max()
+        endless[labels[later[astray > ROUNDING * extent]]] = True
+    return endless[labels]
+
+
 @attrs.frozen(eq=False, repr=False)
 class Clusters:
     """The clusters of bodies that hang together at one time; fixed bodies hold nothing together.
@@ -41,7 +59,9 @@ class Clusters:
     its bodies; ``mass`` [kg]; ``area`` [m²] of its bodies; ``gyration`` [m], the radius of gyration
     R_g = √(Σ (m ρ² + I)/Σ m) about its centre of mass, that of a body by itself included;
     ``velocity`` (c, 2) [m/s] of its centre of mass; ``porosity``, 1 − area/area of the convex hull
-    of its bodies' core points swept by their disks (0 for one convex body).
+    of its bodies' core points swept by their disks (0 for one convex body); ``percolates`` (c,),
+    whether it hangs together with its own images round a box that repeats itself. Such a cluster
+    has no end, so that ``gyration`` and ``porosity`` are NaN.
     """
 
     label: np.ndarray
@@ -51,6 +71,7 @@ class Clusters:
     gyration: np.ndarray
     velocity: np.ndarray
     porosity: np.ndarray
+    percolates: np.ndarray
 
     @classmethod
     def of(
@@ -65,8 +86,9 @@ class Clusters:
         both = free[neighbours.pairs].all(axis=1)
         held = Neighbours(neighbours.pairs[both], neighbours.gap[both], neighbours.vector[both])
         labels, places = placed_together(len(bodies), held)
-        names, label = np.unique(labels[free], return_inverse=True)
-        count = len(names)
+        endless = percolating(held, labels, places)
+        names, firsts, label = np.unique(labels[free], return_index=True, return_inverse=True)
+        count, percolates = len(names), endless[free][firsts]
         known = [body for body, moves in zip(bodies, free, strict=True) if moves]
         mass = np.array([body.mass for body in known])
         inertia = np.array([body.inertia for body in known])
@@ -78,15 +100,15 @@ class Clusters:
         own = places[free]
         centre = np.column_stack([mean(own[:, axis]) for axis in range(2)])
         away2 = np.sum((own - centre[label]) ** 2, axis=1)
-        gyration = np.sqrt(mean(away2 + inertia / mass))
+        gyration = np.where(percolates, math.nan, np.sqrt(mean(away2 + inertia / mass)))
         motion = np.column_stack([mean(velocity[free, axis]) for axis in range(2)])
         area = np.bincount(label, [body.shape.area for body in known], count)
-        hulls = hull_areas(known, own, position[free, 2], label, count)
+        hulls = hull_areas(known, own, position[free, 2], label, ~percolates)
         whole = np.full(len(bodies), -1)
         whole[free] = label
         return cls(
             whole, np.bincount(label, minlength=count), total, area, gyration, motion,
-            np.clip(1.0 - area / hulls, 0.0, 1.0),
+            np.clip(1.0 - area / hulls, 0.0, 1.0), percolates,
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -112,8 +134,8 @@ class Clusters:
 
     def fractal_dimension(self, least: int = 4) -> float:
         """D_f of mass ∝ R_g^D_f over the clusters of at least so many bodies, by least squares in
-        logarithms; nan where fewer than three sizes are there."""
-        chosen = self.size >= least
+        logarithms, without those that percolate; nan where fewer than three sizes are there."""
+        chosen = (self.size >= least) & ~self.percolates
         if len(np.unique(self.size[chosen])) < 3:
             return math.nan
         slope, _ = np.polyfit(np.log(self.gyration[chosen]), np.log(self.mass[chosen]), 1)
@@ -121,13 +143,14 @@ class Clusters:
 
 
 def hull_areas(
-    bodies: list[Body], places: np.ndarray, angles: np.ndarray, label: np.ndarray, count: int
+    bodies: list[Body], places: np.ndarray, angles: np.ndarray, label: np.ndarray, ends: np.ndarray
 ) -> np.ndarray:
-    """Areas [m²] of the convex hulls of clusters' outlines, whose arcs are drawn by 64 points."""
+    """Areas [m²] of the convex hulls of clusters' outlines, whose arcs are drawn by 64 points; NaN
+    for those that have no ``ends`` (c,)."""
     from scipy.spatial import ConvexHull
 
-    areas = np.zeros(count)
-    for cluster in range(count):
+    areas = np.full(len(ends), math.nan)
+    for cluster in np.flatnonzero(ends).tolist():
         rings = []
         for each in np.flatnonzero(label == cluster):
             x, y = places[each].tolist()

@@ -40,9 +40,9 @@ def vectors_between(scene, work, vectors):
 
 @attrs.frozen(eq=False)
 class Neighbours:
-    """Pairs of bodies that are near each other: ``pairs`` (m, 2), the later one first; ``gap`` (m,)
-    [m] between their outlines, below 0 where they overlap; ``vector`` (m, 2) [m] from the centroid
-    of the earlier one to that of the later one's nearest image."""
+    """Pairs of bodies, not both fixed, that are near each other: ``pairs`` (m, 2), the later one
+    first; ``gap`` (m,) [m] between their outlines, below 0 where they overlap; ``vector`` (m, 2)
+    [m] from the centroid of the earlier one to that of the later one's nearest image."""
 
     pairs: np.ndarray
     gap: np.ndarray

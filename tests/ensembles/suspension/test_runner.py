@@ -2,6 +2,7 @@
 the file."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -19,8 +20,10 @@ from flocsim.ensembles.suspension.replicate import Left, run_replicate
 from flocsim.ensembles.suspension.runner import form_of
 from flocsim.ensembles.suspension.study import SwarmStudy
 from flocsim.errors import FileError, UsageError
+from flocsim.io import terminal
 from flocsim.io.journal.records import Record, scan
 from flocsim.io.results.swarm_file import read_swarm
+from flocsim.swarms import runner
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
 
 
@@ -92,6 +95,46 @@ def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
     assert np.array(motions[0]).tobytes() == np.array(motions[1]).tobytes()
     efforts = [parts[-1].facts for parts in (whole, rest)]
     assert efforts[0] == efforts[1]
+
+
+def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
+    config = swarm_config(tmp_path)
+    whole, _ = run_parts(config)
+    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
+    parts, left, times = [], None, 0
+    while True:
+        found, ended = run_parts(config, halts=range(2, 10**9) if times < 6 else (), left=left)
+        parts += found
+        if ended:
+            break
+        times += 1
+        state = part_of_encoded(found[-1])
+        left = Left(state.facts["moments"], state.arrays)
+    assert times > 1
+    moments = [
+        [each.encoded() for each in some if each.of == "moment"] for some in (whole, parts)
+    ]  # fmt: skip
+    assert moments[0] == moments[1]
+
+
+def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys):
+    """In whole lines where no terminal is; within windows, too."""
+    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
+    study = SwarmStudy(swarm_config(tmp_path))
+    told = []
+    run_replicate(study, 0, lambda part: None, going=lambda *now: told.append(now))
+    assert [time for time, _ in told] == sorted(time for time, _ in told)
+    assert any(tried == 0 for _, tried in told)
+    assert 0.0 < told[-1][0] <= 0.3
+    path = write_swarm_study(tmp_path)
+    assert main(["swarm", str(path), "-o", str(tmp_path / "told.h5")]) == 0
+    output = capsys.readouterr().out
+    lines = [line for line in output.splitlines() if "; swarm " in line]
+    assert lines
+    for line in lines:
+        assert re.search(r"\d of 8 snapshots.*; swarm [01] at [\d.e-]+ s, \d+ steps on$", line)
+    assert "\r" not in output
 
 
 @pytest.mark.parametrize("leaving", ["remove", "reenter"])
@@ -262,6 +305,6 @@ def test_a_dealer_hands_out_each_replicate_once(monkeypatch):
             return iter(())
 
     ran, kept = [], []
-    monkeypatch.setattr(dealing, "run_replicate", lambda s, k, keep, left, halted: ran.append(k))
+    monkeypatch.setattr(dealing, "run_replicate", lambda s, k, *rest: ran.append(k))
     dealing.Dealer(Alone(), {3: None, 1: None}, kept.append, lambda each: None).run(None)
     assert ran == [1, 3] and not kept

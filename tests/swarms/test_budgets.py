@@ -1,0 +1,125 @@
+"""Windows that take long: they end by a budget that goes with what steps cost, show that they live,
+and can be left at any time without a trace."""
+
+import _thread
+import functools
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from flocsim import Body, Sphere
+from flocsim.integrators import Implicit, Status
+from flocsim.swarms.runner import FULL_BUDGET, Runner, budget_of
+from flocsim.swarms.swarm import Swarm
+from tests.helpers.swarm_scenes import WATER, R, crowd, forces
+
+TINY, LONG = 1e-9, 1e3
+"""Steps, and a run whose windows would last for hours by them [s]."""
+
+
+class Short(Implicit):
+    """The same method, by such steps."""
+
+    largest_step = TINY
+
+
+def slow(count=1):
+    """A swarm whose first window takes for ever."""
+    bodies = [Body(Sphere(R), (1e-3 * k, 0.0), density=2650.0) for k in range(count)]
+    return Swarm(bodies, forces(), Short(), WATER)
+
+
+def bytes_of(progress):
+    return {name: array.tobytes() for name, array in progress.state().items()}
+
+
+@pytest.mark.parametrize("max_steps", [1, 1000, 200_000])
+def test_steps_of_large_islands_are_as_many_fewer_as_they_cost_more(max_steps):
+    assert budget_of(max_steps, 1) == budget_of(max_steps, FULL_BUDGET) == max_steps
+    for bodies in (FULL_BUDGET + 1, 1000, 100_000):
+        steps = budget_of(max_steps, bodies)
+        assert steps >= 1
+        assert steps == 1 or steps * bodies <= FULL_BUDGET * max_steps
+        assert (steps + 1) * bodies > FULL_BUDGET * max_steps
+
+
+@pytest.mark.parametrize("count", [3, 2 * FULL_BUDGET])
+def test_an_island_that_uses_its_budget_up_is_named(count):
+    """A row of discs that touch: one island, whose budget ends it; a lone disc goes on."""
+    row = [Body(Sphere(R), (2.0 * R * k, 0.0), density=2650.0) for k in range(count)]
+    bodies = [Body(Sphere(R), (0.0, 1.0), density=2650.0), *row]
+    swarm = Swarm(bodies, forces(), Short(), WATER)
+    run = swarm.run(1.0, max_steps=400)
+    assert run.status == Status.STEP_BUDGET
+    assert run.failed.tolist() in ([0], list(range(1, count + 1)))
+    taken = run.effort.steps + run.effort.rejected
+    assert taken <= budget_of(400, count) + 400 + 2
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_long_window_is_looked_at_and_left_as_it_was(threads):
+    progress = slow(3).begin(LONG, threads=threads, max_steps=10**12)
+    before, seen = bytes_of(progress), []
+
+    def look(tried):
+        seen.append(tried)
+        return len(seen) == 4
+
+    began = time.monotonic()
+    assert progress.advance(LONG, look) == Status.STOPPED
+    assert time.monotonic() - began < 60.0  # of which most compiles
+    assert sorted(seen) == seen and seen[-1] > seen[0]
+    assert bytes_of(progress) == before
+
+
+def test_looks_change_no_bit(monkeypatch):
+    """However often a window is left and tried again, the run ends with the same bytes."""
+    bodies, side = crowd(20, 4)
+    watched, ends = Runner.watched, []
+
+    def after(self, at_work, tried, look, pause):
+        """A first look after a moment, wherever the islands are by then."""
+        time.sleep(pause)
+        return look(tried()) or watched(self, at_work, tried, look)
+
+    for often, pause in ((0, 0.0), (1, 0.0), (1, 1e-4), (1, 1e-3)):
+        monkeypatch.setattr(Runner, "watched", functools.partialmethod(after, pause=pause))
+        progress = Swarm(bodies, forces(), fluid=WATER, box=(side, side)).begin(0.02)
+        calls, left, status = 0, 0, Status.PAUSED
+        while status != Status.FINISHED:
+            status = progress.advance(0.02, lambda _, now=calls % 2 < often: now)
+            left += status == Status.STOPPED
+            calls += 1
+        assert (left > 3) == (often > 0)
+        ends.append(bytes_of(progress))
+    assert all(each == ends[0] for each in ends)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_interrupt_is_answered_within_a_window(threads):
+    slow().begin(1e-8).advance(1e-8)  # compiled
+    began = []
+
+    def interrupt():
+        began.append(time.monotonic())
+        _thread.interrupt_main()
+
+    timer = threading.Timer(0.5, interrupt)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        slow().run(LONG, threads=threads, max_steps=10**12)
+    assert time.monotonic() - began[0] < 1.0
+    assert not timer.is_alive()
+
+
+def test_what_fails_in_a_thread_is_raised():
+    def fail(*args):
+        raise MemoryError("no room")
+
+    progress = slow(3).begin(1.0)
+    progress.runner.driver = fail
+    with pytest.raises(MemoryError, match="no room"):
+        progress.advance(1.0)
+    assert np.array_equal(progress.swarm.wander, progress.least_wander)
