@@ -58,7 +58,7 @@ SLIP_RATES = STATES
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
 held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing, and 1 where it stays closed though it is apart (integrators.events.grazes).
+that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).
 Displacements, offsets, forces and gaps that are set aside while the list is made anew."""
 
 (

@@ -50,6 +50,19 @@ def skin_factor():
 
 
 @hook
+def pays_across(scene, work, clock, trials, passed):
+    """Whether steps that go on across switches would have passed a time [s] in far fewer than the
+    ``trials`` that it took."""
+    return False
+
+
+@hook
+def advance_across(scene, work, observed, clock, counts, record, euler):
+    """Run with steps that go on across switches until a Status; 0 where ``attempt`` is to go on."""
+    return 0
+
+
+@hook
 def awaits_touch(observed):
     """Whether a method of fixed steps, too, is to end a step where the first pair touches."""
     return False

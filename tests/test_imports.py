@@ -58,7 +58,8 @@ INNER_ROWS = {
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
-        ["implicit", "parts", "backward_euler", "few_bodies"],
+        ["implicit"],
+        ["parts", "backward_euler", "few_bodies"],
         ["loop", "radau"],
         ["events"],
         ["rhs"],

@@ -20,7 +20,9 @@ from flocsim.arrays import (
     X,
 )
 from flocsim.fields import quantity
-from flocsim.hooks import end_within, skin_factor
+from flocsim.hooks import advance_across, end_within, pays_across, skin_factor
+from flocsim.integrators.backward_euler.choice import pays
+from flocsim.integrators.backward_euler.driver import advance_across as euler_across
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.grazes import leave_early, settle
@@ -156,6 +158,8 @@ class Implicit(Integrator):
             settle_grazes: settle,
             leave_at_once: leave_early,
             skin_factor: wide_skin,
+            pays_across: pays,
+            advance_across: euler_across,
             carry_vector: carry_error,
             overlap_error: step_overlap_error,
         }

@@ -32,7 +32,6 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts, row_radii
-from flocsim.geometry.contact.rolling import rolled
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
 from flocsim.hooks import attempt, end_within, observe
 from flocsim.integrators.events.crossings import may_switch
@@ -54,6 +53,7 @@ from flocsim.integrators.loop.step_size import (
     shortest_needed,
 )
 from flocsim.integrators.rhs.friction import slip_in
+from flocsim.integrators.rhs.rolling import rolled, rolled_besides
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
@@ -156,11 +156,12 @@ def went_too_far(scene, work, clock):
     return scene.surface_reach > 0.0 and clock[TOLERANCE] < math.inf and overlooked(scene, work)
 
 
-def roll_slips(scene, work):
-    """Tangential displacements of the closed pairs in NEW, which is located."""
+def roll_slips(scene, work, step):
+    """Tangential displacements of the closed pairs in NEW, which is located, after a step."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES:
-            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row)
+            besides = 0.5 * step * rolled_besides(scene, work, NEW, row)
+            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row) + besides
             work.slip[NEW, row] = slip_in(scene, work, NEW, row, stuck)
 
 
@@ -172,7 +173,7 @@ def ends_early(scene, work, clock, step, ratio, share):
     if not end_within(scene, work, step, ratio, share):
         return False
     locate_contacts(scene, work, NEW)
-    roll_slips(scene, work)
+    roll_slips(scene, work, share * step)
     # A long step may have run through a body: what came first is seen from a nearer end alone.
     resolution, depth = resolutions_of(work, clock)
     return not may_switch(scene, work, share * step, resolution, depth)

@@ -19,12 +19,12 @@ from flocsim.arrays import (
     PACE,
     SEEN_PACE,
     SEEN_STEP,
+    SLIP_RATES,
     SOLVES,
     TIME,
     TOUCHES,
     VELOCITY,
 )
-from flocsim.geometry.contact.rolling import rolled
 from flocsim.integrators.events.resolution import memory_of
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
@@ -34,6 +34,7 @@ from flocsim.integrators.rhs.error import rounding_size, step_tolerance
 from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_stage
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
+from flocsim.integrators.rhs.rolling import rolled, rolled_besides
 from flocsim.integrators.rhs.views import along_normal, lever
 
 MOST_ITERATIONS = 10
@@ -73,20 +74,32 @@ def place_stages(work, step):
                 motion[FIRST_STAGE + stage, body, axis] = motion[NOW, body, axis] + step * mean
 
 
-def slip_stage(scene, work, stage):
-    """Tangential displacements of the closed pairs in a stage, which is located."""
+def slip_stages(scene, work, step, first):
+    """Tangential displacements of the closed pairs in the stages from ``first`` on, which are
+    located."""
+    slip = work.slip
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES:
-            stuck = work.slip[NOW, row] + rolled(scene, work, stage, row)
-            work.slip[stage, row] = slip_in(scene, work, stage, row, stuck)
+            for stage in range(first, 3):
+                besides = rolled_besides(scene, work, FIRST_STAGE + stage, row)
+                slip[SLIP_RATES + FIRST_STAGE + stage, row] = besides
+            for stage in range(first, 3):
+                one, two, three = MATRIX[stage]
+                mean = one * slip[SLIP_RATES + FIRST_STAGE, row]
+                mean += two * slip[SLIP_RATES + SECOND_STAGE, row]
+                mean += three * slip[SLIP_RATES + THIRD_STAGE, row]
+                state = FIRST_STAGE + stage
+                stuck = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
+                slip[state, row] = slip_in(scene, work, state, row, stuck)
 
 
 def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
         locate_touching(scene, work, state)
-        if state != NOW:
-            slip_stage(scene, work, state)
+    if first == FIRST_STAGE:
+        slip_stages(scene, work, step, 0)
+    for state in range(first, last):
         node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
 
@@ -139,7 +152,7 @@ def finish_stages(scene, work, step):
     """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
     locate_touching(scene, work, THIRD_STAGE)
-    slip_stage(scene, work, THIRD_STAGE)
+    slip_stages(scene, work, step, 2)
     take_stage(work, THIRD_STAGE)
 
 

@@ -37,7 +37,7 @@ def test_the_sphere_code_is_the_polygon_code_for_points(place):
 def test_two_spheres_touch_on_the_line_of_centres_at_the_middle_of_the_overlap():
     scene, work = arrays(sphere(1e-6, 0.0, 0.0), sphere(2e-6, 2.8e-6, 0.0))
     assert locate_contacts(scene, work, NOW) == pytest.approx(-0.2e-6)
-    nx, ny, gap, a_n, a_t, b_n, b_t, turning, _ = work.geometry[NOW, 0]
+    nx, ny, gap, a_n, a_t, b_n, b_t, turning = work.geometry[NOW, 0, :8]
     side = 1.0 if work.candidates[0, 0] == 1 else -1.0
     assert [nx, ny, gap] == pytest.approx([side, 0.0, -0.2e-6])
     assert [a_n, b_n] == pytest.approx([0.0, 0.0], abs=1e-22)

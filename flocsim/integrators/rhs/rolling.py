@@ -9,7 +9,8 @@ s the foot's place on the edge, φ the direction of the normal, D = r_a + r_b + 
 r = r_a + gap/2 the radius at which the disk of the vertex rolls. On the edge's inside the normal
 turns with the edge, and at its end the foot stays, so that one formula serves both. Between two
 states the displacement is therefore known from where the bodies are, whatever a method makes of the
-motion in between: a doublet that turns as one has none, however long its steps.
+motion in between: a doublet that turns as one has none, however long its steps. What is left to be
+summed over a step is next to nothing: D and r change with the gap, by its change times the turn.
 """
 
 import math
@@ -23,10 +24,12 @@ from flocsim.arrays import (
     NORMAL_Y,
     NOW,
     SIDE,
+    SPIN,
     TURNING,
     VERTEX_BODY,
 )
 from flocsim.geometry.contact.points import row_radii
+from flocsim.integrators.rhs.views import tangential_rate
 
 
 def turn_of_normal(work, state, row):
@@ -38,12 +41,12 @@ def turn_of_normal(work, state, row):
 
 
 def rolled(scene, work, state, row):
-    """How far the tangential displacement of a pair has grown from now to a state [m]; both are
-    located."""
+    """How far the tangential displacement of a pair has grown from now to a state, at the gap of
+    now [m]; both are located."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     g = work.geometry
     radius_a, radius_b = row_radii(scene, work, row)
-    gap = 0.5 * (g[NOW, row, GAP] + g[state, row, GAP])
+    gap = g[NOW, row, GAP]
     turn_a = work.motion[state, a, ANGLE] - work.motion[NOW, a, ANGLE]
     turn_b = work.motion[state, b, ANGLE] - work.motion[NOW, b, ANGLE]
     inside = NOW if g[NOW, row, TURNING] == 0.0 else state
@@ -51,3 +54,17 @@ def rolled(scene, work, state, row):
     about = turn_of_normal(work, state, row) - turn_b
     rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
     return along + (radius_a + radius_b + gap) * about + rolling
+
+
+def rolled_besides(scene, work, state, row):
+    """How fast it grows besides, in a state, as the gap is another one than now [m/s]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    g, spin_b = work.geometry, work.motion[state, b, SPIN]
+    radius_a, radius_b = row_radii(scene, work, row)
+    gap, apart = g[state, row, GAP], g[state, row, GAP] - g[NOW, row, GAP]
+    relative = spin_b - work.motion[state, a, SPIN]
+    about = 0.0
+    if g[state, row, TURNING] != 0.0:
+        rolling = (radius_a + 0.5 * gap) * relative
+        about = (tangential_rate(work, state, row) - rolling) / (radius_a + radius_b + gap)
+    return apart * (about + 0.5 * relative)
