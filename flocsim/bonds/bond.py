@@ -32,7 +32,7 @@ NO_BOND, CERTIFICATE, HOOK, REST = range(4)
 
 class Bond(NamedTuple):
     """Bodies ``i`` and ``j``; the unit vector from i's centroid to j's, and their distance [m]; the
-    least gap of their features [m], and ``apart``, that by which surface forces go [m]."""
+    least gap of their features [m], and ``surface_gap``, that by which surface forces go [m]."""
 
     i: int
     j: int
@@ -40,7 +40,7 @@ class Bond(NamedTuple):
     ny: float
     distance: float
     gap: float
-    apart: float
+    surface_gap: float
 
 
 class Load(NamedTuple):
@@ -62,11 +62,11 @@ def bond_between(scene, work, time, i, j):
     """The Bond of two bodies whose features are listed and located."""
     nx, ny, distance = centre_line(scene, work, NOW, j, i)
     gap = least_listed_gap(work)
-    apart = gap
+    surface = gap
     if scene.surface_reach > 0.0 and work.tally[CANDIDATES] > 0:
         flag_near(scene, work, NOW, 0.0)
-        apart = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES]).gap
-    return Bond(i, j, nx, ny, distance, gap, apart)
+        surface = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES]).gap
+    return Bond(i, j, nx, ny, distance, gap, surface)
 
 
 def is_closed(work, row):

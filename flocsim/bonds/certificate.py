@@ -21,6 +21,7 @@ import math
 
 from flocsim.arrays import CANDIDATES, NOW, SPIN
 from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, speeds_of
+from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
 from flocsim.integrators.rhs.views import effective_mass, pair_view
@@ -43,7 +44,7 @@ FINER = 0.125
 def attraction_at(scene, time, bond, way):
     """(between centres, between outlines) [N] at rest, both gaps wider by a way [m]."""
     centres, surfaces = 0.0, 0.0
-    distance, gap = bond.distance + way, bond.apart + way
+    distance, gap = bond.distance + way, bond.surface_gap + way
     if has(scene, CENTRE_FORCE):
         between = distance - radii_of(scene, bond)
         view = pair_view(scene, time, bond.j, bond.i, between, 0.0, distance)
@@ -53,6 +54,7 @@ def attraction_at(scene, time, bond, way):
     return centres, surfaces
 
 
+@apart
 def most_between(scene, time, bond, start, end, near, share):
     """What the attraction comes to at most over the ways from ``start`` to ``end`` [N], as capacity
     has it, and the way at which all of it is most [m]; ``share``: steps over the gap there."""
@@ -71,21 +73,27 @@ def most_between(scene, time, bond, start, end, near, share):
         if has(scene, CENTRE_FORCE):
             left = min(left, abs(bond.distance + way - sizes))
         if scene.surface_reach > 0.0:
-            left = min(left, abs(bond.apart + way))
+            left = min(left, abs(bond.surface_gap + way))
         way += max(share * left, LEAST_RUNG)
     return all_of_it, follows, pries, best
+
+
+@apart
+def lets_out(scene, time, bond, pull, needed):
+    """Whether less than an energy [J] leads out of the attraction, a pull [N] helping."""
+    return can_climb(scene, time, bond.j, bond.i, bond.distance, bond.surface_gap, pull, needed)
 
 
 def capacity(scene, time, bond, near):
     """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
     a repulsion of centres; that of centres alone, over a way ``near`` [m])."""
-    if not has(scene, CENTRE_FORCE) and not scene.surface_reach > bond.apart:
+    if not has(scene, CENTRE_FORCE) and not scene.surface_reach > bond.surface_gap:
         return 0.0, 0.0, 0.0
     sizes = radii_of(scene, bond)
-    end = 2.0 * sizes + max(-bond.apart, sizes - bond.distance, 0.0)
+    end = 2.0 * sizes + max(-bond.surface_gap, sizes - bond.distance, 0.0)
     most, follows, pries, best = most_between(scene, time, bond, 0.0, end, near, RUNG)
     # Once more about the highest place, which may be a cusp.
-    around = RUNG * (abs(bond.apart + best) if scene.surface_reach > 0.0 else sizes)
+    around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
     if has(scene, CENTRE_FORCE):
         around = min(around, RUNG * abs(bond.distance + best - sizes))
     known = scene, time, bond, max(best - around, 0.0), best + around, near, FINER * RUNG
@@ -130,8 +138,7 @@ def is_held(scene, work, time, bond, load):
         return False
     # In a well, which they might still be leaving.
     moving = 0.5 * mass * along * along
-    known = scene, time, bond.j, bond.i, bond.distance, bond.apart
-    return bond.gap < 0.0 or not can_climb(*known, load.force, moving)
+    return bond.gap < 0.0 or not lets_out(scene, time, bond, load.force, moving)
 
 
 def is_trapped(scene, work, time, bond, load):
@@ -145,7 +152,7 @@ def is_trapped(scene, work, time, bond, load):
     if not centres > pull:
         return False
     needed = SAFETY * energy_of(scene, work, bond)
-    return not can_climb(scene, time, bond.j, bond.i, bond.distance, bond.apart, pull, needed)
+    return not lets_out(scene, time, bond, pull, needed)
 
 
 def is_certain(scene, work, time, bond, load):
@@ -161,4 +168,4 @@ def is_certain_in_kicks(scene, work, time, bond, load):
         if not follows > pull:
             pull *= leverage(work, bond, load.lever)
     needed = BARRIER * load.kicks + energy_of(scene, work, bond)
-    return not can_climb(scene, time, bond.j, bond.i, bond.distance, bond.apart, pull, needed)
+    return not lets_out(scene, time, bond, pull, needed)

@@ -9,9 +9,9 @@ smaller spheroradius against it.
 
 from flocsim.arrays import BOUNDING_RADIUS, FREE, NOW, RADIUS, SPIN
 from flocsim.bonds.bond import HOOK, NO_BOND, REST, are_spheres, radii_of
-from flocsim.bonds.certificate import CALM
+from flocsim.bonds.certificate import CALM, lets_out
 from flocsim.bonds.statics import is_hooked
-from flocsim.integrators.rhs.climb import BARRIER, can_climb
+from flocsim.integrators.rhs.climb import BARRIER
 
 STILL = 1e-3
 """A pair that has moved by less than this share of the drift's way keeps its pose."""
@@ -58,8 +58,7 @@ def outlasts_kicks(scene, time, bond, load):
     if not are_spheres(scene, bond):
         radii = scene.bodies[bond.i, RADIUS], scene.bodies[bond.j, RADIUS]
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
-    known = scene, time, bond.j, bond.i, bond.distance, bond.apart
-    return load.force > 0.0 and not can_climb(*known, load.force, barrier)
+    return load.force > 0.0 and not lets_out(scene, time, bond, load.force, barrier)
 
 
 def kind_at_rest(scene, work, time, bond, load, rested):

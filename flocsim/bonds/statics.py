@@ -22,6 +22,7 @@ import math
 
 from flocsim.arrays import CANDIDATES, FREE, NORMAL_X, NORMAL_Y, NOW, VERTEX_BODY
 from flocsim.bonds.bond import are_spheres, is_closed, resting_contact, size_of
+from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.laws import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
@@ -127,6 +128,7 @@ def load_works(scene, bond, load, size, motion):
     return max(at_j, at_i, pulling) > ROUNDING
 
 
+@apart
 def is_hooked(scene, work, bond, load):
     """Whether the contacts of the two carry every load that the doublet meets."""
     grip, size = grip_of(scene, work), size_of(scene, bond.i, bond.j)

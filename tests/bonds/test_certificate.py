@@ -3,7 +3,6 @@ among them."""
 
 import math
 
-import attrs
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -15,30 +14,13 @@ from flocsim.bonds.certificate import SAFETY, capacity, is_certain, is_certain_i
 from flocsim.bonds.rest import FAR_LONGER, kind_at_rest
 from flocsim.bonds.statics import is_hooked
 from flocsim.constants import BOLTZMANN
-from flocsim.fields import quantity
-from flocsim.forces import Contact, SurfaceForce, VanDerWaals
+from flocsim.forces import Contact, VanDerWaals
+from tests.helpers.hydration import Hydration
 from tests.helpers.trial_scenes import Spring
 from tests.helpers.two_bodies import TwoBodies, load, polygon
 
 RADII = (4e-6, 5e-6)
 REDUCED = RADII[0] * RADII[1] / sum(RADII)
-
-
-@attrs.frozen
-class Hydration(SurfaceForce):
-    """F = 2π P r* exp(−gap/λ), a layer of water that keeps outlines apart."""
-
-    pressure: float = quantity("N/m", above=0.0, default=3e-3)
-    length: float = quantity("m", above=0.0, default=6e-10)
-
-    @property
-    def reach(self):
-        return 30.0 * self.length
-
-    @staticmethod
-    def kernel(pair, pressure, length):
-        layer = math.exp(-max(pair.gap, 0.0) / length)
-        return 2.0 * math.pi * pressure * pair.reduced_radius * layer
 
 
 def net_attraction(gap, hamaker, layer):
@@ -81,7 +63,7 @@ def test_a_well_above_the_touch_is_judged_by_the_most_that_it_bears(share):
 def test_only_what_is_calm_is_held_by_its_well(speed, held):
     motion = np.zeros((2, 3))
     motion[1, 1] = -speed * certificate.CALM * 1e-3
-    two, most = in_well(1e-12, motion=motion)
+    two, _ = in_well(1e-12, motion=motion)
     pull = load(1e-12)
     assert is_certain(two.scene, two.work, 0.0, two.bond, pull) == held
 
@@ -99,7 +81,7 @@ def test_who_is_on_the_way_out_of_a_well_is_not_held_by_it():
 
 def test_capacity_is_the_largest_attraction_of_centres_and_outlines_together():
     """A spring between the centres that pulls from some distance on, and one that pushes."""
-    two, most = in_well(1e-12)
+    two, _ = in_well(1e-12)
     only = capacity(two.scene, 0.0, two.bond, 0.0)
     assert only[0] == only[1] and only[2] == 0.0
     forces = [VanDerWaals(4.7e-20, gap="surface"), Contact(), Spring(1e-3, 1e-6)]

@@ -1,4 +1,4 @@
-"""Hooks by statics: drawn cases with known answers, a linear program, and the same seen otherwise."""
+"""Hooks by statics: drawn cases with known answers, a linear program, the same seen otherwise."""
 
 import math
 
@@ -13,7 +13,7 @@ from flocsim.bonds.bond import is_closed, size_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.slip_transfer import contact_point
 from tests.helpers.trial_scenes import star
-from tests.helpers.two_bodies import TwoBodies, load, polygon
+from tests.helpers.two_bodies import ANCHOR, CHANNEL, TwoBodies, load, polygon
 
 TOUCH = 1e-4
 """How far outlines overlap in the drawings [um], whose corners are rounded by .05 um."""
@@ -24,13 +24,6 @@ ELL = [(-5, 0), (-5, -1), (-0.2, -1), (-0.2, 0), (-4, 0), (-4, 8), (-5, 8)]
 """A foot that points to the right at the lower end of a bar."""
 OVER = [(-4 - x, -y) for x, y in ELL]
 """The same upside down: its arm lies on the foot, its bar hangs down to the right."""
-
-ANCHOR = [(-0.5, 8), (-0.5, 1), (-3, 1), (-3, 0), (3, 0), (3, 1), (0.5, 1), (0.5, 8)]
-CHANNEL = [
-    (-4, -2), (4, -2), (4, 2), (1, 2), (1, 1), (3.5, 1), (3.5, -1), (-3.5, -1), (-3.5, 1), (-1, 1),
-    (-1, 2), (-4, 2),
-]  # fmt: skip
-"""A channel whose lips lie on the feet of the anchor from above."""
 
 
 def drawn(points_i, points_j, shift=(0.0, 0.0), friction="none", **options):

@@ -12,6 +12,13 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
 from tests.helpers.swarm_scenes import WATER
 
+ANCHOR = [(-0.5, 8), (-0.5, 1), (-3, 1), (-3, 0), (3, 0), (3, 1), (0.5, 1), (0.5, 8)]
+CHANNEL = [
+    (-4, -2), (4, -2), (4, 2), (1, 2), (1, 1), (3.5, 1), (3.5, -1), (-3.5, -1), (-3.5, 1), (-1, 1),
+    (-1, 2), (-4, 2),
+]  # fmt: skip
+"""A channel whose lips lie on the feet of the anchor from above."""
+
 
 class TwoBodies:
     """Two shapes at places (2, 3) [m, m, rad], with motions (2, 3) and forces of their own."""

@@ -103,7 +103,7 @@ def is_caged(scene, work, observed, time):
     if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
         return False
     bond = bond_between(scene, work, time, BODY_I, BODY_J)
-    between = bond.apart
+    between = bond.surface_gap
     if are_spheres(scene, bond):
         between = bond.distance - radii_of(scene, bond)
     return observed[CAGE_LOW] < between < observed[CAGE_HIGH]
