@@ -1,15 +1,15 @@
 """Rests: bonds that have shown to hold, by keeping their pose while the load was at its worst.
 
-Where the contacts carry that load by themselves (statics.py) such a bond is a hook; what merely has
-kept its pose is a rest. A rest shows that the doublet holds, not that no kick could open it. Where
-thermal motion kicks, spheres rest where BARRIER k_B T keep them in their attraction against the
-load, and shapes, whose contacts no potential tells of, where it takes as much to lift one by the
-smaller spheroradius against it.
+Where attraction could not carry the load, and the contacts do by themselves (statics.py), such a
+bond is a hook; what merely has kept its pose is a rest. A rest shows that the doublet holds, not
+that no kick could open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them in
+their attraction against the load, and shapes, whose contacts no potential tells of, where it takes
+as much to lift one by the smaller spheroradius against it.
 """
 
 from flocsim.arrays import BOUNDING_RADIUS, FREE, NOW, RADIUS, SPIN
 from flocsim.bonds.bond import HOOK, NO_BOND, REST, are_spheres, radii_of
-from flocsim.bonds.certificate import CALM, lets_out
+from flocsim.bonds.certificate import CALM, capacity, lets_out
 from flocsim.bonds.statics import is_hooked
 from flocsim.integrators.rhs.climb import BARRIER
 
@@ -67,4 +67,5 @@ def kind_at_rest(scene, work, time, bond, load, rested):
         return NO_BOND
     if load.kicks > 0.0 and not outlasts_kicks(scene, time, bond, load):
         return NO_BOND
-    return HOOK if is_hooked(scene, work, bond, load) else REST
+    borne, _, _ = capacity(scene, time, bond, 0.0)
+    return HOOK if borne <= load.force and is_hooked(scene, work, bond, load) else REST

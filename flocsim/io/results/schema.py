@@ -150,7 +150,8 @@ COORDINATES = {
     "bond": (
         "1",
         "certificate: no later load can open it; hook: at rest, and the contacts carry the load, "
-        "as statics shows; rest: it has kept its pose under its load, without such a proof",
+        "as statics shows, where attraction could not; rest: it has kept its pose under its load, "
+        "without such a proof",
     ),
     "replicate": ("1", "replicate index"),
     "floc": ("1", "name of the floc"),
