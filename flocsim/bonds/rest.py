@@ -2,9 +2,9 @@
 
 Where attraction could not carry the load, and the contacts do by themselves (statics.py), such a
 bond is a hook; what merely has kept its pose is a rest. A rest shows that the doublet holds, not
-that no kick could open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them in
-their attraction against the load, and shapes, whose contacts no potential tells of, where it takes
-as much to lift one by the smaller spheroradius against it.
+that no kick could open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them
+in their attraction against the load, and shapes, whose contacts no potential tells of, where it
+takes as much to lift one by the smaller spheroradius against it.
 """
 
 from flocsim.arrays import BOUNDING_RADIUS, FREE, NOW, RADIUS, SPIN
