@@ -27,7 +27,7 @@ ROWS = [
     ["trajectories"],
     ["io"],
     ["explain", "run"],
-    ["plausibility"],
+    ["bonds", "plausibility"],
     ["forces", "integrators"],
     ["body"],
     ["geometry", "laws"],

@@ -56,8 +56,7 @@ def format_table(
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
     "-" where there was no event to estimate a probability from. Of the aggregations some hang by
-    their shapes, attraction being weaker than the load, and the others stick. Returns text without
-    a final line end.
+    their shapes, as statics shows, and the others stick. Returns text without a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
     ends = [name for name in ENDS if name != "n_held" or np.any(table[name])]

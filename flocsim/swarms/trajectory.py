@@ -52,13 +52,13 @@ class SwarmTrajectory:
         near = self.neighbours(at, within)
         return Clusters.of(self.bodies, self.position[at], self.velocity[at], near)
 
-    def bonds(self, at: int = -1) -> Bonds:
-        """What holds the pairs that touch at a time of ``t``: by a certificate, by a hook, at rest
-        since the time of ``t`` before, or nothing that is proved."""
+    def bonds(self, at: int = -1, within: float = 0.0) -> Bonds:
+        """What holds the pairs that touch, or lie nearer than a gap [m], at a time of ``t``: a
+        certificate, a hook or a rest since the time of ``t`` before, or nothing that is proved."""
         at = range(len(self.t))[at]
         motion = np.concatenate([self.position, self.velocity], axis=2)
         before = (float(self.t[at - 1]), motion[at - 1]) if at else None
-        touching = self.gauge.neighbours(self.position[at])
+        touching = self.gauge.neighbours(self.position[at], within)
         return self.bond_gauge().bonds(float(self.t[at]), motion[at], touching, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:

@@ -11,7 +11,9 @@ import numpy as np
 from flocsim import hooks
 from flocsim.arrays import NOW, Scene, Work, work_of
 from flocsim.body import Body
-from flocsim.ensembles.collision import bonds, meetings, outcomes
+from flocsim.bonds.certificate import SAFETY
+from flocsim.bonds.rest import REST_TURNS
+from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, replicate_row
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
@@ -42,9 +44,6 @@ OBSERVER: dict[Callable, Callable] = {
 
 KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: kicked.watch_kicked_pair}
 """The same for one under thermal motion."""
-
-REST_TURNS = 3.0
-"""Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
 
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
@@ -262,7 +261,7 @@ class Encounter:
             # Shapes come round what acts between their centres.
             return 0.0, 0.0
         mobility = sum(each for _, each in self.yielding)
-        load, barrier = bonds.SAFETY * self.largest_load, BARRIER * self.kick_energy
+        load, barrier = SAFETY * self.largest_load, BARRIER * self.kick_energy
         return caged_between(self.pull, mobility, load, barrier)
 
     def time_limit(self, share: float = 1.0) -> float:

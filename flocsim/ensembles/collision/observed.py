@@ -13,7 +13,7 @@ settling, or the flow, can put on a bond [N]; whether they meet in a flow alone,
 [1/s]; k_B T [J], 0 without kicks, whether they meet by thermal motion alone, when ESCAPE is the
 distance of their centres [m], and the gaps [m] of a secondary minimum between which kicks do not
 let a pair out. Found: flags, centre distances [m], time [s], the kind of
-bond (bonds.py), and since when the doublet has been resting in which pose."""
+bond (flocsim.bonds), and since when the doublet has been resting in which pose."""
 
 BODY_I, BODY_J = range(2)
 """The two bodies of an encounter: the receiver, and the one that it meets."""

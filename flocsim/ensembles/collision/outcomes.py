@@ -3,11 +3,11 @@
 `watch_pair`, the observer, looks at the pair after every accepted step. Departed is a pair that
 touched and has parted for good (departure.py), missed one that parted so before it touched; held is
 one that has not touched and rests so, one body over the other, in a secondary minimum say; bound is
-one that has touched and is proved to stay together (bonds.py).
+one that has touched and is proved to stay together (flocsim.bonds).
 """
 
 from flocsim.arrays import NOW
-from flocsim.ensembles.collision.bonds import NO_BOND, bond_of, rests_for_long
+from flocsim.bonds.bond import NO_BOND
 from flocsim.ensembles.collision.departure import has_departed
 from flocsim.ensembles.collision.observed import (
     BODY_I,
@@ -22,6 +22,7 @@ from flocsim.ensembles.collision.observed import (
     T_COLLISION,
     ZONE,
 )
+from flocsim.ensembles.collision.resting import bond_of, rests_for_long
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.rhs.views import centre_line
@@ -75,5 +76,5 @@ def watch_pair(scene, work, observed, time):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
     if observed[COLLIDED] == 0.0:
         return HELD if rests_for_long(scene, work, observed, time) else 0
-    observed[BOND] = bond_of(scene, work, observed, time, gap, nx, ny, distance)
+    observed[BOND] = bond_of(scene, work, observed, time)
     return 0 if observed[BOND] == NO_BOND else BOUND

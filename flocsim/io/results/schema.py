@@ -124,8 +124,8 @@ DIFFERENCES = {
     "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
 }
 BONDS = ("certificate", "hook", "rest")
-"""Kinds of bond, from code 1 on: no later load can open it; shapes hook into each other, attraction
-being weaker than the load; the pair rests, held by more attraction than load."""
+"""Kinds of bond, from code 1 on: no later load can open it; the contacts carry the load, as statics
+shows; the pair has kept its pose under its load, without such a proof."""
 LAST_AXES = {"class": CLASSES, "bond": BONDS}
 """The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
 EVENTS = ("inside", "aggregated")
@@ -149,8 +149,9 @@ COORDINATES = {
     ),
     "bond": (
         "1",
-        "certificate: no later load can open it; hook: shapes hook into each other, attraction "
-        "being weaker than the load; rest: it rests, held by more attraction than load",
+        "certificate: no later load can open it; hook: at rest, and the contacts carry the load, "
+        "as statics shows, where attraction could not; rest: it has kept its pose under its load, "
+        "without such a proof",
     ),
     "replicate": ("1", "replicate index"),
     "floc": ("1", "name of the floc"),

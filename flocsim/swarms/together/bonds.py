@@ -1,18 +1,15 @@
-"""What holds the bodies of a swarm together that touch, as ensembles/collision/bonds.py has it for
-two.
+"""What holds the bodies of a swarm together: the proofs of flocsim.bonds, for all pairs that touch.
 
-Certificate: the two do not move against each other, and their attraction outweighs, by a safety
-factor, the largest load that settling can put on the bond, in any form and orientation of their
-cluster. A cluster that settles at V = Σ D v/Σ D, v and D the settling velocity and the resistance
-of each body alone, pulls at its bodies with D (v − V), which add up to nothing: no part of it pulls
-at the rest with more than half the sum of their sizes. That of two is |v_i − v_j|/(1/D_i + 1/D_j).
-Where the attraction acts between centres it must also hold against prying about each of the two
-outermost contact points, with a lever as long as the cluster; a surface force follows the contact.
+What a swarm knows is what loads a bond. A cluster that settles at V = Σ D v/Σ D, v and D the
+settling velocity and the resistance of each body alone, pulls at its bodies with D (v − V), which
+add up to nothing: no part of it pulls at the rest with more than half the sum of their sizes, in
+any form and orientation of the cluster. That of two is |v_i − v_j|/(1/D_i + 1/D_j). What rests on a
+wall does not settle: there the load is all the weight. Two that are a cluster by themselves are
+judged as a pair of a study is: the load is along their drift, and the doublet turns to hang. In a
+larger cluster it may come from anywhere, with an arm as long as the cluster.
 
-Rest: since the time before, the two have kept their pose. Where attraction alone could not carry
-the load, their shapes do, and such a rest is a hook. All others touch, and roll or part. What rests
-on a wall does not settle: there the load is all the weight. Where bodies are kicked, other proofs
-take the place of these (kicked.py).
+A pair rests where it has kept its pose since the time before, if that is a rest time ago at least.
+What is not known of a swarm at one instant is the tangential displacements of its contacts.
 """
 
 import math
@@ -22,107 +19,90 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import (
-    ANGLE,
     CANDIDATES,
     EARLIER,
-    GAP,
-    INERTIA,
     LATER,
+    NEW,
     NOW,
     PAIRS,
-    SPIN,
-    VX,
-    VY,
     with_room,
     work_of,
 )
+from flocsim.bonds.bond import (
+    CERTIFICATE,
+    NO_BOND,
+    Load,
+    bond_between,
+    doublet_pose,
+    radii_of,
+    way_between,
+)
+from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
+from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
-from flocsim.geometry.contact.slip_transfer import contact_point
-from flocsim.integrators.rhs.surface_gap import RANGE, flag_near, gap_of, surface_view
-from flocsim.integrators.rhs.views import (
-    centre_line,
-    centre_view,
-    contact_view,
-    pressed_view,
-)
-from flocsim.laws import (
-    CENTRE_FORCE,
-    CONTACT_FORCE,
-    centre_force,
-    compiled_calls,
-    contact_force,
-    has,
-    surface_force,
-)
+from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
+from flocsim.laws import compiled_calls
 from flocsim.plausibility.settling import least_mobility, terminal_motion
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Neighbours
-from flocsim.swarms.together.kicked import KickedBonds
 
-TOUCHING, CERTIFICATE, HOOK, REST = range(4)
 KINDS = ("touching", "certificate", "hook", "rest")
 """Kinds of bonds: those of pairs, and none that is proved."""
 
-SAFETY = 3.0
-"""Factor by which attraction must outweigh the load in a certificate."""
-
-CALM, STILL = 0.02, 1e-3
-"""A pair that moves at less than this share of the drift is calm enough for a certificate, and one
-that has moved by less than this share of the drift's way rests."""
-
-CENTRES, SURFACES, LEFT, RIGHT, NORMAL_OF, DISTANCE, APART, SPRINGS, PULL_COLUMNS = (
-    0, 1, 2, 3, 4, 6, 7, 8, 9,
-)  # fmt: skip
-"""Columns of what holds a pair: attraction between centres and between surfaces [N]; the levers of
-the contact points outermost on either side of the line of centres [m]; that line's direction and
-length [m]; the gap by which attraction goes at the outlines [m]; twice the energy of the contacts'
-normal springs [J]."""
+FORCE, DRIFT, DRIFT_X, DRIFT_Y, LEVER, ALONE, GAP, LOAD_COLUMNS = range(8)
+"""Columns of what is known of a pair: its Load, the direction of which is (0, 0) where it may be
+any, and the gap of its outlines [m]."""
 
 
-def stored(scene, work, row):
-    """Twice the energy of the normal spring of a contact [J]."""
-    if not has(scene, CONTACT_FORCE):
-        return 0.0
-    view = contact_view(scene, work, NOW, row)
-    normal, _ = contact_force(scene, pressed_view(view, view.overlap, 0.0))
-    return abs(normal * view.overlap)
+def list_pair(scene, work, pair, gap):
+    """List and locate the features of one pair, at a gap of the outlines [m], that any force knows;
+    False without room."""
+    work.tally[CANDIDATES] = 0
+    cut = 0.0
+    if scene.surface_reach > 0.0:
+        cut = gap_of(scene, measure_of(scene, max(gap, 0.0)) + RANGE)
+    if not list_polygons(scene, work, pair, cut):
+        return False
+    turn_body(work, NOW, work.pairs[pair, LATER])
+    turn_body(work, NOW, work.pairs[pair, EARLIER])
+    for row in range(work.tally[CANDIDATES]):
+        locate_polygons(scene, work, NOW, row)
+    return True
 
 
-def measure_pulls(scene, work, time, pulls):
-    """What holds the listed pairs, see CENTRES; False without room for their features."""
+def kind_of(scene, work, time, elapsed, bond, load):
+    """The kind of bond of two bodies whose places were in NEW a time ``elapsed`` [s] ago."""
+    if load.kicks > 0.0:
+        if is_certain_in_kicks(scene, work, time, bond, load):
+            return CERTIFICATE
+    elif is_certain(scene, work, time, bond, load):
+        return CERTIFICATE
+    i, j = bond.i, bond.j
+    now, before = doublet_pose(scene, work, NOW, i, j), doublet_pose(scene, work, NEW, i, j)
+    moved = way_between(scene, i, j, now, before)
+    if not moved < STILL * load.drift * elapsed or swings(scene, work, i, j, load):
+        return NO_BOND
+    rested = elapsed * load.drift / (REST_TURNS * radii_of(scene, bond))
+    return kind_at_rest(scene, work, time, bond, load, rested)
+
+
+def judge_bonds(scene, work, time, elapsed, kicks, loads, kinds):
+    """The ``kinds`` of the listed pairs under their ``loads``, see FORCE; False without room for
+    their features. ``elapsed``: how long ago places were those in NEW [s], 0 where none is known;
+    ``kicks``: k_B T [J]."""
     for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-        work.tally[CANDIDATES] = 0
-        cut = gap_of(scene, RANGE) if scene.surface_reach > 0.0 else 0.0
-        if not list_polygons(scene, work, pair, cut):
+        if not list_pair(scene, work, pair, loads[pair, GAP]):
             return False
-        turn_body(work, NOW, a)
-        turn_body(work, NOW, b)
-        nx, ny, distance = centre_line(scene, work, NOW, a, b)
-        left, right, apart, springs = 0.0, 0.0, math.inf, 0.0
-        for row in range(work.tally[CANDIDATES]):
-            locate_polygons(scene, work, NOW, row)
-            apart = min(apart, work.geometry[NOW, row, GAP])
-            if work.geometry[NOW, row, GAP] < 0.0:
-                springs += stored(scene, work, row)
-                x, y = contact_point(work, row, b)
-                left = max(left, nx * y - ny * x)
-                right = max(right, ny * x - nx * y)
-        pulls[pair, LEFT], pulls[pair, RIGHT] = left, right
-        pulls[pair, NORMAL_OF], pulls[pair, NORMAL_OF + 1] = nx, ny
-        pulls[pair, CENTRES] = pulls[pair, SURFACES] = 0.0
-        if has(scene, CENTRE_FORCE):
-            pulls[pair, CENTRES] = -centre_force(scene, centre_view(scene, work, time, NOW, a, b))
-        if scene.surface_reach > 0.0 and work.tally[CANDIDATES] > 0:
-            flag_near(scene, work, NOW, 0.0)
-            view = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES])
-            pulls[pair, SURFACES] = -surface_force(scene, view)
-            apart = view.gap
-        pulls[pair, DISTANCE], pulls[pair, APART], pulls[pair, SPRINGS] = distance, apart, springs
+        load = Load(
+            loads[pair, FORCE], loads[pair, DRIFT], loads[pair, DRIFT_X], loads[pair, DRIFT_Y],
+            loads[pair, LEVER], loads[pair, ALONE], kicks,
+        )  # fmt: skip
+        bond = bond_between(scene, work, time, work.pairs[pair, EARLIER], work.pairs[pair, LATER])
+        kinds[pair] = kind_of(scene, work, time, elapsed, bond, load)
     return True
 
 
@@ -150,89 +130,63 @@ class BondGauge:
     def __init__(self, swarm: Any) -> None:
         self.bodies = swarm.bodies
         self.scene = swarm.system.scene()._replace(box=swarm.box)
-        self.pulls = compose(measure_pulls, {**compiled_calls(), **swarm.fillings()})
+        self.judge = compose(judge_bonds, {**compiled_calls(), **swarm.fillings()})
         self.free = np.array([not body.fixed for body in swarm.bodies])
-        n = len(swarm.bodies)
-        self.work = work_of(self.scene, np.zeros((n, 3)), np.zeros((n, 3)), 64, 1, 0, False)
+        self.work = self.work_for(64, 1)
         self.settling, self.resistance = alone(swarm)
         self.shear = math.hypot(*swarm.fluid.gradient)
-        self.spheres = swarm.system.spheres_only
-        found = thermal_in(swarm.forces)
-        self.kicked = KickedBonds(swarm, self.scene, found[0].energy) if found else None
+        self.kicks = max((each.energy for each in thermal_in(swarm.forces)), default=0.0)
+
+    def work_for(self, capacity: int, pairs: int) -> Any:
+        """Work arrays with room for so many features and pairs."""
+        nothing = np.zeros((len(self.bodies), 3))
+        return work_of(self.scene, nothing, nothing, capacity, pairs, 0, False)
 
     def bonds(
         self, time: float, motion: np.ndarray, touching: Neighbours,
         before: tuple[float, np.ndarray] | None = None,
     ) -> Bonds:  # fmt: skip
-        """The Bonds of the pairs that touch at ``motion`` (n, 6); ``before``: an earlier time and
-        the motion then."""
+        """The Bonds of the pairs that touch at ``motion`` (n, 6), or are handed over as near;
+        ``before``: an earlier time and the motion then."""
         both = self.free[touching.pairs].all(axis=1)
         on_wall = np.zeros(len(self.free), bool)
         on_wall[touching.pairs[~both].ravel()] = True
         held = Neighbours(touching.pairs[both], touching.gap[both], touching.vector[both])
+        kinds = np.zeros(len(held.pairs), dtype=np.int64)
         if not len(held.pairs):
-            return Bonds(held.pairs, np.zeros(0, dtype=np.int64))
+            return Bonds(held.pairs, kinds)
+        loads = self.loads_on(held, on_wall)
+        if len(self.work.pairs) < len(held.pairs):
+            self.work = self.work_for(len(self.work.candidates), 2 * len(held.pairs))
+        since, earlier = (time, motion) if before is None else before
+        while True:
+            work = self.work
+            work.motion[NOW], work.motion[NEW] = motion, earlier
+            work.pairs[: len(held.pairs), [LATER, EARLIER]] = held.pairs
+            work.tally[PAIRS] = len(held.pairs)
+            if self.judge(self.scene, work, time, time - since, self.kicks, loads, kinds):
+                return Bonds(held.pairs, kinds)
+            self.work = with_room(work)
+
+    def loads_on(self, held: Neighbours, on_wall: np.ndarray) -> np.ndarray:
+        """What loads the bonds of pairs (m, LOAD_COLUMNS)."""
         labels, places = placed_together(len(self.free), held)
         load, drift, extent = self.loads(labels, places, on_wall)
-        label = labels[held.pairs[:, 0]]
-        load, drift, extent = load[label], drift[label], extent[label]
-        pulls = self.pulls_of(time, motion, held.pairs)
-        still = np.zeros(len(held.pairs), bool)
-        if before is not None:
-            still = self.kept_pose(time, motion, held, before) < STILL * drift * (time - before[0])
-        if self.kicked is None:
-            along, shear, spin = relative(motion, held, pulls, self.sizes(held.pairs))
-            distance = np.hypot(*held.vector.T)
-            load = load + self.effective_masses(held.pairs) * spin**2 * distance
-            certified = self.outweighs(pulls, load, extent, shear < CALM * drift)
-            certified &= along < CALM * drift
-        else:
-            certified, lasting = self.outlasts(
-                self.kicked, time, motion, held.pairs, pulls, load, extent
-            )
-            still &= lasting
-        carried = pulls[:, CENTRES] + pulls[:, SURFACES] > load
-        kind = np.where(still, np.where(carried, REST, HOOK), TOUCHING)
-        kind[certified] = CERTIFICATE
-        return Bonds(held.pairs, kind)
-
-    def outweighs(
-        self, pulls: np.ndarray, load: np.ndarray, extent: np.ndarray, calm: np.ndarray
-    ) -> np.ndarray:
-        """Where attraction outweighs a load by the safety factor, also where it pries."""
-        straight = pulls[:, CENTRES] + pulls[:, SURFACES] > SAFETY * load
-        if self.spheres:
-            return straight
-        lever = np.minimum(pulls[:, LEFT], pulls[:, RIGHT])
-        pried = (pulls[:, CENTRES] * lever > SAFETY * load * extent) & calm
-        return straight & (pried | self.follows(pulls, load))
-
-    def follows(self, pulls: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Where the surface force, which follows the contact, outweighs a load by itself."""
-        return pulls[:, SURFACES] > SAFETY * load - np.minimum(pulls[:, CENTRES], 0.0)
-
-    def outlasts(
-        self, kicked: KickedBonds, time: float, motion: np.ndarray, pairs: np.ndarray,
-        pulls: np.ndarray, load: np.ndarray, extent: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Where kicks have a bond certified, and where they let a pair rest."""
-        pull = SAFETY * load
-        if not self.spheres:
-            lever = np.minimum(pulls[:, LEFT], pulls[:, RIGHT])
-            pries = ~self.follows(pulls, load) & (load > 0.0)
-            with np.errstate(divide="ignore"):
-                pull = np.where(pries, pull * extent / lever, pull)
-        ways = pulls[:, [DISTANCE, APART]]
-        energy = pulls[:, SPRINGS] + self.moving(motion, pairs)
-        certified = kicked.certified(time, pairs, ways, pull, energy)
-        attracted = (pulls[:, CENTRES] != 0.0) | (pulls[:, SURFACES] != 0.0)
-        return certified & attracted, kicked.resting(time, pairs, ways, load)
+        later, earlier = held.pairs.T
+        label = labels[later]
+        two = (np.bincount(labels)[label] == 2) & ~on_wall[later] & ~on_wall[earlier]
+        against = self.settling[later] - self.settling[earlier]
+        speed = np.hypot(*against.T)
+        known = two & (speed > 0.0) & (self.shear == 0.0)
+        toward = np.where(known, 1.0 / np.where(known, speed, 1.0), 0.0)[:, None] * against
+        lever = np.where(two, 0.0, extent[label])
+        return np.column_stack([load[label], drift[label], toward, lever, two, held.gap])
 
     def loads(
         self, labels: np.ndarray, places: np.ndarray, on_wall: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of every cluster the largest load on a bond [N], the drift of its bodies against it
-        [m/s], and its extent [m]."""
+        """Of every cluster the largest load on a bond [N], the largest drift of two of its bodies
+        against each other [m/s], and its extent [m]."""
         count = labels.max() + 1
 
         def summed(values: np.ndarray) -> np.ndarray:
@@ -251,55 +205,15 @@ class BondGauge:
         slip = np.hypot(*(self.settling - mean[labels]).T) + self.shear * extent[labels]
         # What settles against nothing but itself pulls as much up as down.
         load = summed(self.resistance * slip) * np.where(rests, 1.0, 0.5)
-        drift = np.zeros(count)
-        np.maximum.at(drift, labels, np.maximum(slip, STILL * np.hypot(*self.settling.T)))
-        return load, drift, 2.0 * extent
-
-    def pulls_of(self, time: float, motion: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        """What holds the pairs (m, PULL_COLUMNS)."""
-        if len(self.work.pairs) < len(pairs):
-            n = len(self.bodies)
-            self.work = work_of(
-                self.scene, np.zeros((n, 3)), np.zeros((n, 3)), len(self.work.candidates),
-                2 * len(pairs), 0, False,
-            )  # fmt: skip
-        pulls = np.zeros((len(pairs), PULL_COLUMNS))
-        while True:
-            self.work.motion[NOW] = motion
-            self.work.pairs[: len(pairs), [LATER, EARLIER]] = pairs
-            self.work.tally[PAIRS] = len(pairs)
-            if self.pulls(self.scene, self.work, time, pulls):
-                return pulls
-            self.work = with_room(self.work)
-
-    def effective_masses(self, pairs: np.ndarray) -> np.ndarray:
-        mass = np.array([body.mass for body in self.bodies])[pairs]
-        return mass.prod(axis=1) / mass.sum(axis=1)
-
-    def moving(self, motion: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        """The energy [J] of two bodies' motion against each other, and of their spins."""
-        a, b = pairs.T
-        against = motion[a][:, [VX, VY]] - motion[b][:, [VX, VY]]
-        turning = 0.5 * self.scene.bodies[:, INERTIA] * motion[:, SPIN] ** 2
-        reduced = self.effective_masses(pairs)
-        return 0.5 * reduced * (against**2).sum(axis=1) + turning[a] + turning[b]
-
-    def sizes(self, pairs: np.ndarray) -> np.ndarray:
-        """The smaller bounding radius of every pair [m]."""
-        return np.array([body.shape.bounding_radius for body in self.bodies])[pairs].min(axis=1)
-
-    def kept_pose(
-        self, time: float, motion: np.ndarray, held: Neighbours, before: tuple[float, np.ndarray]
-    ) -> np.ndarray:
-        """How far the later body of every pair has moved as seen from the earlier one, which turns
-        [m]."""
-        _, earlier = before
-        a, b = held.pairs.T
-        change = (motion - earlier)[:, :2]
-        vector = held.vector - (change[a] - change[b])
-        turns = [turned(held.vector, -motion[b, ANGLE]), turned(vector, -earlier[b, ANGLE])]
-        rolled = (motion[a, ANGLE] - motion[b, ANGLE]) - (earlier[a, ANGLE] - earlier[b, ANGLE])
-        return np.hypot(*(turns[0] - turns[1]).T) + np.abs(rolled) * self.sizes(held.pairs)
+        # The fastest two: on a wall they may go the same way, else against each other.
+        order = np.lexsort((slip, labels))
+        ends = np.cumsum(np.bincount(labels, minlength=count)) - 1
+        drift = slip[order[ends]]
+        several = bodies > 1.0
+        drift[several] += slip[order[ends[several] - 1]]
+        fastest = np.zeros(count)
+        np.maximum.at(fastest, labels, np.hypot(*self.settling.T))
+        return load, np.maximum(drift, STILL * fastest), 2.0 * extent
 
 
 def alone(swarm: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -323,24 +237,3 @@ def settling(swarm, body):
         return np.zeros(2), 0.0
     least = least_mobility(swarm.system, body, math.hypot(*velocity), mobility)
     return velocity, 1.0 / least if least > 0.0 else 0.0
-
-
-def turned(vectors: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Vectors (m, 2), each turned by its angle (m,) [rad]."""
-    c, s = np.cos(angles), np.sin(angles)
-    x, y = vectors.T
-    return np.column_stack([c * x - s * y, s * x + c * y])
-
-
-def relative(
-    motion: np.ndarray, held: Neighbours, pulls: np.ndarray, sizes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of every pair as a rigid doublet the speed along its line of centres, of any kind [m/s], and
-    its spin [rad/s]."""
-    a, b = held.pairs.T
-    ux, uy = (motion[a] - motion[b])[:, [VX, VY]].T
-    rx, ry = held.vector.T
-    spin = motion[b, SPIN]
-    shear = np.hypot(ux + spin * ry, uy - spin * rx) + np.abs(motion[a, SPIN] - spin) * sizes
-    along = ux * pulls[:, NORMAL_OF] + uy * pulls[:, NORMAL_OF + 1]
-    return np.abs(along), shear, np.abs(spin)

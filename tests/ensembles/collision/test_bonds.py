@@ -1,4 +1,4 @@
-"""What counts as bound, and as what: certificates by pull and by trap, hooks, rest."""
+"""What the observer of a pair counts as bound, and as what: by pull and by trap, hooks, rest."""
 
 import math
 
@@ -7,21 +7,24 @@ import pytest
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import NOW
-from flocsim.ensembles.collision import bonds
+from flocsim.bonds.bond import CERTIFICATE, HOOK, NO_BOND, REST, bond_between, energy_of
+from flocsim.bonds.certificate import CALM, SAFETY, attraction_at, is_held
+from flocsim.bonds.rest import FAR_LONGER, HANGING, NEST, STILL
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.bonds import CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.ensembles.collision.encounter import make_encounter
 from flocsim.ensembles.collision.outcomes import BOUND, watch_pair
+from flocsim.ensembles.collision.resting import bond_of, load_on, start_rest
 from flocsim.forces import VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
-from flocsim.integrators.rhs.views import centre_line
 from flocsim.io.results.schema import BONDS
 from tests.helpers.small_study import small_config
+from tests.helpers.two_bodies import ANCHOR, CHANNEL, polygon
 
 RADII = (16.41e-6, 23.02e-6)
 NO_VOLTAGE = {"double_layer": {"potential": 0.0}}
+NO_VOLTAGE_OR_PULL = {"forces": {"van_der_waals": {"hamaker": 0.0}, **NO_VOLTAGE}}
 
 
 def hamaker(strength):
@@ -65,17 +68,21 @@ class Doublet:
         """The greatest pull of settling on the bond [N]."""
         return self.observed[numbers.LOAD]
 
-    def attraction(self):
-        return bonds.centre_attraction(self.scene, self.work, 0.0)
+    @property
+    def between(self):
+        """The two as proofs see them."""
+        return bond_between(self.scene, self.work, 0.0, 0, 1)
 
-    def bond(self, time=0.0, gap=-1e-9):
+    def attraction(self):
+        return attraction_at(self.scene, 0.0, self.between, 0.0)[0]
+
+    def bond(self, time=0.0):
         """The kind of bond now."""
-        nx, ny, distance = centre_line(self.scene, self.work, NOW, 1, 0)
-        return bonds.bond_of(self.scene, self.work, self.observed, time, gap, nx, ny, distance)
+        return bond_of(self.scene, self.work, self.observed, time)
 
     def rest(self, turns):
         """The kind of bond after so many rest times in this pose."""
-        bonds.start_rest(self.work, self.observed, 0.0)
+        start_rest(self.scene, self.work, self.observed, 0.0)
         return self.bond(turns * self.observed[numbers.REST_TIME])
 
 
@@ -89,14 +96,14 @@ def strength_for(folder, share):
 def test_attraction_that_outweighs_three_times_the_load_is_a_certificate(tmp_path, share):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, share)))
     assert doublet.attraction() == pytest.approx(share * doublet.load, rel=1e-6)
-    assert doublet.bond() == (CERTIFICATE if share > bonds.SAFETY else NO_BOND)
+    assert doublet.bond() == (CERTIFICATE if share > SAFETY else NO_BOND)
 
 
 def test_bodies_that_part_quickly_have_no_certificate(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 10.0)))
-    doublet.move(vy=-1.1 * bonds.CALM * doublet.drift)
+    doublet.move(vy=-1.1 * CALM * doublet.drift)
     assert doublet.bond() == NO_BOND
-    doublet.move(vy=-0.9 * bonds.CALM * doublet.drift)
+    doublet.move(vy=-0.9 * CALM * doublet.drift)
     assert doublet.bond() == CERTIFICATE
 
 
@@ -112,6 +119,17 @@ def test_a_doublet_that_spins_carries_its_centrifugal_load_too(tmp_path):
     assert doublet.bond() == NO_BOND
 
 
+def test_what_hangs_by_its_contacts_is_a_hook_as_soon_as_it_rests(tmp_path):
+    """The lips of a channel on the feet of an anchor, as a doublet and upside down."""
+    (anchor, above), (channel, below) = polygon(ANCHOR, 3e-6, 1e-7), polygon(CHANNEL, 6e-6, 1e-7)
+    lifted = below[1] + 3e-6 - 6e-6 + 2e-7 - 1e-11
+    places = [(above[0], above[1], 0.0), (below[0], lifted, 0.0)]
+    doublet = Doublet(tmp_path, NO_VOLTAGE_OR_PULL, [anchor, channel], places)
+    assert doublet.between.gap < 0.0
+    assert doublet.rest(0.99) == NO_BOND
+    assert doublet.rest(1.01) == HOOK
+
+
 def square(half, radius=1e-6):
     """A square of this half width, rounded."""
     return SpheroPolygon([(-half, -half), (half, -half), (half, half), (-half, half)], radius)
@@ -124,19 +142,18 @@ def test_two_contacts_on_either_side_hold_against_prying(tmp_path, tilt, expecte
     corner = 9e-6 * (math.cos(tilt) + math.sin(tilt))
     places = [(0.0, 0.0, 0.0), (0.0, 16e-6 - 1e-9 + corner, tilt)]
     doublet = Doublet(tmp_path, hamaker(1e-16), shapes, places)
-    assert doublet.attraction() > 10.0 * bonds.SAFETY * doublet.load
+    assert doublet.attraction() > 10.0 * SAFETY * doublet.load
     # By itself: at rest the bodies could not climb out of the attraction either.
-    nx, ny, distance = centre_line(doublet.scene, doublet.work, NOW, 1, 0)
-    known = doublet.scene, doublet.work, doublet.observed
-    assert bonds.is_held(*known, 0.0, nx, ny, distance) == expected
+    load = load_on(doublet.observed)
+    assert is_held(doublet.scene, doublet.work, 0.0, doublet.between, load) == expected
 
 
-def nested(folder, overrides, x=0.0):
-    """A small body around the middle of a wide ring with a slit, without touching it."""
+def nested(folder, overrides, x=0.0, radius=18e-6):
+    """A disc around the middle of a wide ring with a slit, a small one without touching it."""
     ways = np.linspace(0.2, 2.0 * math.pi - 0.2, 40)
     ring = np.array([np.cos(ways), np.sin(ways)]).T
     outer = SpheroPolygon(np.concatenate([30e-6 * ring, 28e-6 * ring[::-1]]), 1e-6)
-    shapes = [outer, Sphere(18e-6)]
+    shapes = [outer, Sphere(radius)]
     return Doublet(folder, overrides, shapes, [(0.0, 0.0, 0.0), (x, 0.0, 0.0)])
 
 
@@ -148,7 +165,7 @@ def climb(doublet):
     radii = [shape.equivalent_radius for shape in doublet.shapes]
     pull = force.hamaker * (radii[0] * radii[1] / outer) / (6.0 * force.d_min**2)
     distance = math.hypot(*doublet.work.motion[NOW, 1, :2])
-    return (pull - bonds.SAFETY * doublet.load) * (outer - distance)
+    return (pull - SAFETY * doublet.load) * (outer - distance)
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
@@ -158,52 +175,54 @@ def test_a_body_with_less_energy_than_the_climb_is_trapped(tmp_path, share):
     assert sum(shape.equivalent_radius for shape in doublet.shapes) > 2e-6
     masses = [body.mass for body in doublet.encounter.system.bodies]
     reduced = masses[0] * masses[1] / sum(masses)
-    speed = math.sqrt(2.0 * share * climb(doublet) / (bonds.SAFETY * reduced))
+    speed = math.sqrt(2.0 * share * climb(doublet) / (SAFETY * reduced))
     doublet.move(vx=speed * math.cos(1.0), vy=speed * math.sin(1.0))
-    assert bonds.energy(doublet.scene, doublet.work) == pytest.approx(0.5 * reduced * speed**2)
-    assert doublet.bond(gap=1e-6) == (NO_BOND if share > 1.0 else CERTIFICATE)
+    assert energy_of(doublet.scene, doublet.work, doublet.between) == pytest.approx(
+        0.5 * reduced * speed**2
+    )
+    assert doublet.bond() == (NO_BOND if share > 1.0 else CERTIFICATE)
 
 
 def test_attraction_weaker_than_the_load_is_no_trap(tmp_path):
     doublet = nested(tmp_path, hamaker(strength_for(tmp_path, 0.1)))
-    assert doublet.bond(gap=1e-6) == NO_BOND
+    assert doublet.bond() == NO_BOND
 
 
 def test_spin_counts_as_energy_to_climb_out_with(tmp_path):
     doublet = nested(tmp_path, hamaker(1e-16), x=2e-6)
     inertia = doublet.encounter.system.bodies[1].inertia
-    doublet.move(spin=math.sqrt(2.0 * 1.1 * climb(doublet) / (bonds.SAFETY * inertia)))
-    assert doublet.bond(gap=1e-6) == NO_BOND
+    doublet.move(spin=math.sqrt(2.0 * 1.1 * climb(doublet) / (SAFETY * inertia)))
+    assert doublet.bond() == NO_BOND
 
 
 @pytest.mark.parametrize(
-    ("share", "expected"), [(0.01, HOOK), (0.9, HOOK), (1.1, REST), (2.9, REST)]
+    ("share", "expected"), [(0.01, REST), (0.9, REST), (1.1, REST), (2.9, REST)]
 )
-def test_a_doublet_that_rests_hangs_or_sticks(tmp_path, share, expected):
-    """Attraction that could not carry the load is not what carries it."""
+def test_spheres_that_rest_are_no_hook(tmp_path, share, expected):
+    """However weak attraction is: no shape holds a sphere."""
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, share)))
     assert doublet.rest(0.99) == NO_BOND
     assert doublet.rest(1.01) == expected
-    assert BONDS[expected - 1] == {HOOK: "hook", REST: "rest"}[expected]
+    assert BONDS[expected - 1] == "rest" and BONDS[HOOK - 1] == "hook"
 
 
 def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
     rest = doublet.observed[numbers.REST_TIME]
-    bonds.start_rest(doublet.work, doublet.observed, 0.0)
+    start_rest(doublet.scene, doublet.work, doublet.observed, 0.0)
     (still, low), way = doublet.work.motion[NOW, :, :3].copy(), doublet.drift * rest
-    doublet.place(still, low + [1.1 * bonds.STILL * way, 0.0, 0.0])
+    doublet.place(still, low + [1.1 * STILL * way, 0.0, 0.0])
     assert doublet.bond(1.1 * rest) == NO_BOND
     assert doublet.bond(2.0 * rest) == NO_BOND
-    assert doublet.bond(2.2 * rest) == HOOK
+    assert doublet.bond(2.2 * rest) == REST
 
 
 def test_a_doublet_that_lies_askew_does_not_rest_for_good(tmp_path):
     """The load is at its worst where the faster body hangs straight below."""
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
-    way = math.acos(bonds.HANGING)
+    way = math.acos(HANGING)
     reach = sum(RADII) - 1e-9
-    for turn, expected in ((1.1 * way, NO_BOND), (0.9 * way, HOOK), (math.pi, NO_BOND)):
+    for turn, expected in ((1.1 * way, NO_BOND), (0.9 * way, REST), (math.pi, NO_BOND)):
         place = (reach * math.sin(turn), -reach * math.cos(turn), 0.0)
         doublet.place((0.0, 0.0, 0.0), place)
         assert doublet.rest(1000.0) == expected
@@ -212,15 +231,17 @@ def test_a_doublet_that_lies_askew_does_not_rest_for_good(tmp_path):
 def test_a_nest_is_bound_after_ten_rest_times(tmp_path):
     """Around the other's centre no load has a lever that could turn it to hang."""
     overrides = hamaker(strength_for(tmp_path, 0.01))
-    doublet = nested(tmp_path, overrides, x=0.0)
+    doublet = nested(tmp_path, overrides, radius=23.4e-6)
     reach = sum(shape.equivalent_radius for shape in doublet.shapes)
     for x, turns, expected in (
-        (0.9 * bonds.NEST * reach, 0.99 * bonds.FAR_LONGER, NO_BOND),
-        (0.9 * bonds.NEST * reach, 1.01 * bonds.FAR_LONGER, HOOK),
-        (1.1 * bonds.NEST * reach, 1.01 * bonds.FAR_LONGER, NO_BOND),
+        (0.98 * NEST * reach, 0.99 * FAR_LONGER, False),
+        (0.98 * NEST * reach, 1.01 * FAR_LONGER, True),
+        (1.1 * NEST * reach, 1.01 * FAR_LONGER, False),
     ):
-        doublet.place((0.0, 0.0, 0.0), (x, 0.0, 0.0))
-        assert doublet.rest(turns) == expected
+        # Away from the slit.
+        doublet.place((0.0, 0.0, 0.0), (-x, 0.0, 0.0))
+        assert doublet.between.gap < 0.0
+        assert (doublet.rest(turns) != NO_BOND) == expected
 
 
 def test_the_observer_keeps_the_kind_of_bond(tmp_path):

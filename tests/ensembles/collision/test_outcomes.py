@@ -9,8 +9,9 @@ from shapely.geometry import Polygon
 
 from flocsim import SpheroPolygon
 from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
-from flocsim.ensembles.collision import bonds, outcomes
+from flocsim.bonds.bond import NO_BOND, REST
 from flocsim.ensembles.collision import observed as numbers
+from flocsim.ensembles.collision import outcomes, resting
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
@@ -18,7 +19,8 @@ from flocsim.ensembles.collision.start import draws, largest_displacement, orien
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
-from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.small_study import small_config, small_study
@@ -274,17 +276,21 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     # turning point, where the load is another, is not known yet.
     encounter = study.encounter(0, 1, draws(1, 0))
     work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
-    spin, reach = 300.0, 39e-6
+    spin, reach = 300.0, sum(shape.radius for shape in encounter.shapes) - 1e-12
     work.motion[NOW] = 0.0
     work.motion[NOW, :, 5] = spin
     work.motion[NOW, 1, 1] = -reach
     work.motion[NOW, 1, 3] = spin * reach
-    later = 2.0 * observed[numbers.REST_TIME]
-    bonds.start_rest(work, observed, 0.0)
-    assert not bonds.has_rested(encounter.scene, work, observed, later, -1e-12, 0.0, -1.0, 1.0)
+    scene = encounter.system.scene(jit=False)
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    observed[numbers.LOAD] = 1.0  # more than any attraction
+    known, later = (scene, work, observed), 2.0 * observed[numbers.REST_TIME]
+    resting.start_rest(scene, work, observed, 0.0)
+    assert resting.bond_of(*known, later) == NO_BOND
     # Without the swing it does.
     work.motion[NOW, :, 3:] = 0.0
-    assert bonds.has_rested(encounter.scene, work, observed, later, -1e-12, 0.0, -1.0, 1.0)
+    assert resting.bond_of(*known, later) == REST
 
 
 def test_a_step_through_a_body_ends_at_the_first_touch(tmp_path):

@@ -10,12 +10,7 @@ against k_B T:
   drift; v the least there, less what attraction makes of it at the near end. Where they meet by
   thermal motion alone there is no drift, and they have parted where the study says so: once their
   centres are the stated distance apart.
-- Certificate: to climb out of their attraction, against the load that a certificate asks for, takes
-  the energy that they have, that of the springs in contact twice, and BARRIER k_B T besides: by
-  Kramers' rate e^20 = 5e8 times as long as bodies take to relax. Whatever way shapes roll, what
-  they climb is their potential (integrators/rhs/climb.py).
-- Rest: spheres by such a climb against the load itself; shapes, whose hooks no potential tells of,
-  where it takes BARRIER k_B T to lift one by its spheroradius against the load.
+- Certificate, rest and hook: by BARRIER k_B T besides what they need without kicks (flocsim.bonds).
 - Held: by BARRIER k_B T on either side of a secondary minimum of spheres, or of surface forces.
 
 What is none of these goes on until it is, or is undecided at the end.
@@ -25,28 +20,14 @@ import math
 
 from flocsim.arrays import (
     BOUNDING_RADIUS,
-    CANDIDATES,
-    EQUIVALENT_RADIUS,
     MASS,
     NOW,
-    RADIUS,
     VX,
     VY,
     X,
     Y,
 )
-from flocsim.ensembles.collision.bonds import (
-    CERTIFICATE,
-    HOOK,
-    NO_BOND,
-    REST,
-    SAFETY,
-    centre_attraction,
-    energy,
-    has_rested,
-    leverage,
-    surface_attraction,
-)
+from flocsim.bonds.bond import NO_BOND, are_spheres, bond_between, radii_of
 from flocsim.ensembles.collision.observed import (
     BODY_I,
     BODY_J,
@@ -64,13 +45,12 @@ from flocsim.ensembles.collision.observed import (
     FLOW_YY,
     IN_FLOW,
     KICK_ENERGY,
-    LOAD,
     MOBILITY_I,
     MOBILITY_J,
 )
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED, look_at_pair
-from flocsim.integrators.rhs.climb import BARRIER, can_climb, repulsion_at
-from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
+from flocsim.ensembles.collision.resting import bond_in_kicks
+from flocsim.integrators.rhs.climb import repulsion_at
 
 RETURN_SHARE = 1e-4
 """Of the pairs that are said to have parted, so many may come back at most."""
@@ -118,56 +98,23 @@ def have_parted(scene, work, observed, time, distance):
     return return_bound(scene, work, observed, time) <= RETURN_SHARE
 
 
-def outline_gap_of(scene, work, time, gap):
-    """The gap of the surface forces [m], or that of the outlines where there are none."""
-    if scene.surface_reach <= 0.0 or work.tally[CANDIDATES] == 0:
-        return gap
-    flag_near(scene, work, NOW, 0.0)
-    return surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES]).gap
-
-
-def bond_in_kicks(scene, work, observed, time, gap, nx, ny, distance):
-    """The kind of bond of two bodies that have touched, NO_BOND where kicks may open it."""
-    barrier = BARRIER * observed[KICK_ENERGY]
-    spheres = len(scene.vertices) == 2
-    surfaces = surface_attraction(scene, work, time)
-    apart = outline_gap_of(scene, work, time, gap)
-    load, centres = SAFETY * observed[LOAD], centre_attraction(scene, work, time)
-    if centres != 0.0 or surfaces != 0.0:
-        pull = load
-        if not spheres and load > 0.0 and surfaces <= load - min(centres, 0.0):
-            pull = load * leverage(work, nx, ny, distance)
-        needed = barrier + energy(scene, work)
-        if not can_climb(scene, time, BODY_J, BODY_I, distance, apart, pull, needed):
-            return CERTIFICATE
-    if observed[LOAD] == 0.0 or not has_rested(scene, work, observed, time, gap, nx, ny, distance):
-        return NO_BOND
-    if spheres:
-        if can_climb(scene, time, BODY_J, BODY_I, distance, apart, observed[LOAD], barrier):
-            return NO_BOND
-    elif observed[LOAD] * min(scene.bodies[BODY_I, RADIUS], scene.bodies[BODY_J, RADIUS]) < barrier:
-        return NO_BOND
-    return REST if centres + surfaces > observed[LOAD] else HOOK
-
-
-def is_caged(scene, work, observed, time, distance, gap):
+def is_caged(scene, work, observed, time):
     """Whether two that never touched lie in a secondary minimum out of which kicks do not come."""
     if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
         return False
-    if len(scene.vertices) == 2:
-        radii = scene.bodies[BODY_I, EQUIVALENT_RADIUS] + scene.bodies[BODY_J, EQUIVALENT_RADIUS]
-        between = distance - radii
-    else:
-        between = outline_gap_of(scene, work, time, gap)
+    bond = bond_between(scene, work, time, BODY_I, BODY_J)
+    between = bond.surface_gap
+    if are_spheres(scene, bond):
+        between = bond.distance - radii_of(scene, bond)
     return observed[CAGE_LOW] < between < observed[CAGE_HIGH]
 
 
 def watch_kicked_pair(scene, work, observed, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
-    nx, ny, distance, gap = look_at_pair(scene, work, observed, time)
+    _, _, distance, _ = look_at_pair(scene, work, observed, time)
     if have_parted(scene, work, observed, time, distance):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
     if observed[COLLIDED] == 0.0:
-        return HELD if is_caged(scene, work, observed, time, distance, gap) else 0
-    observed[BOND] = bond_in_kicks(scene, work, observed, time, gap, nx, ny, distance)
+        return HELD if is_caged(scene, work, observed, time) else 0
+    observed[BOND] = bond_in_kicks(scene, work, observed, time)
     return 0 if observed[BOND] == NO_BOND else BOUND

@@ -8,18 +8,18 @@ from scipy.special import erfc, ive, kve
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import NOW
+from flocsim.bonds.bond import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.bonds import CERTIFICATE, HOOK, NO_BOND
 from flocsim.ensembles.collision.encounter import KICKED, OBSERVER, make_encounter
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
+from flocsim.ensembles.collision.resting import bond_in_kicks
 from flocsim.ensembles.collision.thermal import kicked
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.rhs.climb import BARRIER
-from flocsim.integrators.rhs.views import centre_line
 from tests.helpers.small_study import small_config
 
 ENERGY = BOLTZMANN * 298.15
@@ -68,10 +68,8 @@ class Pair:
         """The bound of the probability to come back."""
         return kicked.return_bound(self.scene, self.work, self.observed, 0.0)
 
-    def bond(self, gap=-1e-12, time=0.0):
-        nx, ny, distance = centre_line(self.scene, self.work, NOW, 1, 0)
-        known = self.scene, self.work, self.observed, time, gap, nx, ny, distance
-        return kicked.bond_in_kicks(*known)
+    def bond(self, time=0.0):
+        return bond_in_kicks(self.scene, self.work, self.observed, time)
 
 
 def test_the_observer_is_that_of_kicks_where_there_are_any(tmp_path):
@@ -202,13 +200,13 @@ def square(half, radius):
     return SpheroPolygon([(-half, -half), (half, -half), (half, half), (-half, half)], radius)
 
 
-@pytest.mark.parametrize(("temperature", "kind"), [(298.15, HOOK), (3e7, NO_BOND)])
-def test_shapes_hook_where_kicks_cannot_lift_them_by_their_rounding(tmp_path, temperature, kind):
+@pytest.mark.parametrize(("temperature", "kind"), [(298.15, REST), (3e7, NO_BOND)])
+def test_shapes_rest_where_kicks_cannot_lift_them_by_their_rounding(tmp_path, temperature, kind):
     shapes = [square(8e-6, 1e-6), square(14e-6, 1e-6)]
     warm = {"thermal": {"temperature": temperature, "kick": "1 ms"}}
     pair = Pair(tmp_path, {}, warm, shapes, collided=1.0).put(0.0, -24e-6 + 1e-12, drifting=False)
     load = pair.observed[numbers.LOAD] * 1e-6 / (BOLTZMANN * temperature)
-    assert (load > BARRIER) == (kind == HOOK)
+    assert (load > BARRIER) == (kind == REST)
     pair.bond()
     assert pair.bond(time=1.1 * pair.observed[numbers.REST_TIME]) == kind
 

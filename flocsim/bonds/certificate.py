@@ -1,0 +1,171 @@
+"""Certificates: no later load can open the bond, by attraction alone.
+
+- Held: the bodies lie calm, and attraction outweighs, by a safety factor, the largest load, in any
+  orientation. What an attraction can bear is the most that it comes to on the way out of where the
+  bodies are, contacts or not: in a well between attraction and repulsion the net force of now is
+  the load, whatever the well could bear. It bears the load in pulling straight, and in prying the
+  doublet open about each of the two outermost contact points, which lie on either side of the line
+  of centres. Two spheres, and a surface force, which follows the contact, need the straight pull
+  only.
+- Trapped: to climb out of the attraction between their centres, against that load, takes more than
+  all the energy that they have.
+- In kicks: to climb out of their attraction, against that load, and times its leverage where it
+  pries, takes the energy that they have and BARRIER k_B T besides: by Kramers' rate e^20 = 5e8
+  times as long as bodies take to relax. Whatever way shapes roll, what they climb is their
+  potential (integrators/rhs/climb.py).
+
+All forces are those at rest: what resists an opening, as lubrication, holds nothing.
+"""
+
+import math
+
+from flocsim.arrays import CANDIDATES, NOW, SPIN
+from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, speeds_of
+from flocsim.compiler.composer import apart
+from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
+from flocsim.integrators.rhs.views import effective_mass, pair_view
+from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+
+SAFETY = 3.0
+"""Factor by which attraction must outweigh the load."""
+
+CALM = 0.02
+"""A pair whose parts move at less than this share of the drift is calm enough."""
+
+LEANING = 0.05
+"""Over this share of the distance, and over the square of the leverage, levers stay what they are
+as a doublet is pried open: so far on the way out attraction between centres counts there."""
+
+FINER = 0.125
+"""A step about the highest place of the way out, over one of the whole way."""
+
+
+def attraction_at(scene, time, bond, way):
+    """(between centres, between outlines) [N] at rest, both gaps wider by a way [m]."""
+    centres, surfaces = 0.0, 0.0
+    distance, gap = bond.distance + way, bond.surface_gap + way
+    if has(scene, CENTRE_FORCE):
+        between = distance - radii_of(scene, bond)
+        view = pair_view(scene, time, bond.j, bond.i, between, 0.0, distance)
+        centres = -centre_force(scene, view)
+    if scene.surface_reach > gap:
+        surfaces = -surface_force(scene, pair_view(scene, time, bond.j, bond.i, gap, 0.0, distance))
+    return centres, surfaces
+
+
+@apart
+def most_between(scene, time, bond, start, end, near, share):
+    """What the attraction comes to at most over the ways from ``start`` to ``end`` [N], as capacity
+    has it, and the way at which all of it is most [m]; ``share``: steps over the gap there."""
+    sizes, best = radii_of(scene, bond), start
+    all_of_it, follows, pries = 0.0, 0.0, 0.0
+    way = start
+    while way < end:
+        centres, surfaces = attraction_at(scene, time, bond, way)
+        if centres + surfaces > all_of_it:
+            all_of_it, best = centres + surfaces, way
+        follows = max(follows, surfaces + min(centres, 0.0))
+        if way <= near:
+            pries = max(pries, centres)
+        # Forces change over as much as is left of the gap that they go by.
+        left = end
+        if has(scene, CENTRE_FORCE):
+            left = min(left, abs(bond.distance + way - sizes))
+        if scene.surface_reach > 0.0:
+            left = min(left, abs(bond.surface_gap + way))
+        way += max(share * left, LEAST_RUNG)
+    return all_of_it, follows, pries, best
+
+
+@apart
+def lets_out(scene, time, bond, pull, needed):
+    """Whether less than an energy [J] leads out of the attraction, a pull [N] helping."""
+    return can_climb(scene, time, bond.j, bond.i, bond.distance, bond.surface_gap, pull, needed)
+
+
+def capacity(scene, time, bond, near):
+    """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
+    a repulsion of centres; that of centres alone, over a way ``near`` [m])."""
+    if not has(scene, CENTRE_FORCE) and not scene.surface_reach > bond.surface_gap:
+        return 0.0, 0.0, 0.0
+    sizes = radii_of(scene, bond)
+    end = 2.0 * sizes + max(-bond.surface_gap, sizes - bond.distance, 0.0)
+    most, follows, pries, best = most_between(scene, time, bond, 0.0, end, near, RUNG)
+    # Once more about the highest place, which may be a cusp.
+    around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
+    if has(scene, CENTRE_FORCE):
+        around = min(around, RUNG * abs(bond.distance + best - sizes))
+    known = scene, time, bond, max(best - around, 0.0), best + around, near, FINER * RUNG
+    finer, follows_finer, pries_finer, _ = most_between(*known)
+    return max(most, finer), max(follows, follows_finer), max(pries, pries_finer)
+
+
+def leverage(work, bond, least):
+    """By how much a load that pries about either outer contact outdoes one that pulls straight at
+    the attraction along the centres, with an arm of at least ``least`` [m]; inf where no contact
+    lies on one side of it."""
+    left, right = math.inf, math.inf
+    nx, ny, distance = bond.nx, bond.ny, bond.distance
+    for row in range(work.tally[CANDIDATES]):
+        if not is_closed(work, row):
+            continue
+        x, y = contact_point(work, row, bond.i)
+        side = nx * y - ny * x
+        lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny), least)
+        if side > 0.0:
+            left = min(left, lever / side)
+        elif side < 0.0:
+            right = min(right, -lever / side)
+    return max(left, right)
+
+
+def is_held(scene, work, time, bond, load):
+    """Whether the bodies lie calm and attraction outweighs every later load on the bond."""
+    along, shear = speeds_of(scene, work, bond)
+    if not along < CALM * load.drift:
+        return False
+    mass, spin = effective_mass(scene, bond.i, bond.j), work.motion[NOW, bond.i, SPIN]
+    needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
+    spheres = are_spheres(scene, bond)
+    ratio = 1.0 if spheres else leverage(work, bond, load.lever)
+    near = LEANING * bond.distance / (ratio * ratio)
+    all_of_it, follows, pries = capacity(scene, time, bond, near)
+    if not all_of_it > needed:
+        return False
+    pried = shear < CALM * load.drift and pries > needed * ratio
+    if not (spheres or follows > needed or pried):
+        return False
+    # In a well, which they might still be leaving.
+    moving = 0.5 * mass * along * along
+    return bond.gap < 0.0 or not lets_out(scene, time, bond, load.force, moving)
+
+
+def is_trapped(scene, work, time, bond, load):
+    """Whether the two have too little energy to leave each other's attraction between centres, in
+    which they lie, against the load: its work out of it is more than SAFETY times their energy."""
+    inside = has(scene, CENTRE_FORCE) and bond.distance < radii_of(scene, bond)
+    if not inside or scene.surface_reach > 0.0 or load.alone == 0.0:
+        return False
+    pull = SAFETY * load.force
+    centres, _ = attraction_at(scene, time, bond, 0.0)
+    if not centres > pull:
+        return False
+    needed = SAFETY * energy_of(scene, work, bond)
+    return not lets_out(scene, time, bond, pull, needed)
+
+
+def is_certain(scene, work, time, bond, load):
+    """Whether no later load can open the bond, where nothing kicks."""
+    return is_trapped(scene, work, time, bond, load) or is_held(scene, work, time, bond, load)
+
+
+def is_certain_in_kicks(scene, work, time, bond, load):
+    """Whether neither a later load nor kicks can open the bond."""
+    pull = SAFETY * load.force
+    if pull > 0.0 and not are_spheres(scene, bond):
+        _, follows, _ = capacity(scene, time, bond, 0.0)
+        if not follows > pull:
+            pull *= leverage(work, bond, load.lever)
+    needed = BARRIER * load.kicks + energy_of(scene, work, bond)
+    return not lets_out(scene, time, bond, pull, needed)
