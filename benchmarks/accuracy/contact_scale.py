@@ -119,9 +119,10 @@ FOUND = {
 
 RECORD = np.dtype([
     ("type", "U8"), ("vertices", "i4"), ("delta", "f8"), ("k_n", "f8"), ("replicate", "i4"),
-    *FOUND.items(), ("seconds", "f8"),
+    *FOUND.items(), ("seconds", "f8"), ("allowed", "i8"),
 ])  # fmt: skip
-"""One replicate: its key, what became of it, and CPU seconds."""
+"""One replicate: its key, what became of it, CPU seconds, and how many steps it might take, those
+that were rejected among them."""
 
 
 @attrs.frozen
@@ -145,6 +146,7 @@ class Runner:
 
     def __init__(self, tree, tolerance, conditions, folder, arguments):
         self.types = list(dict.fromkeys(each.type for each in conditions))
+        self.max_steps = arguments.max_steps
         self.folder = folder / f"studies_{tolerance:g}"
         self.folder.mkdir()
         vertices = dict.fromkeys(each.vertices for each in conditions)
@@ -153,7 +155,7 @@ class Runner:
                 types=", ".join(f'"{name}"' for name in self.types),
                 vertices=", ".join(map(str, vertices)),
                 k_n=k_n, k_t=k_n / 10.0, tolerance=tolerance, seed=arguments.seed,
-                steps=arguments.max_steps,
+                steps=self.max_steps,
             ))  # fmt: skip
         self.child = Child(tree, CHILD, ",".join(FOUND), folder=self.folder)
 
@@ -171,7 +173,7 @@ class Runner:
             sys.exit(f"the process ended in replicate {replicate} of {condition}")
         row = json.loads(answer) or failed_row()
         found = (*attrs.astuple(condition), replicate, *(row[name] for name in FOUND))
-        return (*found, row["seconds"])
+        return (*found, row["seconds"], self.max_steps)
 
 
 class Truth:
@@ -193,7 +195,7 @@ class Truth:
         if key not in self.rows:
             return True
         row = dict(zip(RECORD.names, self.rows[key], strict=True))
-        return row["failure"] == FAILURES.index("step budget") and row["steps"] < max_steps
+        return row["failure"] == FAILURES.index("step budget") and row["allowed"] < max_steps
 
     def of(self, condition, count):
         """Rows of the first replicates of a condition, those that are there."""
@@ -207,12 +209,12 @@ class Truth:
         np.savez_compressed(part, rows=rows, facts=json.dumps(self.facts))
         os.replace(part, self.path)
 
-    def compute(self, runner, conditions, count, max_steps):
+    def compute(self, runner, conditions, count):
         """Run what is missing; the file is renewed now and then."""
         saved, began = time.monotonic(), time.monotonic()
         for condition in conditions:
             for replicate in range(count):
-                if self.lacks((*attrs.astuple(condition), replicate), max_steps):
+                if self.lacks((*attrs.astuple(condition), replicate), runner.max_steps):
                     row = runner.run(condition, replicate)
                     self.rows[row[: len(KEY)]] = row
                 if time.monotonic() - saved > SAVED_EVERY:
@@ -480,7 +482,7 @@ def main():
         if arguments.compute:
             tree = other_tree(arguments.commit, folder)
             runner = Runner(tree, arguments.exact, conditions, folder, arguments)
-            truth.compute(runner, conditions, count, arguments.max_steps)
+            truth.compute(runner, conditions, count)
             runner.child.close()
             return
         tree = arguments.tree.resolve()
