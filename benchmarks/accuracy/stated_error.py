@@ -20,7 +20,8 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim import Body, Swarm, System
+from flocsim import Body, Swarm, System, wall
+from flocsim.constants import STANDARD_GRAVITY
 from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
@@ -52,20 +53,20 @@ CONFIG = (
 
 
 @cache
-def study(preset, friction=None):
-    """The study that replicates are taken from."""
+def study(preset, contact=()):
+    """The study that replicates are taken from; ``contact``: (name, value) of its law."""
     changes = {"forces": COLLOID} if preset == "si" else {}
-    if friction is not None:
-        changes = {"forces": {"contact": {"friction": friction}}}
+    if contact:
+        changes = {"forces": {"contact": dict(contact)}}
     with TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
         path.write_text(CONFIG.format(preset))
         return Study(load_config(path, changes))
 
 
-def replicate(rng, number, preset, outcomes, friction=None, longer=1.0):
+def replicate(rng, number, preset, outcomes, longer=1.0, **contact):
     """(System, until) of a random replicate that ends in one of these outcomes; None of another."""
-    found = study(preset, friction)
+    found = study(preset, tuple(contact.items()))
     place = int(rng.integers(3)), int(rng.choice(VERTICES)), float(rng.random())
     row = found.run(*place, number)
     if row["outcome"] not in outcomes:
@@ -91,6 +92,15 @@ def friction(rng, number):
     return replicate(rng, number, "tang2014", (0, 1, 2, 3), friction=float(rng.choice([0.1, 0.3])))
 
 
+STIFF = 2e5
+"""Normal stiffness [N/m] at which weight overlaps outlines by less than 1e-12 m."""
+
+
+def stiff(rng, number):
+    """Any collision of bodies ten thousand times as stiff."""
+    return replicate(rng, number, "tang2014", (0, 1, 2, 3), k_n=STIFF, k_t=0.1 * STIFF)
+
+
 def surface_forces(rng, number):
     """Stable colloids, which pass each other on their double layers."""
     return replicate(rng, number, "si", (0, 1, 2, 3, 4, 7))
@@ -104,10 +114,10 @@ def random_shape(rng):
     return shape.scaled(float(rng.uniform(5e-6, 2e-5)) / shape.equivalent_radius)
 
 
-def several_bodies(rng, number):
-    """Three to six flocs that are thrown into each other in water."""
-    bodies, angles = [], rng.uniform(0.0, 2.0 * math.pi)
-    count = int(rng.integers(3, 7))
+def thrown_together(rng, angles, count, contact):
+    """(System, until) of so many flocs that are thrown into each other in water, the first of them
+    from the direction ``angles`` [rad]."""
+    bodies = []
     for k in range(count):
         direction = angles + 2.0 * math.pi * k / count
         shape = random_shape(rng)
@@ -117,8 +127,21 @@ def several_bodies(rng, number):
             shape, tuple(place), float(rng.uniform(0.0, 6.0)), tuple(velocity),
             float(rng.normal() * 1e3), surface_density=2.0,
         ))  # fmt: skip
-    system = System(bodies, [Gravity(), StokesDrag(), Contact()], Implicit())
+    system = System(bodies, [Gravity(), StokesDrag(), contact], Implicit())
     return system, float(rng.uniform(4e-4, 1e-3))
+
+
+def several_bodies(rng, number):
+    """Three to six flocs that are thrown into each other in water."""
+    angles = rng.uniform(0.0, 2.0 * math.pi)
+    return thrown_together(rng, angles, int(rng.integers(3, 7)), Contact())
+
+
+def without_tension(rng, number):
+    """Two or three flocs that are thrown into each other, with friction, and tension off."""
+    angles, friction = rng.uniform(0.0, 2.0 * math.pi), float(rng.choice([0.1, 0.3, 0.6]))
+    contact = Contact(friction=friction, tension=False)
+    return thrown_together(rng, angles, int(rng.integers(2, 4)), contact)
 
 
 def fifty_bodies(rng, number):
@@ -154,8 +177,20 @@ def free_flight(rng, number):
     ) * height / speed
 
 
+def bouncing(rng, number):
+    """A floc that falls onto a floor in nothing, and bounces some times."""
+    shape, height = random_shape(rng), float(rng.uniform(1e-6, 2e-5))
+    start = shape.bounding_radius + height
+    body = Body(shape, (0.0, start), float(rng.uniform(0.0, 6.0)), surface_density=2.0)
+    ground = wall((-1e-3, -1e-5), (1e-3, -1e-5), radius=1e-5)
+    contact = Contact(damping_n=float(rng.choice([0.0, 1e4, 1e5])))
+    fall = math.sqrt(2.0 * start / STANDARD_GRAVITY)
+    return System([body, ground], [Gravity(), contact], Implicit()), rng.uniform(1.0, 4.0) * fall
+
+
 FAMILIES = {each.__name__: each for each in (
-    departing, rolling, friction, surface_forces, several_bodies, free_flight, fifty_bodies,
+    departing, rolling, friction, stiff, surface_forces, several_bodies, without_tension,
+    free_flight, bouncing, fifty_bodies,
 )}  # fmt: skip
 
 

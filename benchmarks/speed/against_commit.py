@@ -99,22 +99,23 @@ PLACES = {"settling": (0, 1, 2), "shear": (1, 4, 5)}
 
 
 class Child:
-    """A process that runs groups of replicates with the flocsim of a folder."""
+    """A process that runs a program with the flocsim of a folder and answers line by line."""
 
-    def __init__(self, tree, study, meeting, cache):
-        environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": str(cache)}
-        program = CHILD.format(made=MADE[meeting])
+    def __init__(self, tree, program, *arguments, folder, cache=None):
+        environment = {**os.environ, "PYTHONPATH": str(tree)}
+        if cache is not None:
+            environment["FLOCSIM_CACHE"] = str(cache)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", program, str(study)],
-            env=environment, cwd=study.parent, text=True,
+            [sys.executable, "-c", program, *map(str, arguments)],
+            env=environment, cwd=folder, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         )  # fmt: skip
 
-    def seconds(self, condition, replicate):
-        """CPU seconds of a group."""
-        self.process.stdin.write(f"{condition} {replicate}\n")
+    def ask(self, *words):
+        """The line that answers one of these words."""
+        self.process.stdin.write(" ".join(map(str, words)) + "\n")
         self.process.stdin.flush()
-        return float(self.process.stdout.readline())
+        return self.process.stdout.readline()
 
     def close(self):
         self.process.stdin.close()
@@ -132,13 +133,18 @@ def other_tree(commit, folder):
     return tree
 
 
+def seconds(child, condition, replicate):
+    """CPU seconds of a group."""
+    return float(child.ask(condition, replicate))
+
+
 def compare(there, here, condition, groups):
     """(CPU times there, here) of so many groups of a condition."""
     found = []
     for replicate in range(groups):
-        there.seconds(condition, replicate), here.seconds(condition, replicate)  # shapes are made
-        first = there.seconds(condition, replicate), here.seconds(condition, replicate)
-        second = here.seconds(condition, replicate), there.seconds(condition, replicate)
+        seconds(there, condition, replicate), seconds(here, condition, replicate)  # makes shapes
+        first = seconds(there, condition, replicate), seconds(here, condition, replicate)
+        second = seconds(here, condition, replicate), seconds(there, condition, replicate)
         found.append((min(first[0], second[1]), min(first[1], second[0])))
     return np.array(found)
 
@@ -161,8 +167,10 @@ def main():
         folder = Path(name)
         study = folder / "study.toml"
         study.write_text(STUDY[meeting].format(arguments.vertices))
-        there = Child(other_tree(arguments.commit, folder), study, meeting, folder / "cache_there")
-        here = Child(ROOT, study, meeting, folder / "cache_here")
+        other = other_tree(arguments.commit, folder)
+        program = CHILD.format(made=MADE[meeting])
+        there = Child(other, program, study, folder=folder, cache=folder / "cache_there")
+        here = Child(ROOT, program, study, folder=folder, cache=folder / "cache_here")
         every = []
         for condition, kind in zip(PLACES[meeting], TYPES[meeting], strict=True):
             found = compare(there, here, condition, groups)
