@@ -20,6 +20,7 @@ from flocsim.arrays import (
     RECORD_TIME,
     RECORDED,
     REJECTED,
+    STAGED_STEP,
     STEP,
     STEPS,
     STILL,
@@ -221,6 +222,7 @@ def advance(scene, work, observed, clock, counts, record):
         if lists and trials < MOST_TRIALS and leave_at_once(scene, work, clock, step):
             counts[LOCATED] += 1
             trials += 1
+            clock[STAGED_STEP] = 0.0
             continue
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:

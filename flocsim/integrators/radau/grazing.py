@@ -22,6 +22,10 @@ from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.grazing import STIFFER
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
 
+LEAST_RESPONSE = 1e-3
+"""A tangential force lifts nothing that moves the gap by less than this share of what it moves its
+bodies along each other."""
+
 
 def any_grazes(work):
     """Whether a pair grazes."""
@@ -38,8 +42,8 @@ def release_gaps(work):
 
 
 def response(scene, work, row):
-    """The rate of the gap for every newton along the tangent of a pair, by the factorised system
-    [m/(N s)]."""
+    """The rates of the gap, and along the tangent, for every newton along the tangent of a pair, by
+    the factorised system [m/(N s)]."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     across, along = tangent_rows(work, row), normal_rows(work, row)
     for each in range(work.loads.shape[1]):
@@ -48,11 +52,12 @@ def response(scene, work, row):
         work.loads[REAL, 3 * a + axis] = across[0][axis]
         work.loads[REAL, 3 * b + axis] = across[1][axis]
     solve_for_free(scene, work)
-    total = 0.0
+    opening, sliding = 0.0, 0.0
     for axis in range(3):
-        total += along[0][axis] * work.loads[REAL, 3 * a + axis].real
-        total += along[1][axis] * work.loads[REAL, 3 * b + axis].real
-    return total
+        first, second = work.loads[REAL, 3 * a + axis].real, work.loads[REAL, 3 * b + axis].real
+        opening += along[0][axis] * first + along[1][axis] * second
+        sliding += across[0][axis] * first + across[1][axis] * second
+    return opening, sliding
 
 
 def hold_gaps(scene, work):
@@ -61,9 +66,10 @@ def hold_gaps(scene, work):
     opened = False
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == GRAZES:
-            found = response(scene, work, row)
+            found, sliding = response(scene, work, row)
+            weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
             fresh = work.slip[FRESH, row] != 0.0
-            if found == 0.0 or (fresh and found * work.slip[GRAZING_FORCE, row] <= 0.0):
+            if weak or (fresh and found * work.slip[GRAZING_FORCE, row] <= 0.0):
                 work.candidates[row, CLOSED], opened = OPEN, True
                 work.slip[NOW, row] = 0.0
             else:
