@@ -1,9 +1,10 @@
-"""When pairs begin and cease to graze (rhs/grazing.py): decided by forces at the end of a step.
+"""When pairs begin and cease to graze, and which are held: decided by forces at the end of a step.
 
-A pair that has just parted goes on grazing, instead of being apart, where its own tangential force
-has lifted it and all that comes of it is far below the tolerance: how far it parts before drag has
-used that speed up, and the displacement that its tangential spring would lose. Where the tolerance
-resolves these, the cycles of the law are followed instead.
+A pair that has just parted goes on grazing (rhs/grazing.py) instead of being apart where its own
+tangential force has lifted it and all that comes of it is far below the tolerance: how high it
+would fly, and the displacement that its tangential spring would lose. One that has parted and
+touched again and again like that is held closed over its flights, without its displacement, until a
+step shows that it would have to pull. Where the tolerance resolves these, the law is followed.
 """
 
 import math
