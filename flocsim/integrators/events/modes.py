@@ -15,9 +15,8 @@ which pairs touch."""
 
 
 def set_closed(work, state=NOW):
-    """Flag every listed pair by its gap in a state, but for those that graze or
-    are held; whether any has
-    changed."""
+    """Flag every listed pair by its gap in a state, but for those that graze or are held; whether
+    any has changed."""
     changed = False
     for row in range(work.tally[CANDIDATES]):
         if stays(work, row):

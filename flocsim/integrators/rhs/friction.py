@@ -46,14 +46,6 @@ def slip_in(scene, work, state, row, stuck):
     return side * limit_in(scene, work, state, row)
 
 
-def hold_slides(scene, work, state):
-    """Bring the displacements of pairs that slide to their limits in a state."""
-    if has(scene, SLIP_LIMIT):
-        for row in range(work.tally[CANDIDATES]):
-            if work.candidates[row, CLOSED] == 1:
-                work.slip[state, row] = slip_in(scene, work, state, row, work.slip[state, row])
-
-
 def side_of(scene, work, row):
     """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
     brought to its limit."""
