@@ -40,43 +40,50 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
-START, CHANGE, DEVIATION, CARRIED, FORCING, MOTION_ROWS = range(STATES, STATES + 6)
+START, CHANGE, DEVIATION, CARRIED, FORCING, LAST_RATES, LOOKED, MOTION_ROWS = range(
+    STATES, STATES + 8
+)
 """Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
 change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
-such errors, carried on with the motion, have become; forces by which it is carried otherwise than a
-change of the start [N, N, N m], in the columns of velocities."""
+such errors, carried on with the motion, have become; in the columns of velocities, forces by which
+it is carried otherwise than a change of the start [N, N, N m], the accelerations of the last step
+across switches [m/s², 1/s²], and the velocities when a method last looked how far it has come."""
 
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
 (
     SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
-    HELD,
-    KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 13)  # fmt: skip
+    HELD, OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
+    KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
+    SLIP_ROWS,
+) = range(2 * STATES, 2 * STATES + 18)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
 held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).
-Displacements, offsets, forces and gaps that are set aside while the list is made anew."""
+that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).  The
+overlap of a pair, what is left of its gap and the changes of both, while an interior-point method
+finds out which pairs close [m].  Displacements, offsets, forces, gaps and flights that are set
+aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
-    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, FRAMES,
+    DOUBT_PLACE, DOUBT_SPEED, SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
+    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, FRAMES,
 ) = (
-    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 21, 22, 23, 26, 27, 28, 29,
+    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 21, 23, 24, 25, 28, 29, 30, 31, 32,
 )  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s]; what all steps' errors, and those of switches, have led to; of the
-first body of a cluster: the share to which the carried error is shortened, the sums of forces, and
-of masses times accelerations (x, y); of body 0, where the present kick begins and how long it is,
-in the shortest kicks; the noise in it (x, y, angle); an
-angle, and its cosine and sine, as they are remembered; its frames at an implicit step's stages."""
+of velocity [m/s]; what all steps' errors, those of switches, and contacts that may have opened
+have led to; of the first body of a cluster: the share to which the carried error is shortened,
+the sums of forces, and of masses times accelerations (x, y); of body 0, where the present
+kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
+angle, and its cosine and sine, as they are remembered; of the first body of a cluster, by how much
+the place of one of its bodies may be wrong [m]; its frames at an implicit step's stages."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
@@ -88,12 +95,14 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 
 (
     VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING, PAIR,
-    CANDIDATE_COLUMNS,
-) = range(10)  # fmt: skip
+    DOES, STUCK, CANDIDATE_COLUMNS,
+) = range(12)  # fmt: skip
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
 point of the edge; how the pair touches in this step, see OPEN; 1 where it may have a share of a
 surface force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of
-the two bodies in ``Work.pairs``."""
+the two bodies in ``Work.pairs``; in an iteration of backward Euler, what the pair does (see
+contact_mean.mode_of), and 1 where it is taken to stick whatever it can hold, for one change,
+because it slid one way, then the other."""
 
 OPEN, TOUCHES, GRAZES = range(3)
 """What ``CLOSED`` says: the pair is apart; it touches, with the whole contact law; it grazes, borne
@@ -161,8 +170,13 @@ NOTHING_FULL, CANDIDATES_FULL, PAIRS_FULL, BLOCKS_FULL = range(4)
     HORIZON,
     SEEN_PACE,
     SEEN_STEP,
+    ACROSS,
+    RATES_KNOWN,
+    BUSY,
+    SWITCHES,
+    LOOKED_AT,
     CLOCK_SIZE,
-) = range(22)
+) = range(27)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
 error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
@@ -172,12 +186,19 @@ tolerance of the trial that was just rejected (0: none was); steps in a row that
 until one has been taken that does not; the size of the last such step; the share of what the method
 estimates for its steps that counts in the stated error; until when the run goes on, where UNTIL is
 but a stop on the way (0: it is not) [s]; the pace of the last second iteration that was made (0: it
-is not known), and the size of its step."""
+is not known), and the size of its step; 1 where steps go on across switches, 0 where they end
+there; of steps across them: 1 where LAST_RATES are known, 1 where so many contacts switch in a step
+that Newton's method alone is slow, and the switches since a method last looked how far it has come;
+when that was (inf: it is to do so anew) [s]."""
 
-STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, COUNTS_SIZE = range(9)
+(
+    STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, LOOK_AT, LOOKED_TRIED,
+    COUNTS_SIZE,
+) = range(11)  # fmt: skip
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
 which to pause, the observer's last code, events located, steps in a row by which no time has
-gone by."""
+gone by; steps after which a method looks how far it has come, and how many had been tried when it
+last did."""
 
 
 class BodyView(NamedTuple):
@@ -294,10 +315,9 @@ class Elimination(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (14, n, 6): places and velocities in the states, then START, CHANGE, DEVIATION,
-    CARRIED, FORCING.
+    ``motion`` (16, n, 6): places and velocities in the states, then see START.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (30, capacity): tangential displacements in the states, their rates there, then see
+    ``slip`` (34, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
     ``bodies`` (n, 41): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
@@ -305,7 +325,7 @@ class Work(NamedTuple):
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.
     ``system`` (2, 3 n, 3 n), complex: few bodies' factorised systems, and ``pivots`` (2, 3 n),
     which rows have changed places; ``elimination``: those of many.
-    ``candidates`` (capacity, 9): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
+    ``candidates`` (capacity, 11): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
     ``kept`` (capacity, 5): the pairs whose displacements are set aside.
     ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
     (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),
@@ -361,9 +381,9 @@ def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
     return count
 
 
-def elimination_of(n: int, pairs: int, room: int, dense: int = DENSE) -> Elimination:
-    """Arrays for the sparse systems of n bodies (none for up to ``dense``)."""
-    if n <= dense:
+def elimination_of(n: int, pairs: int, room: int) -> Elimination:
+    """Arrays for the sparse systems of n bodies (none for up to DENSE)."""
+    if n <= DENSE:
         n = pairs = room = 0
     return Elimination(
         place=np.zeros(n, dtype=np.int64),

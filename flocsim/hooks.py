@@ -44,22 +44,20 @@ def end_within(scene, work, step, ratio, share):
 
 
 @hook
-def skin_factor():
-    """How far candidates are listed, in multiples of what suits many short steps."""
-    return 1.0
+def choose_method(scene, work, clock, counts):
+    """Whether the next steps end at switches or go on across them, into ACROSS of the clock, where
+    a method may do both."""
 
 
 @hook
-def pays_across(scene, work, clock, trials, passed):
-    """Whether steps that go on across switches would have passed a time [s] in far fewer than the
-    ``trials`` that it took."""
-    return False
+def step_across(scene, work, clock, step):
+    """One step of a method that may do both, across switches: what ``attempt`` returns."""
+    return -1.0
 
 
 @hook
-def advance_across(scene, work, observed, clock, counts, record, euler):
-    """Run with steps that go on across switches until a Status; 0 where ``attempt`` is to go on."""
-    return 0
+def note_step(scene, work, clock, step):
+    """Write down what a method of steps across switches has to know of one that is accepted."""
 
 
 @hook

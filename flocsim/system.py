@@ -10,7 +10,6 @@ import attrs
 import numpy as np
 
 from flocsim.arrays import (
-    DENSE,
     ERROR,
     EVALUATIONS,
     KICK_SPAN,
@@ -198,8 +197,8 @@ class System:
         """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
         to serve any number of bodies, not these alone."""
         shapes = FAMILIES[self.family]
-        few = few_bodies.FILLINGS if len(self.bodies) <= DENSE and not grows else {}
-        filled = {**few, **self.integrator.fillings, **shapes, **(observer or {})}
+        few = {} if grows else few_bodies.left_out(len(self.bodies))
+        filled = {**self.integrator.fillings, **few, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "

@@ -59,7 +59,8 @@ INNER_ROWS = {
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit"],
-        ["parts", "backward_euler", "few_bodies"],
+        ["parts", "few_bodies"],
+        ["backward_euler"],
         ["loop", "radau"],
         ["events"],
         ["rhs"],

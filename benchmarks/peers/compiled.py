@@ -7,7 +7,6 @@ listed pair.
 import math
 
 from flocsim.arrays import (
-    BOUNDING_RADIUS,
     CANDIDATES,
     CLOSED,
     FORCE,
@@ -15,11 +14,8 @@ from flocsim.arrays import (
     MOTION_COLUMNS,
     NOW,
     SLIP_RATES,
-    SPIN,
-    VX,
-    VY,
 )
-from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.candidates import list_ahead, outline_speed, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import observe
@@ -62,11 +58,9 @@ def locate_now(scene, work):
     return least
 
 
-def outline_speed(scene, work, body):
-    """Upper bound of the speed of any point of a body's outline [m/s]."""
-    motion = work.motion
-    speed = math.hypot(motion[NOW, body, VX], motion[NOW, body, VY])
-    return speed + abs(motion[NOW, body, SPIN]) * scene.bodies[body, BOUNDING_RADIUS]
+LISTED_FOR = 1e-4
+"""Steps [s] that lists are made for: shorter lists cost the solvers more starts, longer ones rows
+and accuracy."""
 
 
 def longest_step(scene, work):
@@ -81,7 +75,7 @@ def list_anew(scene, work):
     """Hand displacements on, list the pairs; the longest step for this list, −1 without room."""
     locate_now(scene, work)
     hand_over(scene, work)
-    if not list_candidates(scene, work):
+    if not list_ahead(scene, work, LISTED_FOR):
         return -1.0
     locate_now(scene, work)
     return longest_step(scene, work)

@@ -16,7 +16,6 @@ from benchmarks.peers.compiled import inspect, list_anew, rate_state
 from benchmarks.speed.measure import Measured
 from flocsim.arrays import CANDIDATES, NOW, with_capacity, work_of
 from flocsim.constants import WATER_VISCOSITY
-from flocsim.hooks import skin_factor
 from flocsim.integrators import VelocityVerlet
 
 SOLVERS = {"LSODA": LSODA, "BDF": BDF, "Radau": Radau}
@@ -42,11 +41,6 @@ def state_tolerances(system, tolerance):
     return np.concatenate(found)
 
 
-def wide_skin():
-    """As Implicit's. Shorter lists cost the solvers more starts, longer ones rows and accuracy."""
-    return 4.0
-
-
 @attrs.define(eq=False)
 class SciPyRun:
     """A system, composed for a SciPy solver; ``observer`` fills the driver's slots."""
@@ -60,9 +54,8 @@ class SciPyRun:
 
     def __attrs_post_init__(self):
         self.system = attrs.evolve(self.system, integrator=VelocityVerlet())
-        slots_filled = {skin_factor: wide_skin, **(self.observer or {})}
         entries = (rate_state, list_anew, inspect)
-        self.pieces = tuple(self.system.compose(entry, slots_filled) for entry in entries)
+        self.pieces = tuple(self.system.compose(entry, self.observer or {}) for entry in entries)
 
     def rate(self, at, vector):
         """The right-hand side."""

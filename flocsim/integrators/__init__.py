@@ -5,6 +5,7 @@ and their derivatives.  ``events``: what ends a step early.  ``loop``: the drive
 stages of the implicit methods.  May import geometry, body and what is below.
 """
 
+from flocsim.integrators.backward_euler.method import BackwardEuler
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.dormand_prince import DormandPrince54
 from flocsim.integrators.implicit import Implicit
@@ -13,6 +14,7 @@ from flocsim.integrators.parts import FixedStep
 from flocsim.integrators.velocity_verlet import VelocityVerlet
 
 __all__ = [
+    "BackwardEuler",
     "DormandPrince54",
     "FixedStep",
     "Implicit",

@@ -10,6 +10,7 @@ import numpy as np
 
 from flocsim import hooks
 from flocsim.arrays import (
+    ACROSS,
     BEARABLE_STEP,
     CLOCK_SIZE,
     COUNTS_SIZE,
@@ -83,12 +84,18 @@ class Integrator(ABC):
     ``tolerance`` [m] and ``first_step`` [s] are read by the driver; a fixed-step method has an
     infinite tolerance. ``estimate_share``: the share of the errors that it estimates for its steps
     that counts in the stated error, far below 1 where the estimate is of a much lower order.
+    ``across``: whether its steps go on across switches instead of ending there, for which they
+    flag, as closed, the pairs that have taken part.
+
+    All that a method keeps from one step to the next lies in the arrays of flocsim.arrays, each
+    column with its unit: a pause, a copy of a run, a System and a Swarm all go on from these.
     """
 
     tolerance = math.inf
     first_step = 1e-6
     largest_step = math.inf
     estimate_share = 1.0
+    across = False
 
     @staticmethod
     @abstractmethod
@@ -123,6 +130,7 @@ class Integrator(ABC):
         clock[PREVIOUS_STEP] = math.inf
         clock[BEARABLE_STEP] = math.inf
         clock[SETTLED_STEP] = math.inf
+        clock[ACROSS] = float(self.across)
         return clock
 
     def fresh_counts(self, max_steps: int) -> np.ndarray:

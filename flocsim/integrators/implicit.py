@@ -5,6 +5,7 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.arrays import (
+    ACROSS,
     CHANGE,
     DEVIATION,
     FIRST_STAGE,
@@ -20,9 +21,9 @@ from flocsim.arrays import (
     X,
 )
 from flocsim.fields import quantity
-from flocsim.hooks import advance_across, end_within, pays_across, skin_factor
-from flocsim.integrators.backward_euler.choice import pays
-from flocsim.integrators.backward_euler.driver import advance_across as euler_across
+from flocsim.hooks import choose_method, end_within, note_step, step_across
+from flocsim.integrators.backward_euler.choice import hand_over, step_or_give_back
+from flocsim.integrators.backward_euler.step import next_across, note_rates
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.grazes import leave_early, settle
@@ -94,16 +95,13 @@ def is_tried_again(scene, clock):
     return staged and scene.surface_reach <= 0.0
 
 
-def wide_skin():
-    """Few long steps: longer lists, which last longer."""
-    return 8.0
-
-
 @attrs.frozen
 class Implicit(Integrator):
     """Radau IIA of order 5, adaptive and stable for any stiffness: the default.
 
-    Steps end where a pair of features touches or parts, so that the forces are smooth inside them.
+    Steps end where a pair of features touches or parts, so that the forces are smooth inside them;
+    in a bed, where contacts switch all the time, they are those of BackwardEuler, by the rule of
+    flocsim.integrators.backward_euler.choice.
     Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
     velocity error leads to included; ``first_step`` [s].
 
@@ -118,6 +116,8 @@ class Implicit(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where Newton's method fails."""
+        if clock[ACROSS] == 1.0:
+            return step_across(scene, work, clock, step)
         time = clock[TIME]
         remaining = max(end_of_run(clock) - time, step)
         grazes = any_grazes(work)
@@ -143,6 +143,8 @@ class Implicit(Integrator):
     @staticmethod
     def next_step(clock, step, ratio):
         """The step for which the estimate and Newton's pace stay in bounds."""
+        if clock[ACROSS] == 1.0:
+            return next_across(clock, step, ratio)
         factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
         if clock[PACE] > 0.0:
             factor = min(factor, (COMFORTABLE_PACE / clock[PACE]) ** 0.5)
@@ -150,16 +152,15 @@ class Implicit(Integrator):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Dense output, and ends of steps, by the stages' cubic; longer lists; the error as a
-        vector."""
+        """Dense output, and ends of steps, by the stages' cubic; the error as a vector."""
         return {
             interpolate: collocate,
             end_within: end_on_the_cubic,
             settle_grazes: settle,
             leave_at_once: leave_early,
-            skin_factor: wide_skin,
-            pays_across: pays,
-            advance_across: euler_across,
+            choose_method: hand_over,
+            step_across: step_or_give_back,
+            note_step: note_rates,
             carry_vector: carry_error,
             overlap_error: step_overlap_error,
         }

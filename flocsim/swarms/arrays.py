@@ -5,25 +5,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.arrays import MOTION_COLUMNS, Scene
+from flocsim.arrays import ACROSS, MOTION_COLUMNS, STEP, Scene
 from flocsim.geometry.contact.sweep import DISC_COLUMNS
 
-ERROR_COLUMNS = 4
-"""Columns of ``errors``: ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE and SWITCH_SPEED of a run."""
+ERROR_COLUMNS = 6
+"""Columns of ``errors``: from ERROR_PLACE to DOUBT_SPEED of a run."""
 
 BEGIN, END, HORIZON_AT, TIME_COUNT = range(4)
 """Places in ``times``: when the window begins and ends, and when the run does [s]."""
 
-LATER_BODY, EARLIER_BODY, AT_VERTEX, AT_EDGE, LINK_COLUMNS = range(5)
-"""Columns of ``links``: the bodies of a contact with a tangential displacement, the later one
-first; core point of the vertex and first one of the edge, of all bodies'."""
+LATER_BODY, EARLIER_BODY, AT_VERTEX, AT_EDGE, MODE, LINK_COLUMNS = range(6)
+"""Columns of ``links``: the bodies of a contact of which more is known than where they are, the
+later one first; core point of the vertex and first one of the edge, of all bodies'; how it touched
+(KEPT_MODE)."""
 
-SLIP, OFFSET = range(2)
-"""Columns of ``slips``: the displacement [m] and the error that it is carried with."""
-
-METHOD, METHOD_STEP, METHOD_COLUMNS = range(3)
-"""Columns of ``methods``: which one a body's island was run by last (swarms.methods), and the size
-of its next step across switches [s]."""
+SLIP, OFFSET, HELD_FORCE, HELD_GAP, MICRO_FLIGHTS, SLIP_COLUMNS = range(6)
+"""Columns of ``slips``: the displacement [m] and the error that it is carried with; the tangential
+force with which it grazes [N], the gap that counts as none [m], and how often it was apart by next
+to nothing (events.grazes)."""
 
 STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
 """Columns of ``costs``, of every island."""
@@ -40,12 +39,13 @@ class Swarm(NamedTuple):
     """n bodies at a common time.
 
     ``bodies`` (n, 10), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
-    ``carried`` (n, 6), ``errors`` (n, 4), ``steps`` (n,): the state, the vector of its error, what
-    the errors of steps and switches have led to, the size of the next step [s].  ``methods``
-    (n, 2): see METHOD.  ``wander`` (n,): how far a body may stray from a straight path in a window
-    [m].  ``first_link`` (n + 1,), ``links`` (k, 4), ``slips`` (k, 2): contacts with a tangential
-    displacement, those of later body b from ``first_link[b]`` on.  ``new_motion`` … ``strayed``:
-    the same at the window's end, the stated error of every body [m], and how far it strayed.
+    ``carried`` (n, 6), ``errors`` (n, 6), ``steps`` (n,): the state, the vector of its error, what
+    the errors of steps and switches have led to, the size of the next step [s].  ``methods`` (n,):
+    1 where the steps of its island went on across switches, as ACROSS in a clock.  ``wander``
+    (n,): how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),
+    ``links`` (k, 5), ``slips`` (k, 5): contacts and what they go by, those of later body b from
+    ``first_link[b]`` on.  ``new_motion`` … ``strayed``: the same at the window's end, the stated
+    error of every body [m], and how far it strayed.
     ``discs``, ``order``, ``starts``: what the sweep for neighbours works on.  ``times``: see BEGIN.
     """
 
@@ -75,8 +75,9 @@ class Swarm(NamedTuple):
     times: np.ndarray
 
 
-def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_step: float) -> Swarm:
-    """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet."""
+def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np.ndarray) -> Swarm:
+    """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet; the
+    ``clock`` that its method begins with."""
     n = len(scene.bodies)
     motion = np.ascontiguousarray(np.hstack([position, velocity]))
     return Swarm(
@@ -87,17 +88,17 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_ste
         motion=motion,
         carried=np.zeros((n, MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
-        steps=np.full(n, float(first_step)),
-        methods=np.zeros((n, METHOD_COLUMNS)),
+        steps=np.full(n, clock[STEP]),
+        methods=np.full(n, clock[ACROSS]),
         wander=np.zeros(n),
         first_link=np.zeros(n + 1, dtype=np.int64),
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
-        slips=np.zeros((0, 2)),
+        slips=np.zeros((0, SLIP_COLUMNS)),
         new_motion=motion.copy(),
         new_carried=np.zeros((n, MOTION_COLUMNS)),
         new_errors=np.zeros((n, ERROR_COLUMNS)),
-        new_steps=np.full(n, float(first_step)),
-        new_methods=np.zeros((n, METHOD_COLUMNS)),
+        new_steps=np.full(n, clock[STEP]),
+        new_methods=np.full(n, clock[ACROSS]),
         stated=np.zeros(n),
         strayed=np.zeros(n),
         discs=np.zeros((n, DISC_COLUMNS)),
@@ -108,7 +109,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, first_ste
 
 
 class Found(NamedTuple):
-    """What islands have left behind: ``links`` (room, 4) and ``slips`` (room, 2), filled up to
+    """What islands have left behind: ``links`` (room, 5) and ``slips`` (room, 5), filled up to
     ``filled[0]``."""
 
     links: np.ndarray
@@ -120,7 +121,7 @@ def found_of(room: int) -> Found:
     """Room for so many contacts."""
     return Found(
         np.zeros((room, LINK_COLUMNS), dtype=np.int64),
-        np.zeros((room, 2)),
+        np.zeros((room, SLIP_COLUMNS)),
         np.zeros(1, dtype=np.int64),
     )
 

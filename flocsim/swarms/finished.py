@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, LINK_COLUMNS
+from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, LINK_COLUMNS, SLIP_COLUMNS
 
 if TYPE_CHECKING:
     from flocsim.swarms.runner import Islands
@@ -29,7 +29,7 @@ class Finished:
         self.labels = np.full(len(free), NONE)
         self.sizes = np.zeros(0, dtype=np.int64)
         self.links = np.zeros((0, LINK_COLUMNS), dtype=np.int64)
-        self.slips = np.zeros((0, 2))
+        self.slips = np.zeros((0, SLIP_COLUMNS))
 
     def owners(self, links: np.ndarray) -> np.ndarray:
         """A free body of every contact."""

@@ -9,6 +9,7 @@ changes no number.
 import math
 
 from flocsim.arrays import (
+    ACROSS,
     CANDIDATES_FULL,
     CARRIED,
     CLOCK_SIZE,
@@ -22,6 +23,8 @@ from flocsim.arrays import (
     KEPT,
     KEPT_EARLIER,
     KEPT_EDGE,
+    KEPT_FLIGHTS,
+    KEPT_FORCE,
     KEPT_GAP,
     KEPT_LATER,
     KEPT_MODE,
@@ -48,8 +51,7 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
-from flocsim.integrators.backward_euler.driver import NEXT_STEP
-from flocsim.integrators.loop.driver import FINISHED, NO_ROOM
+from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
 from flocsim.swarms.arrays import (
     AT_EDGE,
     AT_VERTEX,
@@ -60,10 +62,12 @@ from flocsim.swarms.arrays import (
     FORCES_SUMMED,
     FURTHEST,
     HALT,
+    HELD_FORCE,
+    HELD_GAP,
     HORIZON_AT,
     LATER_BODY,
-    METHOD,
-    METHOD_STEP,
+    MICRO_FLIGHTS,
+    MODE,
     OFFSET,
     PATH_VX,
     PATH_VY,
@@ -74,7 +78,6 @@ from flocsim.swarms.arrays import (
     STEPS_REJECTED,
     STEPS_TAKEN,
 )
-from flocsim.swarms.methods import ACROSS, LOCATES, advance_island
 
 
 def watch_paths(scene, work, observed, time):
@@ -172,13 +175,22 @@ def put_slips(swarm, scene, work, members, first):
             work.kept[count, KEPT_EDGE] = local_point(
                 swarm, scene, members, first, size, swarm.links[link, AT_EDGE], body, other
             )
-            work.kept[count, KEPT_MODE] = OPEN
-            work.slip[KEPT_GAP, count] = 0.0
+            work.kept[count, KEPT_MODE] = swarm.links[link, MODE]
+            work.slip[KEPT_GAP, count] = swarm.slips[link, HELD_GAP]
+            work.slip[KEPT_FORCE, count] = swarm.slips[link, HELD_FORCE]
+            work.slip[KEPT_FLIGHTS, count] = swarm.slips[link, MICRO_FLIGHTS]
             work.slip[KEPT_SLIP, count] = swarm.slips[link, SLIP]
             work.slip[KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
             count += 1
     work.tally[KEPT] = count + 1
     return True
+
+
+def touch_plainly(work):
+    """Let no contact graze or be held: where steps go on across switches there is none of that."""
+    for kept in range(work.tally[KEPT] - 1):
+        work.kept[kept, KEPT_MODE] = OPEN
+        work.slip[KEPT_GAP, kept] = 0.0
 
 
 def local_point(swarm, scene, members, first, size, point, body, other):
@@ -197,18 +209,24 @@ def global_point(swarm, scene, members, first, point, body, other):
 
 
 def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, first):
-    """Clock, counts, and the paths that its bodies are expected to go."""
+    """Clock, counts, and the paths that its bodies are expected to go.
+
+    Steps go on across switches where those of any of its bodies did, from their shortest step.
+    """
     for place in range(CLOCK_SIZE):
         clock[place] = start_clock[place]
     for place in range(COUNTS_SIZE):
         counts[place] = start_counts[place]
     clock[TIME], clock[UNTIL] = swarm.times[BEGIN], swarm.times[END]
     clock[HORIZON] = swarm.times[HORIZON_AT]
-    step = math.inf
+    step, across = math.inf, 0.0
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
         if swarm.bodies[member, FREE] == 1.0:
-            step = min(step, swarm.steps[member])
+            other = swarm.methods[member]
+            if other > across:
+                step, across = math.inf, other
+            step = min(step, swarm.steps[member]) if other == across else step
         observed[body, START_X], observed[body, START_Y] = (
             swarm.motion[member, X],
             swarm.motion[member, Y],
@@ -216,19 +234,8 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
         observed[body, PATH_VX] = swarm.motion[member, VX]
         observed[body, PATH_VY] = swarm.motion[member, VY]
         observed[body, SINCE], observed[body, FURTHEST] = swarm.times[BEGIN], 0.0
+    clock[ACROSS] = across
     clock[STEP] = step if step < math.inf else start_clock[STEP]
-
-
-def put_method(swarm, work, euler, members, first):
-    """The method that the island begins with: the one across switches where it has been in use for
-    any of its bodies, with their shortest step."""
-    method, step = LOCATES, math.inf
-    for body in range(work.bodies.shape[0]):
-        member = members[first + body]
-        if swarm.bodies[member, FREE] == 1.0 and swarm.methods[member, METHOD] == ACROSS:
-            method, step = ACROSS, min(step, swarm.methods[member, METHOD_STEP])
-    euler[NEXT_STEP] = step
-    return method
 
 
 def take_slips(swarm, scene, work, found, members, first):
@@ -248,13 +255,17 @@ def take_slips(swarm, scene, work, found, members, first):
         found.links[row, AT_EDGE] = global_point(
             swarm, scene, members, first, work.kept[kept, KEPT_EDGE], later, earlier
         )
+        found.links[row, MODE] = work.kept[kept, KEPT_MODE]
+        found.slips[row, HELD_GAP] = work.slip[KEPT_GAP, kept]
+        found.slips[row, HELD_FORCE] = work.slip[KEPT_FORCE, kept]
+        found.slips[row, MICRO_FLIGHTS] = work.slip[KEPT_FLIGHTS, kept]
         found.slips[row, SLIP] = work.slip[KEPT_SLIP, kept]
         found.slips[row, OFFSET] = work.slip[KEPT_OFFSET, kept]
     found.filled[0] = begin + count
     return True
 
 
-def take_state(swarm, work, observed, clock, euler, method, members, first):
+def take_state(swarm, work, observed, clock, members, first):
     """Write the state of its bodies at the window's end, and how they got there."""
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
@@ -268,14 +279,12 @@ def take_state(swarm, work, observed, clock, euler, method, members, first):
             swarm.new_errors[member, kind] = work.bodies[body, ERROR_PLACE + kind]
         swarm.new_steps[member] = clock[STEP]
         swarm.stated[member] = clock[ERROR]
-        swarm.new_methods[member, METHOD] = method
-        # Of no matter for the other method, and no number at first.
-        swarm.new_methods[member, METHOD_STEP] = euler[NEXT_STEP] if method == ACROSS else 0.0
+        swarm.new_methods[member] = clock[ACROSS]
 
 
 def run_islands(
-    swarm, scene, work, observed, clock, counts, record, euler, start_clock, start_counts,
-    members, starts, codes, costs, found, first, last,
+    swarm, scene, work, observed, clock, counts, record, start_clock, start_counts, members, starts,
+    codes, costs, found, first, last,
 ):  # fmt: skip
     """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
     their Status into ``codes``. How far that went: to one that found no room, or to the last."""
@@ -291,8 +300,9 @@ def run_islands(
             work.tally[FULL] = CANDIDATES_FULL
             return island
         put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, begin)
-        method = put_method(swarm, work, euler, members, begin)
-        code, method = advance_island(scene, work, observed, clock, counts, record, euler, method)
+        if clock[ACROSS] == 1.0:
+            touch_plainly(work)
+        code = advance(scene, work, observed, clock, counts, record)
         if code == NO_ROOM:
             return island
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
@@ -301,5 +311,5 @@ def run_islands(
         costs[island, STEPS_TAKEN] = counts[STEPS]
         costs[island, STEPS_REJECTED] = counts[REJECTED]
         costs[island, FORCES_SUMMED] = work.tally[EVALUATIONS]
-        take_state(swarm, work, observed, clock, euler, method, members, begin)
+        take_state(swarm, work, observed, clock, members, begin)
     return last

@@ -20,11 +20,9 @@ from flocsim.arrays import (
     STEPS,
     Scene,
     Work,
-    elimination_of,
     with_room,
     work_of,
 )
-from flocsim.integrators.backward_euler.driver import EULER_SIZE
 from flocsim.integrators.base import Integrator
 from flocsim.swarms.arrays import (
     COST_COLUMNS,
@@ -68,7 +66,6 @@ class IslandArrays:
     observed: np.ndarray
     clock: np.ndarray
     counts: np.ndarray
-    euler: np.ndarray
 
 
 class ThreadArrays:
@@ -113,12 +110,9 @@ class ThreadArrays:
             zeros = np.zeros((size, 3))
             room = size * (ROOM_OF_FEW if 1 < size <= FEW else ROOM_OF_MANY)
             work = work_of(scene, zeros, zeros, room, pairs=4 * size, blocks=8 * size)
-            # Steps across switches solve sparse systems of few bodies as well.
-            elimination = elimination_of(size, len(work.pairs), 8 * size, dense=0)
-            work = work._replace(elimination=elimination)
             self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, TRACK_COLUMNS)),
-                integrator.fresh_clock(), integrator.fresh_counts(0), np.zeros(EULER_SIZE),
+                integrator.fresh_clock(), integrator.fresh_counts(0),
             )  # fmt: skip
         return self.by_size[size]
 
@@ -223,8 +217,8 @@ class Runner:
         while not own.halted:
             first = self.driver(
                 swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
-                place.euler, start_clock, start_counts, islands.members, islands.starts,
-                islands.codes, islands.costs, own.found, first, last,
+                start_clock, start_counts, islands.members, islands.starts, islands.codes,
+                islands.costs, own.found, first, last,
             )  # fmt: skip
             if first == last:
                 return

@@ -162,7 +162,7 @@ class Swarm:
             compose(find_islands, {}), compose(run_islands, {**compiled_calls(), **fillings}),
             self.integrator, [ThreadArrays(scene) for _ in range(threads)], max_steps,
         )  # fmt: skip
-        swarm = swarm_of(scene, *self.system.motion(), self.integrator.first_step)
+        swarm = swarm_of(scene, *self.system.motion(), self.integrator.fresh_clock())
         return Progress(runner, swarm, self.box, self.reach, until, leaving)
 
     def fillings(self) -> dict[Callable, Callable]:

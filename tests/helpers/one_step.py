@@ -1,46 +1,49 @@
 """Single steps of backward Euler, uncompiled, of a few bodies."""
 
-import numpy as np
-
 from flocsim import System
-from flocsim.arrays import NOW, TIME, UNTIL, VX, elimination_of, work_of
+from flocsim.arrays import NOW, TIME, UNTIL, VX, work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators import Implicit
-from flocsim.integrators.backward_euler.driver import EULER_SIZE, take_end, try_step
+from flocsim.integrators import BackwardEuler
 from flocsim.integrators.backward_euler.interior import find_closed
 from flocsim.integrators.backward_euler.newton import begin_step, solve_end
-from flocsim.integrators.loop.driver import keep_lists
+from flocsim.integrators.backward_euler.step import euler_step
+from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 
 
-def newton_alone(scene, work, clock, euler, step, most):
+def newton_alone(scene, work, clock, step, most):
     """One step by Newton's method from its start."""
     begin_step(work)
     return solve_end(scene, work, clock, step, most)
 
 
-def newton_from_inside(scene, work, clock, euler, step, most):
+def newton_from_inside(scene, work, clock, step, most):
     """One step by both methods."""
     begin_step(work)
     return find_closed(scene, work, clock, step) and solve_end(scene, work, clock, step, most)
+
+
+def whole_step(scene, work, clock, counts, step):
+    """One step, however large its error: that over the tolerance."""
+    ratio, _ = euler_step(scene, work, clock, step, False)
+    assert ratio >= 0.0 and not went_too_far(scene, work, clock, step)
+    accept(scene, work, clock, counts, step, True)
+    return ratio
 
 
 class Stage:
     """Bodies, listed and located, for steps of backward Euler."""
 
     def __init__(self, bodies, forces, fluid=None, tolerance=1e-9):
-        integrator = Implicit(tolerance=tolerance)
+        integrator = BackwardEuler(tolerance=tolerance)
         fluids = {} if fluid is None else {"fluid": fluid}
         system = System(bodies, forces, integrator, **fluids)
         self.fillings = system.fillings(grows=True)
         self.scene = system.scene(jit=False)
-        work = work_of(self.scene, *system.motion())
-        n = len(bodies)
-        self.work = work._replace(elimination=elimination_of(n, len(work.pairs), 50 * n, dense=0))
+        self.work = work_of(self.scene, *system.motion())
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
         self.clock[UNTIL] = 1.0
-        self.euler = np.zeros(EULER_SIZE)
-        assert self.linked(keep_lists)(self.scene, self.work)
+        assert self.linked(keep_lists)(self.scene, self.work, 0.0)
 
     def linked(self, function):
         """The function with this family's others in the place of hooks."""
@@ -48,14 +51,11 @@ class Stage:
 
     def end(self, step, how=newton_alone, most=100):
         """Whether the step's end was found; it is left in NOW."""
-        return self.linked(how)(self.scene, self.work, self.clock, self.euler, step, most)
+        return self.linked(how)(self.scene, self.work, self.clock, step, most)
 
     def step(self, step):
         """Take a step, however large its error: that over the tolerance."""
-        ratio = self.linked(try_step)(self.scene, self.work, self.clock, self.euler, step)
-        assert ratio >= 0.0
-        self.linked(take_end)(self.scene, self.work, self.clock, self.counts, self.euler, step)
-        return ratio
+        return self.linked(whole_step)(self.scene, self.work, self.clock, self.counts, step)
 
     def locate(self):
         """Contacts anew, of what stands in NOW."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere
+from flocsim.arrays import TOUCHES
 from flocsim.integrators import Status
 from flocsim.swarms.arrays import with_links
 from flocsim.swarms.leaving import REENTER, REMOVE, Leaving
@@ -74,8 +75,8 @@ def test_a_cluster_comes_back_as_it_is():
     others = [(x * 3.0 * R, HIGH - 0.2 * R) for x in range(1, 5)]
     swarm = swarm_at([*pair, *others])
     progress = progress_of(swarm, REENTER)
-    links = np.array([[1, 0, 1, 0]])
-    progress.swarm = with_links(progress.swarm, [(links, np.array([[1e-9, 0.0]]))])
+    links = np.array([[1, 0, 1, 0, TOUCHES]])
+    progress.swarm = with_links(progress.swarm, [(links, np.array([[1e-9, 0.0, 0.0, 0.0, 0.0]]))])
     progress.swarm.motion[:2, 3:] = [1e-4, -2e-4, 3.0]
     before = progress.swarm.motion.copy()
     progress.let_leave()
@@ -86,7 +87,7 @@ def test_a_cluster_comes_back_as_it_is():
     assert after[:2, 1].min() - R >= HIGH - 1e-12
     near = swarm.gauge().neighbours(after[:, :3], 0.05 * R)
     assert near.pairs.tolist() == [[1, 0]]
-    assert progress.swarm.slips.tolist() == [[1e-9, 0.0]]
+    assert progress.swarm.slips.tolist() == [[1e-9, 0.0, 0.0, 0.0, 0.0]]
     assert progress.returns.tolist() == [1, 1, 0, 0, 0, 0]
 
 

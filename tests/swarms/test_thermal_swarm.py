@@ -33,7 +33,7 @@ def progress_of(swarm, until):
         compose(find_islands, {}, jit=False), compose(run_islands, swarm.fillings(), jit=False),
         swarm.integrator, [ThreadArrays(scene)], 10**6,
     )  # fmt: skip
-    arrays = swarm_of(scene, *swarm.system.motion(), swarm.integrator.first_step)
+    arrays = swarm_of(scene, *swarm.system.motion(), swarm.integrator.fresh_clock())
     return Progress(runner, arrays, swarm.box, swarm.reach, until)
 
 

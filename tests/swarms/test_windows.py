@@ -5,8 +5,19 @@ import itertools
 import numpy as np
 import pytest
 
-from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, LINK_COLUMNS
+from flocsim import Body, Sphere, System
+from flocsim.arrays import CLOSED, GRAZES, KEPT_MODE, OPEN, work_of
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.swarms.arrays import (
+    EARLIER_BODY,
+    LATER_BODY,
+    LINK_COLUMNS,
+    SLIP_COLUMNS,
+    found_of,
+    with_links,
+)
 from flocsim.swarms.finished import Finished
+from flocsim.swarms.islands import put_slips, take_slips, touch_plainly
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import CHUNK, Islands, chunks_of
 from flocsim.swarms.swarm import Swarm
@@ -63,9 +74,9 @@ def contacts_of(islands, free, rng):
         members = islands.members_of(k)
         if len(members) > 1:
             later, earlier = members[-1], members[0]
-            links.append([later, earlier, *rng.integers(0, 100, 2)])
+            links.append([later, earlier, *rng.integers(0, 100, LINK_COLUMNS - 2)])
     links = np.array(links, dtype=np.int64).reshape(-1, LINK_COLUMNS)
-    return links, rng.random((len(links), 2))
+    return links, rng.random((len(links), SLIP_COLUMNS))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -146,3 +157,31 @@ def test_a_window_that_fails_leaves_time_motion_and_error_as_they_were():
     after = progress.seen()
     assert (after[0], after[2], progress.median_error) == (time, error, half)
     assert np.array_equal(after[1], motion)
+
+
+def test_what_a_contact_goes_by_besides_places_goes_on_behind_a_window():
+    """How it touches, its force, the gap that counts as none, and its flights; but not where the
+    steps go on across switches."""
+    swarm = Swarm(
+        [Body(Sphere(R), (x, 0.0), density=2650.0) for x in (0.0, 2.0 * R - 1e-9)],
+        forces(),
+        fluid=WATER,
+    )
+    arrays = swarm.begin(1.0).swarm
+    links = np.array([[1, 0, 1, 0, GRAZES]])
+    arrays = with_links(arrays, [(links, np.array([[1e-12, 2e-13, 3e-9, 4e-14, 5.0]]))])
+    system = System(swarm.bodies, forces(), fluid=WATER)
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    members, found = np.arange(2), found_of(4)
+    work.budget[:] = -1.0
+    assert put_slips(arrays, scene, work, members, 0)
+    list_candidates(scene, work)
+    assert work.candidates[0, CLOSED] == GRAZES
+    assert take_slips(arrays, scene, work, found, members, 0)
+    assert found.filled[0] == 1
+    assert found.links[0].tolist() == links[0].tolist()
+    assert found.slips[0].tolist() == [1e-12, 2e-13, 3e-9, 4e-14, 5.0]
+    assert put_slips(arrays, scene, work, members, 0)
+    touch_plainly(work)
+    assert work.kept[0, KEPT_MODE] == OPEN

@@ -161,3 +161,18 @@ def test_the_stated_error_covers_a_flight_without_drag(method):
     run = System(bodies, [Contact(damping_n=0.0)], method()).run(1e-4 + contact_time + 10.0)
     error = abs(run.position[-1, 1, 1] - 6e-6 - 0.1)
     assert 0.0 < error <= run.error < 1e4 * error
+
+
+@pytest.mark.parametrize(("delta", "number"), [(0.0, 25), (0.25, 33), (0.5, 59)])
+def test_a_doublet_of_stiff_contacts_parts_though_it_hangs_on_little(delta, number):
+    """It hangs on overlaps of 2.4e-14 m between two contacts that each lose their displacement
+    where they part: a touch noticed deeper than it gets would wedge them for good."""
+    path = Path(mkdtemp()) / "study.toml"
+    path.write_text(
+        'preset = "tang2014"\nseed = 12\n'
+        '[scene]\ntypes = ["I", "II", "III"]\ndelta = [0.0, 0.25, 0.5, 0.75, 1.0]\n'
+        '[shapes]\nsource = "library"\nfile = "synthetic"\nvertices = [16]\n'
+        "[forces.contact]\nk_n = 2000.0\nk_t = 200.0\n"
+    )
+    row = Study(load_config(path)).run(TYPE_III, 16, delta, number)
+    assert OUTCOMES[row["outcome"]] == "B"

@@ -3,6 +3,8 @@ own; resized to the scene, or as they were measured."""
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import attrs
 import numpy as np
@@ -132,12 +134,24 @@ class FlocPool:
     own_size: bool = False
     by_error: bool = False
     made: dict[tuple, Shape] = attrs.Factory(dict)
+    orders: dict[float, list[int]] = attrs.Factory(dict)
+
+    @cached_property
+    def sizes(self) -> list[Any]:
+        """What flocs are chosen by: their size [m], or its ratio to the spheroradius."""
+        return [floc.size if self.own_size else floc.ratio for floc in self.flocs]
+
+    def by_size(self, radius: float) -> list[int]:
+        """Places of all flocs, those nearest in size to a body of that radius [m] first."""
+        if radius not in self.orders:
+            wanted = radius if self.own_size else radius / self.radius
+            self.orders[radius] = nearest_in_ratio(self.sizes, wanted, None)
+        return self.orders[radius]
 
     def near(self, radii: Sequence[float]) -> list[float]:
         """The different sizes [m], ascending, of the flocs that are drawn for bodies of about
         these radii: two at least."""
-        sizes = [floc.size for floc in self.flocs]
-        orders = [nearest_in_ratio(sizes, radius, None) for radius in radii]
+        sizes, orders = self.sizes, [self.by_size(radius) for radius in radii]
         found = {sizes[k] for order in orders for k in order[: self.pool]}
         more = next(sizes[k] for k in orders[1] if {sizes[k]} != found)
         return sorted(found | {more} if len(found) == 1 else found)
@@ -146,18 +160,15 @@ class FlocPool:
         self, numbers: Sequence[float] | np.ndarray, radius_i: float, radius_j: float
     ) -> tuple[int, int]:
         """Places of the flocs of i and j for a replicate's random numbers; two, where possible."""
-        unit = 1.0 if self.own_size else self.radius
-        sizes = [floc.size if self.own_size else floc.ratio for floc in self.flocs]
-        pool_i, pool_j = (
-            nearest_in_ratio(sizes, radius / unit, self.pool) for radius in (radius_i, radius_j)
-        )
+        sizes = self.sizes
+        pool_i, pool_j = (self.by_size(radius)[: self.pool] for radius in (radius_i, radius_j))
         first = pool_i[int(numbers[2] * len(pool_i))]
         others = [k for k in pool_j if k != first] or pool_j
         if not self.own_size:
             return first, others[int(numbers[3] * len(others))]
         # Two flocs of one size settle alike and never meet.
         others = [k for k in others if sizes[k] != sizes[first]] or [
-            next(k for k in nearest_in_ratio(sizes, radius_j, None) if sizes[k] != sizes[first])
+            next(k for k in self.by_size(radius_j) if sizes[k] != sizes[first])
         ]
         second = others[int(numbers[3] * len(others))]
         return (first, second) if sizes[first] < sizes[second] else (second, first)

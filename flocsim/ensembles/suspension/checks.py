@@ -6,8 +6,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.arrays import OPEN
 from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
+from flocsim.geometry.contact.slip_transfer import STAYS
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
 from flocsim.swarms.arrays import (
@@ -16,9 +18,10 @@ from flocsim.swarms.arrays import (
     EARLIER_BODY,
     ERROR_COLUMNS,
     LATER_BODY,
-    METHOD_COLUMNS,
+    LINK_COLUMNS,
+    MODE,
+    SLIP_COLUMNS,
 )
-from flocsim.swarms.methods import ACROSS, LOCATES
 from flocsim.swarms.progress import Effort
 
 EFFORT = tuple(field.name for field in attrs.fields(Effort))
@@ -101,28 +104,29 @@ def check_moment(part: Part, form: Form) -> None:
 
 
 def check_state(part: Part, form: Form) -> None:
-    n, links = form.bodies, part.arrays.get("links", np.zeros((0, 4)))
+    n, links = form.bodies, part.arrays.get("links", np.zeros((0, LINK_COLUMNS)))
     count = len(links) if links.ndim else 0
     one: tuple[int, ...] = ()
     shaped(part, {
         "seen": ("f8", (n, 6)),
         "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
         "steps": ("f8", (n,)), "wander": ("f8", (n,)),
-        "methods": ("f8", (n, METHOD_COLUMNS)), "links": ("i8", (count, 4)),
-        "slips": ("f8", (count, 2)), "time": ("f8", one), "span": ("f8", one),
+        "methods": ("f8", (n,)), "links": ("i8", (count, LINK_COLUMNS)),
+        "slips": ("f8", (count, SLIP_COLUMNS)), "time": ("f8", one), "span": ("f8", one),
         "stated": ("f8", (n,)), "effort": ("i8", (len(EFFORT),)),
         "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
     for name in ("steps", "wander"):
         demand(np.all(part.arrays[name] > 0.0), name)
-    method, step = part.arrays["methods"].T
-    demand(np.all((method == LOCATES) | (method == ACROSS)) and np.all(step >= 0.0), "methods")
+    methods = part.arrays["methods"]
+    demand(np.all((methods == 0.0) | (methods == 1.0)), "methods")
     demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
     gone, returns = part.arrays["gone"], part.arrays["returns"]
     demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")
     bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
     demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
     demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")
+    demand(np.all((links[:, MODE] >= OPEN) & (links[:, MODE] <= STAYS)), "links")
     demand(is_count(part.facts.get("moments"), form.moments), "moments")
     demand(part.facts["moments"] >= 1, "moments")
 

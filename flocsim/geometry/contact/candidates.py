@@ -12,15 +12,18 @@ from flocsim.arrays import (
     BOUNDING_RADIUS,
     CANDIDATES,
     EARLIER,
+    EDGE_BODY,
     EQUIVALENT_RADIUS,
     FREE,
     LATER,
     LISTED,
     NOW,
+    PAIR,
     PAIRS,
     RADIUS,
     REBUILDS,
     SPIN,
+    VERTEX_BODY,
     VX,
     VY,
     X,
@@ -30,7 +33,6 @@ from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wand
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
-from flocsim.hooks import skin_factor
 
 SKIN = 0.1
 """Pairs are listed up to a gap of this share of r_i + r_j, or up to the smaller one of …"""
@@ -41,6 +43,13 @@ SKIN_OF_EDGE = 0.3
 SKIN_OF_SIZE = 0.1
 """… and this share of the smaller body, whatever is larger."""
 
+LASTING, WIDEST = 2.2, 12.0
+"""Lists are made for so many steps at the speeds of now, up to so many times as wide: half of that
+is for the first."""
+
+TOO_WIDE = 4.0
+"""Of few bodies they are made anew where they are so many times as wide as that."""
+
 
 def edge_length(scene, body):
     """The mean length of a body's edges [m], as if its outline were a circle's."""
@@ -48,12 +57,18 @@ def edge_length(scene, body):
     return 2.0 * math.pi * scene.bodies[body, EQUIVALENT_RADIUS] / points
 
 
-def skin_of(scene, a, b):
-    """Cut-off gap of the list of a pair of bodies [m]."""
+def widened(skin, way):
+    """A cut-off gap for bodies that come nearer to each other by so much in a step [m]."""
+    return min(max(skin, LASTING * way), WIDEST * skin)
+
+
+def skin_of(scene, work, a, b, ahead):
+    """Cut-off gap of the list of a pair of bodies for steps of ``ahead`` [s] [m]."""
     size = min(scene.bodies[a, BOUNDING_RADIUS], scene.bodies[b, BOUNDING_RADIUS])
     edge = min(edge_length(scene, a), edge_length(scene, b))
     contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-    return skin_factor() * max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
+    skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
+    return widened(skin, relative_speed(scene, work, a, b) * ahead)
 
 
 def list_for_surface_force(scene, work, pair, skin, reach):
@@ -68,24 +83,28 @@ def list_for_surface_force(scene, work, pair, skin, reach):
     return -math.inf
 
 
-def widest_cut(scene):
-    """The gap of bounding circles from which on no two bodies act, nor are they listed [m]."""
-    largest, contact, edge = 0.0, 0.0, 0.0
+def widest_cut(scene, work, ahead):
+    """The gap of bounding circles from which on no two bodies act, nor are they listed for steps of
+    ``ahead`` [s] [m]."""
+    largest, contact, edge, fastest = 0.0, 0.0, 0.0, 0.0
     for body in range(scene.bodies.shape[0]):
         if scene.bodies[body, FREE] == 1.0:
             largest = max(largest, scene.bodies[body, BOUNDING_RADIUS])
             edge = max(edge, edge_length(scene, body))
+            fastest = max(fastest, outline_speed(scene, work, body))
         contact = max(contact, scene.bodies[body, RADIUS])
     skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
-    return max(0.0, scene.surface_reach, scene.centre_reach) + skin_factor() * skin
+    reach = max(0.0, scene.surface_reach, scene.centre_reach)
+    return reach + widened(skin, 2.0 * fastest * ahead)
 
 
-def list_pair(scene, work, pair):
-    """List the candidates of two bodies; how far they may move before it must be made again."""
+def list_pair(scene, work, pair, ahead):
+    """List the candidates of two bodies for steps of ``ahead`` [s]; how far they may move before it
+    must be made again."""
     a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
     ox, oy = separation(scene, work, NOW, a, b)
     reach = scene.surface_reach
-    skin = skin_of(scene, a, b)
+    skin = skin_of(scene, work, a, b, ahead)
     apart = length_of(ox, oy) - scene.bodies[a, BOUNDING_RADIUS] - scene.bodies[b, BOUNDING_RADIUS]
     if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
@@ -169,6 +188,13 @@ def relative_speed(scene, work, a, b):
     return min(seen_from_b, seen_from_a)
 
 
+def outline_speed(scene, work, body):
+    """A bound of how fast the core of a body moves now [m/s]."""
+    v = work.motion
+    turning = abs(v[NOW, body, SPIN]) * core_radius(scene, body)
+    return length_of(v[NOW, body, VX], v[NOW, body, VY]) + turning
+
+
 def time_within(scene, work, share):
     """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
     longest = math.inf if watches_all(work) else time_to_wander(scene, work, share)
@@ -179,19 +205,37 @@ def time_within(scene, work, share):
     return longest
 
 
+def too_wide(scene, work, ahead):
+    """Whether the lists of few bodies are far wider than steps of ``ahead`` [s] need."""
+    before = -1
+    if watches_all(work):
+        for row in range(work.tally[CANDIDATES]):
+            pair = work.candidates[row, PAIR]
+            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+            if pair != before and work.budget[pair] > TOO_WIDE * skin_of(scene, work, a, b, ahead):
+                return True
+            before = pair
+    return False
+
+
 def list_candidates(scene, work):
     """Make the list anew at the current position; False where it has no room."""
+    return list_ahead(scene, work, 0.0)
+
+
+def list_ahead(scene, work, ahead):
+    """The same, for steps of ``ahead`` [s]."""
     kept = keep_slips(work)
     work.tally[CANDIDATES] = 0
     work.tally[REBUILDS] += 1
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
             work.bodies[body, LISTED + axis] = work.motion[NOW, body, axis]
-    if not list_pairs(scene, work, widest_cut(scene)):
+    if not list_pairs(scene, work, widest_cut(scene, work, ahead)):
         return False
     room = True
     for pair in range(work.tally[PAIRS]):
-        budget = list_pair(scene, work, pair)
+        budget = list_pair(scene, work, pair, ahead)
         work.budget[pair] = budget
         room = room and budget > 0.0
     if room:

@@ -23,6 +23,7 @@ from flocsim.arrays import (
     KEPT,
     KEPT_EARLIER,
     KEPT_EDGE,
+    KEPT_FLIGHTS,
     KEPT_FORCE,
     KEPT_GAP,
     KEPT_LATER,
@@ -51,6 +52,12 @@ STAYS = 3
 """KEPT_MODE of a pair that is HELD."""
 
 
+def is_kept(work, row, mode):
+    """Whether there is anything to be known of a pair besides where its bodies are."""
+    known = work.slip[NOW, row] != 0.0 or work.slip[GAP_OFFSET, row] != 0.0
+    return known or work.slip[FLIGHTS, row] != 0.0 or mode in (GRAZES, STAYS)
+
+
 def keep_slips(work):
     """Set aside the tangential displacements, and the grazing, of the listed pairs; how many there
     are.
@@ -64,7 +71,7 @@ def keep_slips(work):
         mode = work.candidates[row, CLOSED]
         if work.slip[HELD, row] != 0.0:
             mode = STAYS
-        if work.slip[NOW, row] != 0.0 or mode == GRAZES:
+        if is_kept(work, row, mode):
             a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
             work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = max(a, b), min(a, b)
             work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
@@ -74,6 +81,7 @@ def keep_slips(work):
             work.slip[KEPT_FORCE, count] = work.slip[GRAZING_FORCE, row]
             work.slip[KEPT_GAP, count] = work.slip[GAP_OFFSET, row]
             work.slip[KEPT_OFFSET, count] = work.slip[SLIP_OFFSET, row]
+            work.slip[KEPT_FLIGHTS, count] = work.slip[FLIGHTS, row]
             count += 1
     work.tally[KEPT] = count + 1
     return count
@@ -105,6 +113,7 @@ def restore_slips(work, count):
                 work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
                 work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
                 work.slip[GAP_OFFSET, row] = work.slip[KEPT_GAP, k]
+                work.slip[FLIGHTS, row] = work.slip[KEPT_FLIGHTS, k]
                 if work.kept[k, KEPT_MODE] == STAYS:
                     work.candidates[row, CLOSED] = TOUCHES
                     work.slip[HELD, row] = 1.0

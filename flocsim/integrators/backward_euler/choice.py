@@ -1,22 +1,54 @@
-"""When steps across switches are ahead of steps that end at every one.
+"""The rule by which Implicit hands over to backward Euler, and takes back, in System and Swarm.
+
+Steps that end at every switch are right for few contacts. In a bed some contact opens or closes all
+the time, while nothing moves. So, where FEWEST bodies or more are run together and touch:
+
+- Behind every PROBE steps that end at switches it looks how far they have come: where backward
+  Euler would have passed that time in AHEAD times fewer steps than were tried, it goes on.
+- It gives back where nothing touches any more, where ENOUGH_TRIALS of its steps had fewer than
+  FEW_SWITCHES switches each, and where bodies would fly apart again, by more than is allowed.
 
 Counts of steps alone decide: clocks have no say, so that the choice is the same everywhere.
 """
 
-from flocsim.arrays import FIRST_STAGE, FREE, NOW, TOLERANCE, VELOCITY
+import math
+
+from flocsim.arrays import (
+    ACROSS,
+    FREE,
+    LOCATED,
+    LOOK_AT,
+    LOOKED,
+    LOOKED_AT,
+    LOOKED_TRIED,
+    NOW,
+    REJECTED,
+    STEPS,
+    SWITCHES,
+    TIME,
+    TOLERANCE,
+    VELOCITY,
+)
+from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.integrators.backward_euler.step import (
+    end_at_switches,
+    euler_step,
+    go_across,
+)
 from flocsim.integrators.rhs.views import lever
+from flocsim.laws import CONTACT_FORCE, has
+
+FEWEST = 3
+"""Bodies, fixed ones among them: two have few contacts, and engines of pairs compile faster."""
+
+PROBE = 60
+"""Steps with located switches between two looks at how far they have come."""
 
 AHEAD = 4.0
 """Backward Euler must be expected to need so many times fewer steps."""
 
-BEFORE = FIRST_STAGE + 4
-"""Row of ``Work.motion`` for the velocities at the last look."""
-
-
-def note_velocities(work):
-    for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
-            work.motion[BEFORE, body, axis] = work.motion[NOW, body, axis]
+ENOUGH_TRIALS, FEW_SWITCHES = 60, 0.25
+"""Behind so many trials with fewer switches than that for each, located switches cost no more."""
 
 
 def largest_change(scene, work):
@@ -26,7 +58,7 @@ def largest_change(scene, work):
         if scene.bodies[body, FREE] == 1.0:
             for axis in range(3):
                 now = work.motion[NOW, body, VELOCITY + axis]
-                change = abs(now - work.motion[BEFORE, body, VELOCITY + axis])
+                change = abs(now - work.motion[LOOKED, body, VELOCITY + axis])
                 largest = max(largest, lever(scene, body, axis) * change)
     return largest
 
@@ -36,3 +68,39 @@ def pays(scene, work, clock, trials, passed):
     error of a step is half of that times the change of velocity."""
     steps = 1.0 + passed * largest_change(scene, work) / clock[TOLERANCE]
     return AHEAD * steps <= trials
+
+
+def hand_over(scene, work, clock, counts):
+    """Hand over to backward Euler, or take back, where that is due."""
+    few = work.bodies.shape[0] < FEWEST or not has(scene, CONTACT_FORCE)
+    if few and clock[ACROSS] == 0.0:
+        return
+    tried = counts[STEPS] + counts[REJECTED] + counts[LOCATED]
+    trials = tried - counts[LOOKED_TRIED]
+    if clock[ACROSS] == 1.0:
+        enough = trials >= ENOUGH_TRIALS
+        quiet = enough and clock[SWITCHES] < FEW_SWITCHES * trials
+        if few or quiet or least_listed_gap(work) >= 0.0:
+            end_at_switches(scene, work, clock)
+        elif not enough:
+            return
+    elif clock[LOOKED_AT] < math.inf:
+        if counts[STEPS] < counts[LOOK_AT]:
+            return
+        passed = clock[TIME] - clock[LOOKED_AT]
+        if pays(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
+            go_across(clock, passed)
+    counts[LOOK_AT], counts[LOOKED_TRIED] = counts[STEPS] + PROBE, tried
+    clock[LOOKED_AT], clock[SWITCHES] = clock[TIME], 0.0
+    for body in range(work.motion.shape[1]):
+        for axis in range(VELOCITY, VELOCITY + 3):
+            work.motion[LOOKED, body, axis] = work.motion[NOW, body, axis]
+
+
+def step_or_give_back(scene, work, clock, step):
+    """One step across switches; −1 where it fails, also for bodies that would fly apart again."""
+    ratio, bounce = euler_step(scene, work, clock, step, False)
+    if 0.0 <= ratio <= 1.0 and bounce > 0.0:
+        end_at_switches(scene, work, clock)
+        return -1.0
+    return ratio

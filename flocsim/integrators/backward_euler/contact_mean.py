@@ -21,9 +21,9 @@ from flocsim.arrays import (
     NOW,
     PAIR,
     RADIUS,
-    SHARE,
     SLIDING,
     STIFFNESS,
+    STUCK,
     TRIAL,
     VERTEX_BODY,
     ContactView,
@@ -38,10 +38,6 @@ from flocsim.integrators.rhs.jacobian import (
 )
 from flocsim.integrators.rhs.views import effective_mass, push_pair, tangential_rate
 from flocsim.laws import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
-
-HELD = SHARE
-"""Column of the geometry of NEW: 1 where a contact is taken to stick whatever it can hold, for one
-change, because it slid one way, then the other."""
 
 
 def takes_part(work, row):
@@ -68,11 +64,11 @@ def mean_view(scene, work, row, step, after):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     before = max(-work.geometry[TRIAL, row, GAP], 0.0)
     rate = tangential_rate(work, NOW, row)
-    slip, side = work.slip[TRIAL, row] + closed_share(work, row) * step * rate, 0
+    slip, side = work.slip[NOW, row] + closed_share(work, row) * step * rate, 0
     mass = effective_mass(scene, a, b)
     radius_a, radius_b = scene.bodies[a, RADIUS], scene.bodies[b, RADIUS]
     pressing = (after - before) / step
-    if has(scene, SLIP_LIMIT) and after > 0.0 and work.geometry[NEW, row, HELD] == 0.0:
+    if has(scene, SLIP_LIMIT) and after > 0.0 and work.candidates[row, STUCK] == 0:
         pressed = ContactView(after, pressing, 0.0, 0.0, mass, radius_a, radius_b)
         limit = slip_limit(scene, pressed)
         if abs(slip) > limit:
@@ -149,7 +145,7 @@ def mode_of(work, row):
     return 3 + work.candidates[row, SLIDING]
 
 
-SLIDES_BOTH_WAYS = 6.0
+SLIDES_BOTH_WAYS = 6
 """The sum of the modes of sliding one way and the other; that of sticking twice, as well."""
 
 CLOSE = 0.02

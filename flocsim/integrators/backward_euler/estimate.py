@@ -14,55 +14,49 @@ error of velocity is sent through once more, for what the next step leaves of it
 from flocsim.arrays import (
     CHANGE,
     DEVIATION,
-    FIRST_STAGE,
     FREE,
+    LAST_RATES,
     NOW,
+    RATES_KNOWN,
     START,
     STIFFNESS,
-    TOLERANCE,
     VELOCITY,
 )
 from flocsim.compiler.composer import apart
-from flocsim.integrators.radau.elimination import solve_sparse
-from flocsim.integrators.radau.systems import balance_load
+from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
-from flocsim.integrators.rhs.error import error_size, rounding_size
 from flocsim.integrators.rhs.views import inertia
 
-BEFORE = FIRST_STAGE + 3
-"""Row of ``Work.motion`` for the accelerations of the last step, which Radau has no use for."""
 
-
-def accelerations(work, row, step, known):
-    """Write the accelerations of the step into a row; those of the step before as well, where
-    they are not known."""
+def write_rates(work, step):
+    """Write the accelerations of the step, which has begun in START, into LAST_RATES."""
     for body in range(work.motion.shape[1]):
         for axis in range(VELOCITY, VELOCITY + 3):
             change = work.motion[NOW, body, axis] - work.motion[START, body, axis]
-            work.motion[row, body, axis] = change / step
-            if not known:
-                work.motion[BEFORE, body, axis] = change / step
+            work.motion[LAST_RATES, body, axis] = change / step
 
 
 @apart
 def solve_loads(scene, work, weight):
     """The solution of the system for the loads less ``weight`` K CHANGE."""
     subtract_product(work, STIFFNESS, weight)
-    balance_load(scene, work)
-    solve_sparse(work, False)
+    solve_for_free(scene, work)
 
 
-def estimate_step(scene, work, step, known):
-    """The error of the step into DEVIATION; ``known``: whether there was a step before."""
+@apart
+def estimate_step(scene, work, clock, step):
+    """The error of the step, whose end stands in NOW, into DEVIATION."""
     motion, loads = work.motion, work.loads
-    accelerations(work, DEVIATION, step, known)
+    if clock[RATES_KNOWN] == 0.0:
+        write_rates(work, step)
     for body in range(motion.shape[1]):
         for axis in range(3):
             place = VELOCITY + axis
-            less = motion[BEFORE, body, place] - motion[DEVIATION, body, place]
-            loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * less
-            motion[CHANGE, body, axis] = motion[START, body, place] - motion[NOW, body, place]
+            less = motion[START, body, place] - motion[NOW, body, place]
+            slower = motion[LAST_RATES, body, place] + less / step
+            loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
+            motion[CHANGE, body, axis] = less
     solve_loads(scene, work, 0.5 * step)
     for body in range(motion.shape[1]):
         free = scene.bodies[body, FREE]
@@ -76,13 +70,3 @@ def estimate_step(scene, work, step, known):
         free = scene.bodies[body, FREE]
         for axis in range(3):
             motion[DEVIATION, body, VELOCITY + axis] = free * loads[REAL, 3 * body + axis].real
-
-
-@apart
-def step_ratio(scene, work, clock, step, known):
-    """The error of the step over what is allowed, −1 where it is no number."""
-    estimate_step(scene, work, step, known)
-    error = error_size(scene, work)
-    if not error < 1e300:
-        return -1.0
-    return error / max(clock[TOLERANCE], rounding_size(scene, work, NOW, step))

@@ -5,7 +5,7 @@ that its force has and the gap s = g + δ that is left of it are not below 0, an
 Newton's method (newton.py) finds which, a few pairs an iteration; here all pairs are followed at
 once along δ s = τ, τ falling to nothing (primal-dual, Wright 1997; as for contacts in Christensen
 et al. 1998): some ten systems for any number of contacts that switch. They are those of Newton's
-method, the stiffness of a pair being its part δ/(δ + s) that is at work.
+method, the stiffness of a pair being its part δ/(δ + s) that is at work. OVERLAP holds δ, LEFT s.
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
@@ -20,11 +20,14 @@ from flocsim.arrays import (
     CHANGE,
     CLOSED,
     EDGE_BODY,
-    FIRST_STAGE,
     FORCE,
     FREE,
     GAP,
+    LEFT,
+    LEFT_CHANGE,
     NOW,
+    OVERLAP,
+    OVERLAP_CHANGE,
     START,
     TIME,
     TRIAL,
@@ -39,17 +42,14 @@ from flocsim.integrators.backward_euler.contact_mean import (
     normal_stiffness,
 )
 from flocsim.integrators.backward_euler.newton import (
-    assemble_others,
+    assemble_rest,
     evaluate_others,
     go_along,
     solve_change,
 )
-from flocsim.integrators.backward_euler.real_system import factorise_real
 from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.rhs.views import along_normal, effective_mass, push_pair
-
-OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE = range(FIRST_STAGE + 2, FIRST_STAGE + 6)
-"""Rows of ``Work.slip`` for δ, s and their changes, which Radau has no use for behind a step."""
 
 MOST_ITERATIONS = 30
 
@@ -184,9 +184,9 @@ def find_closed(scene, work, clock, step):
     for _ in range(MOST_ITERATIONS):
         target = FALLING if share >= LEAST_WAY else STANDING
         target *= mean_product(work, count)
-        assemble_others(scene, work, clock, step)
+        assemble_rest(scene, work, clock, step)
         write_forces(scene, work, step, target)
-        if not factorise_real(scene, work, step):
+        if not factorise_euler(scene, work, step):
             return False
         if not solve_change(scene, work, step) < math.inf:
             return False

@@ -10,7 +10,8 @@ the forces have done their work, g(α) = Σ r(α)·d = 0, r being what the force
 minimum of the potential that there is without friction, where Newton's method with such a search
 ends after finitely many steps.
 
-The iterate stands in NOW; the step's start in START, and in TRIAL its gaps and displacements.
+The iterate stands in NOW, the contacts that may close in it flagged as closed; the step's start
+meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
 """
 
 import math
@@ -19,22 +20,26 @@ from flocsim.arrays import (
     CANDIDATES,
     CHANGE,
     CLOSED,
+    DOES,
     EDGE_BODY,
-    EVALUATIONS,
     FORCE,
     FREE,
     GAP,
+    GEOMETRY_COLUMNS,
     LEADER_FORCE,
     LEADER_RATE,
     MEMORY,
     MOTION_COLUMNS,
     NEW,
     NOW,
+    OPEN,
     RADIUS,
     SOLVES,
     START,
+    STUCK,
     TIME,
     TOLERANCE,
+    TOUCHES,
     TRIAL,
     VELOCITY,
     VERTEX_BODY,
@@ -43,27 +48,22 @@ from flocsim.compiler.composer import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.backward_euler.contact_mean import (
-    HELD,
     SLIDES_BOTH_WAYS,
     add_all_derivatives,
     add_mean_forces,
     flag_close,
     mode_of,
+    takes_part,
 )
-from flocsim.integrators.backward_euler.real_system import factorise_real
 from flocsim.integrators.radau.contact_frames import gather_clusters
-from flocsim.integrators.radau.elimination import solve_sparse
+from flocsim.integrators.radau.systems import factorise_euler, solve_real
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import end_of_run, rounding_size
-from flocsim.integrators.rhs.forces import (
-    add_body_forces,
-    add_centre_forces,
-    add_surface_forces,
-)
-from flocsim.integrators.rhs.jacobian import add_centres, add_surfaces, weigh_velocities
+from flocsim.integrators.rhs.forces import sum_other_forces
+from flocsim.integrators.rhs.jacobian import assemble_others
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
-from flocsim.laws import BODY_FORCE, CENTRE_FORCE, CONTACT_FORCE, has
+from flocsim.laws import CONTACT_FORCE, has
 
 NEWTON_SHARE = 1e-3
 """Newton's method goes on until what is left is below this share of the tolerance."""
@@ -88,21 +88,30 @@ def begin_step(work):
         for axis in range(MOTION_COLUMNS):
             work.motion[START, body, axis] = work.motion[NOW, body, axis]
     for row in range(work.tally[CANDIDATES]):
-        work.geometry[TRIAL, row, GAP] = work.geometry[NOW, row, GAP]
-        work.slip[TRIAL, row] = work.slip[NOW, row]
-        work.candidates[row, CLOSED] = 0
-        work.geometry[NEW, row, HELD] = 0.0
+        for column in range(GEOMETRY_COLUMNS):
+            work.geometry[TRIAL, row, column] = work.geometry[NOW, row, column]
+        work.candidates[row, CLOSED] = OPEN
+        work.candidates[row, STUCK] = 0
 
 
-@apart
-def take_back(scene, work):
-    """Go back to the start of the step."""
+def put_back(work):
+    """Go back to the motion at the start of the step."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
             work.motion[NOW, body, axis] = work.motion[START, body, axis]
+
+
+def end_step(work):
+    """Make the iterate the new state, its contacts flagged that take part in the step, and its
+    start the current one again."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[NEW, body, axis] = work.motion[NOW, body, axis]
+    put_back(work)
     for row in range(work.tally[CANDIDATES]):
-        work.slip[NOW, row] = work.slip[TRIAL, row]
-    locate_contacts(scene, work, NOW)
+        work.candidates[row, CLOSED] = TOUCHES if takes_part(work, row) else OPEN
+        for column in range(GEOMETRY_COLUMNS):
+            work.geometry[NOW, row, column] = work.geometry[TRIAL, row, column]
 
 
 def place_ends(work, step):
@@ -118,17 +127,9 @@ def evaluate_others(scene, work, time, step):
     """All forces at the end of the step but those of contacts, which are located."""
     place_ends(work, step)
     locate_contacts(scene, work, NOW)
-    work.tally[EVALUATIONS] += 1
-    for body in range(work.bodies.shape[0]):
-        for axis in range(3):
-            work.rates[NOW, body, FORCE + axis] = 0.0
-    if has(scene, BODY_FORCE):
-        add_body_forces(scene, work, time + step, NOW)
-    if has(scene, CENTRE_FORCE):
-        add_centre_forces(scene, work, time + step, NOW)
     if scene.surface_reach > 0.0:
         flag_near(scene, work, NOW, 0.0)
-        add_surface_forces(scene, work, time + step, NOW)
+    sum_other_forces(scene, work, time + step, NOW)
 
 
 def evaluate_end(scene, work, time, step):
@@ -195,31 +196,27 @@ def write_load(scene, work, step):
 
 
 @apart
-def assemble_others(scene, work, clock, step):
+def assemble_rest(scene, work, clock, step):
     """Derivatives of all forces at the end of the step but those of contacts."""
-    time = clock[TIME] + step
-    weigh_velocities(scene, work, time, max(end_of_run(clock) - clock[TIME], step))
-    if has(scene, CENTRE_FORCE):
-        add_centres(scene, work, time)
-    if scene.surface_reach > 0.0:
-        add_surfaces(scene, work, time)
+    remaining = max(end_of_run(clock) - clock[TIME], step)
+    assemble_others(scene, work, clock[TIME] + step, remaining)
 
 
 def refresh(scene, work, clock, step):
     """Factorise anew at the iterate; False where that fails."""
     flag_close(scene, work)
     gather_clusters(scene, work)
-    assemble_others(scene, work, clock, step)
+    assemble_rest(scene, work, clock, step)
     if has(scene, CONTACT_FORCE):
         add_all_derivatives(scene, work, step)
-    return factorise_real(scene, work, step)
+    return factorise_euler(scene, work, step)
 
 
 @apart
 def solve_change(scene, work, step):
     """Newton's change of velocities into CHANGE; the largest that it makes in place [m]."""
     write_load(scene, work, step)
-    solve_sparse(work, False)
+    solve_real(work)
     work.tally[SOLVES] += 1
     largest = 0.0
     for body in range(work.bodies.shape[0]):
@@ -274,18 +271,17 @@ def search(scene, work, time, step, overshot):
 
 @apart
 def note_modes(work):
-    """Write down what all pairs do now, in the gaps of NEW; (how many do another thing than before,
-    whether any is held from now on, or no more)."""
-    changed, held = 0, False
+    """Write down what all pairs do now; (how many do another thing than before, whether any is
+    taken to stick from now on, or no more)."""
+    changed, held, pairs = 0, False, work.candidates
     for row in range(work.tally[CANDIDATES]):
-        mode, before = float(mode_of(work, row)), work.geometry[NEW, row, GAP]
-        was_held = work.geometry[NEW, row, HELD]
-        turns = was_held == 0.0 and mode + before == SLIDES_BOTH_WAYS and mode != before
-        work.geometry[NEW, row, HELD] = 1.0 if turns else 0.0
-        held = held or turns or was_held == 1.0
-        if before != mode or turns or was_held == 1.0:
+        mode, before, stuck = mode_of(work, row), pairs[row, DOES], pairs[row, STUCK] == 1
+        turns = not stuck and mode + before == SLIDES_BOTH_WAYS and mode != before
+        pairs[row, STUCK] = 1 if turns else 0
+        held = held or turns or stuck
+        if before != mode or turns or stuck:
             changed += 1
-            work.geometry[NEW, row, GAP] = mode
+            pairs[row, DOES] = mode
     return changed, held
 
 
@@ -298,7 +294,7 @@ def solve_end(scene, work, clock, step, most):
         return False
     note_modes(work)
     for row in range(work.tally[CANDIDATES]):
-        work.geometry[NEW, row, HELD] = 0.0
+        work.candidates[row, STUCK] = 0
     before, fresh = math.inf, False
     for iteration in range(most):
         if not fresh:

@@ -8,7 +8,7 @@ kink errs by the square of that little alone.
 
 import math
 
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
+from flocsim.arrays import ACROSS, CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import NEVER, first_switch
@@ -107,7 +107,8 @@ def switch_share(scene, work, observed, clock, step):
 
     Expects the geometry of all pairs in NEW.
     """
-    if clock[TOLERANCE] < math.inf or awaits_touch(observed):
+    ends = clock[TOLERANCE] < math.inf and clock[ACROSS] == 0.0
+    if ends or awaits_touch(observed):
         resolution, depth = resolutions_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)
         return share if share <= 1.0 else law_share(scene, work, clock, step)

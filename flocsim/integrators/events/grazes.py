@@ -32,8 +32,9 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.events.resolution import above_rounding, memory_of, pressed
+from flocsim.integrators.events.resolution import above_rounding, memory_of
 from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
 from flocsim.laws import contact_derivatives, contact_force
 
@@ -231,7 +232,7 @@ def note_flight(work, row):
 def is_settled(scene, work, clock, row, step):
     """Whether a step was long against the vibrations of a contact, which has come to rest in it."""
     view = contact_view(scene, work, NOW, row)
-    stiffness = pressed(scene, view, clock[TOLERANCE], 0.0) / clock[TOLERANCE]
+    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
     return step * step * stiffness > SETTLED * SETTLED * view.effective_mass
 
 

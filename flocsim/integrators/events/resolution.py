@@ -7,11 +7,16 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 import math
 
 from flocsim.arrays import EDGE_BODY, MEMORY, VERTEX_BODY
+from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
 from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 SHARE_OF_DEPTH = 0.02
 """Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
+
+SHARE_OF_DAMPED = 0.3
+"""Where they do not, to this share: what they come to rest with may hang on far less than the
+tolerance, and a touch that is noticed deeper than it would get has a force from nowhere."""
 
 MOST_LATER = 100.0
 """… and so finely that the error of velocity leads to so many times that at most."""
@@ -64,15 +69,15 @@ def above_rounding(work, state, length):
 
 
 def touch_resolution(scene, work, state, row, resolution):
-    """The overlap that a new contact may have got to unnoticed [m]; all of it if it is damped."""
+    """The overlap that a new contact may have got to unnoticed [m]."""
     speed = -normal_rate(work, state, row)
     view = contact_view(scene, work, state, row)
-    stiffness = pressed(scene, view, resolution, 0.0) / resolution
+    stiffness = pressed_stiffness(scene, view, resolution)
     if not (stiffness > 0.0 and speed > 0.0):
         return resolution
     frequency = math.sqrt(stiffness / view.effective_mass)
     if not bounces(scene, view, speed, frequency):
-        return resolution
+        return above_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
     later = MOST_LATER * resolution / max(frequency * memory_of(work, row), TINY)
     return above_rounding(work, state, min(resolution, SHARE_OF_DEPTH * speed / frequency, later))
 

@@ -3,6 +3,7 @@
 import math
 
 from flocsim.arrays import (
+    ACROSS,
     CANDIDATES,
     CLOSED,
     CODE,
@@ -31,10 +32,10 @@ from flocsim.arrays import (
 )
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
 from flocsim.geometry.contact.points import locate_contacts, row_radii
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
-from flocsim.hooks import attempt, end_within, observe
+from flocsim.hooks import attempt, choose_method, end_within, note_step, observe
 from flocsim.integrators.events.crossings import may_switch
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
 from flocsim.integrators.events.modes import (
@@ -44,6 +45,7 @@ from flocsim.integrators.events.modes import (
     set_modes,
     settle_grazes,
 )
+from flocsim.integrators.events.overtaking import overtakes
 from flocsim.integrators.loop.kicks import meet_kick, renew_kicks
 from flocsim.integrators.loop.step_size import (
     choose_step,
@@ -52,6 +54,7 @@ from flocsim.integrators.loop.step_size import (
     reject,
     room_for_time,
     shortest_needed,
+    step_behind_touch,
 )
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
@@ -98,17 +101,23 @@ def accept(scene, work, clock, counts, step, lists):
     clock[TIME] += step
     meet_kick(scene, work, clock)
     counts[STEPS] += 1
-    if clock[TOLERANCE] < math.inf:
+    controlled, across = clock[TOLERANCE] < math.inf, clock[ACROSS] == 1.0
+    if controlled:
         carry_errors(scene, work, clock, step)
+    if across:
+        note_step(scene, work, clock, step)
     if not lists:
         return SAME
-    if clock[TOLERANCE] < math.inf and has(scene, CONTACT_FORCE):
-        _, depth = resolutions_of(work, clock)
-        add_switch_errors(scene, work, clock, step, depth)
+    if controlled and has(scene, CONTACT_FORCE):
+        if not across:
+            _, depth = resolutions_of(work, clock)
+            add_switch_errors(scene, work, clock, step, depth)
         forget_offsets(work)
-    grazes = clock[TOLERANCE] < math.inf and settle_grazes(scene, work, clock, step)
+    grazes = controlled and not across and settle_grazes(scene, work, clock, step)
     hand_over(scene, work)
     switched = set_modes(scene, work)
+    if across:
+        return SAME
     return OTHER_FRICTION if grazes and switched == SAME else switched
 
 
@@ -139,22 +148,26 @@ def pause_reason(clock, counts, record):
     return 0
 
 
-def keep_lists(scene, work):
-    """Make the candidate lists anew where half their budget is spent; False without room."""
-    if spent(scene, work, NOW) > 0.5:
-        if not list_candidates(scene, work):
+def keep_lists(scene, work, ahead):
+    """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
+    or they are too wide; False without room."""
+    if spent(scene, work, NOW) > 0.5 or too_wide(scene, work, ahead):
+        if not list_ahead(scene, work, ahead):
             return False
         locate_contacts(scene, work, NOW)
         set_modes(scene, work)
     return True
 
 
-def went_too_far(scene, work, clock):
-    """Locate all pairs at the end of the step; whether what was listed or flagged is not enough."""
+def went_too_far(scene, work, clock, step):
+    """Locate all pairs at the end of the step; whether what was listed or flagged is not enough, or
+    it is not known where surface forces act."""
     if spent(scene, work, NEW) > 1.0:
         return True
     locate_contacts(scene, work, NEW)
-    return scene.surface_reach > 0.0 and clock[TOLERANCE] < math.inf and overlooked(scene, work)
+    if scene.surface_reach <= 0.0 or clock[TOLERANCE] == math.inf:
+        return False
+    return overlooked(scene, work) or overtakes(scene, work, clock, step)
 
 
 def roll_slips(scene, work, step):
@@ -202,8 +215,9 @@ def advance(scene, work, observed, clock, counts, record):
         status = pause_reason(clock, counts, record)
         if status != 0:
             return status
-        if lists and trials == 0 and not keep_lists(scene, work):
+        if lists and trials == 0 and not keep_lists(scene, work, clock[STEP]):
             return NO_ROOM
+        choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
         step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
         if scene.surface_reach > 0.0:
@@ -213,7 +227,7 @@ def advance(scene, work, observed, clock, counts, record):
             return NO_ROOM
         if ratio < 0.0 and clock[TOLERANCE] == math.inf:
             return NOT_FINITE
-        too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock)
+        too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
         if ratio < 0.0 or ratio > 1.0 or too_far:
             limit, trials = math.inf, 0
             if not reject(clock, counts, step, ratio, too_far):
@@ -235,6 +249,7 @@ def advance(scene, work, observed, clock, counts, record):
         switched = accept(scene, work, clock, counts, step, lists)
         plan(clock, step, ratio, trials > 0, switched)
         if switched != SAME:
+            clock[STEP] = min(clock[STEP], step_behind_touch(scene, work, clock))
             clock[STEP] = max(clock[STEP], shortest_needed(scene, work))
         limit, trials = math.inf, 0
         status = look(scene, work, observed, clock, counts, record, lists)

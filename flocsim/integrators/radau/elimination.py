@@ -1,10 +1,10 @@
 """Sparse systems of many bodies, in blocks of 3 × 3: written, factorised and solved by rows.
 
 Both systems of a Newton step (tableau.py) have one pattern (ordering.py), and are worked on at
-once: a block holds the real one's numbers, then the real and the imaginary parts of the complex
-one's. There is no pivoting but inside the blocks on the diagonal: masses and drag make the systems
-dominated by them, as far as stiffness does not, which is symmetric and positive all but for what
-turning and friction add.
+once, or the real one alone: a block holds its numbers, then the real and the imaginary parts of the
+complex one's. There is no pivoting but inside the blocks on the diagonal: masses and drag make the
+systems dominated by them, as far as stiffness does not, which is symmetric and positive all but for
+what turning and friction add.
 
 The rows of x and y of a cluster's first body are the sums of all its bodies'. What bodies do to
 each other cancels in these, so that they are written without it, and momentum is exact.
@@ -108,41 +108,49 @@ def write_systems(scene, work, step):
             write_coupling(work, b, a, upper_block(work, pair), weights)
 
 
-def copy_block(target, to, source, slot):
-    for part in range(3):
+def copy_block(target, to, source, slot, both):
+    for part in range(3 if both else 1):
         for i in range(3):
             for j in range(3):
                 target[to, part, i, j] = source[slot, part, i, j]
 
 
-def write_product(target, to, left, one, right, other):
-    """A product of two blocks, of both systems."""
+def write_product(target, to, left, one, right, other, both):
+    """A product of two blocks, of the real system or of both."""
     for i in range(3):
         for j in range(3):
-            real, re, im = 0.0, 0.0, 0.0
+            real = 0.0
             for k in range(3):
                 real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
+            target[to, REAL_PART, i, j] = real
+            if not both:
+                continue
+            re, im = 0.0, 0.0
+            for k in range(3):
                 a, b = left[one, PAIR_RE, i, k], left[one, PAIR_IM, i, k]
                 c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
                 re += a * c - b * d
                 im += a * d + b * c
-            target[to, REAL_PART, i, j] = real
             target[to, PAIR_RE, i, j] = re
             target[to, PAIR_IM, i, j] = im
 
 
-def subtract_product(target, to, left, one, right, other):
-    """Subtract a product of two blocks, of both systems."""
+def subtract_product(target, to, left, one, right, other, both):
+    """Subtract a product of two blocks, of the real system or of both."""
     for i in range(3):
         for j in range(3):
-            real, re, im = 0.0, 0.0, 0.0
+            real = 0.0
             for k in range(3):
                 real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
+            target[to, REAL_PART, i, j] -= real
+            if not both:
+                continue
+            re, im = 0.0, 0.0
+            for k in range(3):
                 a, b = left[one, PAIR_RE, i, k], left[one, PAIR_IM, i, k]
                 c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
                 re += a * c - b * d
                 im += a * d + b * c
-            target[to, REAL_PART, i, j] -= real
             target[to, PAIR_RE, i, j] -= re
             target[to, PAIR_IM, i, j] -= im
 
@@ -164,55 +172,58 @@ def entry(blocks, slot, i, j):
     return complex(blocks[slot, PAIR_RE, i, j], blocks[slot, PAIR_IM, i, j])
 
 
-def invert(blocks, slot):
-    """Replace a block by its inverse, of both systems; False where it has none."""
+def invert(blocks, slot, both):
+    """Replace a block by its inverse, of the real system or of both; False where it has none."""
     m = blocks[slot, REAL_PART]
     found = inverse(m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2])
-    if found[0] == 0.0:
+    if not abs(found[0]) > 0.0:
         return False
     share = 1.0 / found[0]
     for k in range(9):
         m[k // 3, k % 3] = share * found[1 + k]
-    both = inverse(
+    if not both:
+        return True
+    pair = inverse(
         entry(blocks, slot, 0, 0), entry(blocks, slot, 0, 1), entry(blocks, slot, 0, 2),
         entry(blocks, slot, 1, 0), entry(blocks, slot, 1, 1), entry(blocks, slot, 1, 2),
         entry(blocks, slot, 2, 0), entry(blocks, slot, 2, 1), entry(blocks, slot, 2, 2),
     )  # fmt: skip
-    if both[0] == 0.0:
+    if pair[0] == 0.0:
         return False
-    part = 1.0 / both[0]
+    part = 1.0 / pair[0]
     for k in range(9):
-        number = part * both[1 + k]
+        number = part * pair[1 + k]
         blocks[slot, PAIR_RE, k // 3, k % 3] = number.real
         blocks[slot, PAIR_IM, k // 3, k % 3] = number.imag
     return True
 
 
-def factorise_row(e, row):
+def factorise_row(e, row, both):
     """Subtract the rows above from a row; False where its pivot is singular."""
     for slot in range(e.lower[row], e.lower[row + 1]):
-        copy_block(e.row, e.column[slot], e.blocks, slot)
-    copy_block(e.row, row, e.pivot, row)
+        copy_block(e.row, e.column[slot], e.blocks, slot, both)
+    copy_block(e.row, row, e.pivot, row, both)
     for slot in range(e.lower[row], e.upper[row]):
         above = e.column[slot]
-        write_product(e.blocks, slot, e.row, above, e.pivot, above)
+        write_product(e.blocks, slot, e.row, above, e.pivot, above, both)
         for each in range(e.upper[above], e.lower[above + 1]):
-            subtract_product(e.row, e.column[each], e.blocks, slot, e.blocks, each)
+            subtract_product(e.row, e.column[each], e.blocks, slot, e.blocks, each, both)
     for slot in range(e.upper[row], e.lower[row + 1]):
-        copy_block(e.blocks, slot, e.row, e.column[slot])
-    copy_block(e.pivot, row, e.row, row)
-    return invert(e.pivot, row)
+        copy_block(e.blocks, slot, e.row, e.column[slot], both)
+    copy_block(e.pivot, row, e.row, row, both)
+    return invert(e.pivot, row, both)
 
 
 @hook
-def factorise_sparse(scene, work, step):
-    """Write and factorise both systems; False where one is singular, or where there is no room."""
+def factorise_sparse(scene, work, step, both):
+    """Write and factorise the real system, or both; False where one is singular, or where there is
+    no room."""
     if not find_pattern(scene, work):
         return False
     write_systems(scene, work, step)
     e = work.elimination
     for row in range(work.bodies.shape[0]):
-        if e.body[row] != NONE and not factorise_row(e, row):
+        if e.body[row] != NONE and not factorise_row(e, row, both):
             return False
     return True
 

@@ -24,6 +24,7 @@ from flocsim.arrays import (
     VX,
     VY,
 )
+from flocsim.compiler.composer import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
 from flocsim.integrators.radau.dense import factorise, solve_dense
 from flocsim.integrators.radau.elimination import factorise_sparse, solve_sparse
@@ -95,15 +96,28 @@ def sum_loads(work, which):
                 work.loads[which, 3 * leader + axis] += work.loads[which, 3 * body + axis]
 
 
-def factorise_systems(scene, work, step):
-    """Write and factorise both systems; False where one is singular, or where there is no room."""
+def factorise_these(scene, work, step, both):
+    """Write and factorise the real system, or both; False where one is singular, or where there is
+    no room."""
     if not is_dense(work):
-        return factorise_sparse(scene, work, step)
-    for which in range(2):
+        return factorise_sparse(scene, work, step, both)
+    for which in range(2 if both else 1):
         write_matrix(scene, work, which, step)
         if not factorise(work.system, work.pivots, which):
             return False
     return True
+
+
+def factorise_systems(scene, work, step):
+    """The same of both systems."""
+    return factorise_these(scene, work, step, True)
+
+
+@apart
+def factorise_euler(scene, work, step):
+    """The same of the system of a step of backward Euler, M/h + DAMPING + h STIFFNESS: Radau's real
+    one for a step that is µ times as long."""
+    return factorise_these(scene, work, EIGENVALUES[REAL].real * step, False)
 
 
 def solve_real(work):

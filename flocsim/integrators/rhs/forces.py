@@ -116,8 +116,9 @@ def locate_and_rate(scene, work, state):
     rate_slips(work, state)
 
 
-def sum_forces(scene, work, time, state):
-    """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
+def sum_other_forces(scene, work, time, state):
+    """All forces and torques of a state but those of contacts into ``work.rates[state]``; its
+    geometry is located."""
     work.tally[EVALUATIONS] += 1
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
@@ -129,5 +130,10 @@ def sum_forces(scene, work, time, state):
         add_centre_forces(scene, work, time, state)
     if scene.surface_reach > 0.0:
         add_surface_forces(scene, work, time, state)
+
+
+def sum_forces(scene, work, time, state):
+    """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
+    sum_other_forces(scene, work, time, state)
     if has(scene, CONTACT_FORCE):
         add_contact_forces(scene, work, state)

@@ -308,12 +308,17 @@ def weigh_velocities(scene, work, time, remaining):
     remember_velocities(scene, work, remaining)
 
 
-def assemble_jacobian(scene, work, time, remaining):
-    """DAMPING and STIFFNESS of the current state, whose contact geometry is located."""
+def assemble_others(scene, work, time, remaining):
+    """DAMPING and STIFFNESS of the current state but for contacts."""
     weigh_velocities(scene, work, time, remaining)
     if has(scene, CENTRE_FORCE):
         add_centres(scene, work, time)
     if scene.surface_reach > 0.0:
         add_surfaces(scene, work, time)
+
+
+def assemble_jacobian(scene, work, time, remaining):
+    """DAMPING and STIFFNESS of the current state, whose contact geometry is located."""
+    assemble_others(scene, work, time, remaining)
     if has(scene, CONTACT_FORCE):
         add_contacts(scene, work)

@@ -20,12 +20,15 @@ one way or the other, is told by a nudged companion alone.
 import math
 
 from flocsim.arrays import (
+    ACROSS,
     ANGLE,
     BOUNDING_RADIUS,
     CANDIDATES,
     CARRIED,
     CLOSED,
     DEVIATION,
+    DOUBT_PLACE,
+    DOUBT_SPEED,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
@@ -39,6 +42,7 @@ from flocsim.arrays import (
     HELD,
     INERTIA,
     MASS,
+    MOST_PLACE,
     MOTION_COLUMNS,
     NORMAL_X,
     NORMAL_Y,
@@ -66,7 +70,7 @@ from flocsim.arrays import (
 from flocsim.geometry.contact.separation import length_of
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.views import along_normal, contact_view, normal_rate, pressed_view
-from flocsim.laws import contact_force
+from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
@@ -103,19 +107,29 @@ def carry_vector(scene, work, clock, step):
 def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
     known, errors = False, work.bodies
+    # Of steps across switches all counts that is estimated, and nothing is carried on with motion.
+    across = clock[ACROSS] == 1.0
+    weight = 1.0 / clock[ESTIMATE_SHARE] if across else 1.0
     for body in range(work.bodies.shape[0]):
         carried(work, body, ERROR_PLACE, ERROR_SPEED, step)
         carried(work, body, SWITCH_PLACE, SWITCH_SPEED, step)
-        errors[body, ERROR_PLACE] += errors[body, STEP_PLACE]
-        errors[body, ERROR_SPEED] += errors[body, STEP_SPEED]
+        carried(work, body, DOUBT_PLACE, DOUBT_SPEED, step)
+        errors[body, ERROR_PLACE] += weight * errors[body, STEP_PLACE]
+        errors[body, ERROR_SPEED] += weight * errors[body, STEP_SPEED]
         known = known or errors[body, STEP_PLACE] + errors[body, STEP_SPEED] > 0.0
     largest = 0.0
     for body in range(work.bodies.shape[0]):
         if not known:
             errors[body, ERROR_PLACE] += clock[STEP_ERROR]
         stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
-        stated += OF_SWITCHES * errors[body, SWITCH_PLACE]
+        stated += OF_SWITCHES * (errors[body, SWITCH_PLACE] + errors[body, DOUBT_PLACE])
         largest = max(largest, stated)
+        if across:
+            for axis in range(MOTION_COLUMNS):
+                work.motion[CARRIED, body, axis] += work.motion[DEVIATION, body, axis]
+    if across:
+        clock[ERROR] = largest
+        return
     vector = max(carry_vector(scene, work, clock, step), LEAST * clock[TOLERANCE])
     clock[ERROR] = min(largest, OF_VECTOR * vector)
 
@@ -133,18 +147,42 @@ def carried_size(scene, work, body):
     return length_of(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
 
 
+def certain_sum(work, body):
+    """By how much the place of a body may be wrong, by the sums of its errors, if no contact has
+    opened that may have [m]."""
+    return work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
+
+
+def sum_of_place(work, body):
+    """By how much the place of a body may be wrong, by the sums of its errors [m]."""
+    return certain_sum(work, body) + OF_SWITCHES * work.bodies[body, DOUBT_PLACE]
+
+
+def hand_on(work, body, size):
+    """Count as its own error of a body what others have handed on to it; ``size`` [m]: of its
+    carried error."""
+    more = size - sum_of_place(work, body)
+    if more > 0.0:
+        work.bodies[body, ERROR_PLACE] += more
+
+
 def shorten(scene, work):
-    """Shorten the carried error of every cluster to what its places can be wrong by.
+    """Shorten the carried error of every cluster to what its places can be wrong by: each by its
+    own sums, or by those of any other one, as bodies that hold each other hand their errors on.
+    Doubts count for their own bodies alone: what they come to is no error until it happens.
 
     All of it by one factor, for it must not give the cluster a momentum that no step and no switch
     has given it, and velocities too: those of vibrations are what their places make them.
     """
     for body in range(work.bodies.shape[0]):
-        work.bodies[body, SHORTENED] = 1.0
+        work.bodies[body, SHORTENED], work.bodies[body, MOST_PLACE] = 1.0, 0.0
     for body in range(work.bodies.shape[0]):
         leader = work.cluster[body]
-        most = work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
-        size = carried_size(scene, work, body)
+        most = max(work.bodies[leader, MOST_PLACE], certain_sum(work, body))
+        work.bodies[leader, MOST_PLACE] = most
+    for body in range(work.bodies.shape[0]):
+        leader, size = work.cluster[body], carried_size(scene, work, body)
+        most = max(work.bodies[leader, MOST_PLACE], sum_of_place(work, body))
         if size > most:
             work.bodies[leader, SHORTENED] = min(work.bodies[leader, SHORTENED], most / size)
     for body in range(work.bodies.shape[0]):
@@ -164,16 +202,19 @@ def bound_carried(scene, work):
     largest = 0.0
     shorten(scene, work)
     for body in range(work.bodies.shape[0]):
-        largest = max(largest, carried_size(scene, work, body))
+        size = carried_size(scene, work, body)
+        hand_on(work, body, size)
+        largest = max(largest, size)
     return largest
 
 
-def add_impulse(scene, work, body, impulse):
-    """Add what an impulse at its outline [N s] does to a body's velocity."""
+def add_impulse(scene, work, body, impulse, kind):
+    """Add what an impulse at its outline [N s] does to a body's velocity to SWITCH_SPEED or
+    DOUBT_SPEED."""
     if scene.bodies[body, FREE] == 1.0:
         size = scene.bodies[body, BOUNDING_RADIUS]
         share = 1.0 / scene.bodies[body, MASS] + size * size / scene.bodies[body, INERTIA]
-        work.bodies[body, SWITCH_SPEED] += impulse * share
+        work.bodies[body, kind] += impulse * share
 
 
 def kick(scene, work, body, x, y, turn):
@@ -207,18 +248,24 @@ def has_switched(work, row):
     return closed != work.candidates[row, CLOSED]
 
 
-def doubtful_time(work, row, step, depth, doubt):
-    """For how much of a step it is in doubt whether a pair touched [s]."""
+def doubtful_time(work, row, step, doubt):
+    """For how much of a step it is in doubt whether a pair touched [s].
+
+    How finely its touch was located says nothing of that later on: a contact that rests in a hair's
+    breadth of overlap, as the second one of two that an attraction presses, bears what it bears.
+    """
     gap = work.geometry[NOW, row, GAP]
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(depth, doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)))
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)))
     return step if -deepest < gap < 0.0 else 0.0
 
 
 def pressed_stiffness(scene, view, overlap):
-    """The normal force of a contact pressed so far, over that [N/m]."""
+    """The normal force of a contact pressed so far, over that [N/m]; 0 without a contact law."""
+    if not has(scene, CONTACT_FORCE):
+        return 0.0
     force, _ = contact_force(scene, pressed_view(view, overlap, 0.0))
     return force / overlap
 
@@ -243,11 +290,12 @@ def add_switch_errors(scene, work, clock, step, depth):
         if work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0:
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        late = doubtful_time(work, row, step, depth, doubt)
+        late = doubtful_time(work, row, step, doubt)
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = late * length_of(normal, tangential)
-            add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse)
-            add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse)
+            kind = SWITCH_SPEED if has_switched(work, row) else DOUBT_SPEED
+            add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, kind)
+            add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, kind)
             kick_pair(scene, work, row, signed * normal, signed * tangential)

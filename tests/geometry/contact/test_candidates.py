@@ -4,17 +4,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from flocsim.arrays import CANDIDATES, NOW, copy_of, with_capacity, work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import (
+    list_ahead,
     list_candidates,
     list_pair,
     moved,
     spent,
     time_within,
+    too_wide,
 )
 from flocsim.geometry.contact.points import locate_contacts
 from tests.helpers.fast_scene import bodies_of, keys_of
@@ -216,7 +218,30 @@ def test_bodies_far_apart_list_nothing_and_may_move_until_they_are_near():
     far = plain.positions + np.arange(len(plain.bodies))[:, None] * (1e-3, 0.0, 0.0)
     scene, work = arrays(Scene(plain.bodies, far, plain.velocities))
     assert list_candidates(scene, work) and work.tally[CANDIDATES] == 0
-    assert list_pair(scene, work, 0) > 8e-4
+    assert list_pair(scene, work, 0, 0.0) > 8e-4
+
+
+@given(seeds)
+@settings(max_examples=40)
+def test_lists_are_as_wide_as_the_steps_ahead_need(seed):
+    scene, work = arrays(random_scene(seed))
+    assert list_candidates(scene, work)
+    rows, narrow = work.tally[CANDIDATES], work.budget.copy()
+    assume(rows > 0 and len(narrow) == 1)
+    step = time_within(scene, work, 2.0)
+    assert list_ahead(scene, work, step)
+    assert work.tally[CANDIDATES] >= rows and (work.budget >= narrow).all()
+    # Half of what the bodies may move is enough for such a step.
+    assert time_within(scene, work, 0.5) >= 0.99 * step
+    assert not too_wide(scene, work, step)
+
+
+def test_lists_that_are_far_too_wide_are_made_anew():
+    scene, work = arrays(random_scene(3))
+    assert list_candidates(scene, work)
+    assert list_ahead(scene, work, time_within(scene, work, 6.0))
+    assert work.tally[CANDIDATES] > 0 and too_wide(scene, work, 0.0)
+    assert list_candidates(scene, work) and not too_wide(scene, work, 0.0)
 
 
 @given(seeds)

@@ -110,7 +110,7 @@ def put_loads(work, loads):
 def test_solutions_are_those_of_the_dense_systems(count, fixed, seed):
     scene, work = packed(count, seed, fixed)
     assert work.pairs[: work.tally[PAIRS], ACTING].sum() > count // 3
-    assert factorise_sparse(scene, work, STEP)
+    assert factorise_sparse(scene, work, STEP, True)
     loads = random_loads(scene, np.random.default_rng(seed))
     put_loads(work, loads)
     solve_both(work)
@@ -124,7 +124,7 @@ def test_solutions_are_those_of_the_dense_systems(count, fixed, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_momentum_is_balanced_to_rounding(seed):
     scene, work = packed(50, seed)
-    assert factorise_sparse(scene, work, STEP)
+    assert factorise_sparse(scene, work, STEP, True)
     loads = random_loads(scene, np.random.default_rng(seed))
     put_loads(work, loads)
     solve_both(work)
@@ -153,7 +153,7 @@ def test_a_chain_fills_in_nowhere():
     set_modes(scene, work)
     gather_clusters(scene, work)
     assemble_jacobian(scene, work, 0.0, 1e-3)
-    assert factorise_sparse(scene, work, STEP)
+    assert factorise_sparse(scene, work, STEP, True)
     e = work.elimination
     right = e.lower[1:] - e.upper[:count]
     # Every body but the last is tied to one that comes later, and the first one's row to all.
@@ -163,14 +163,14 @@ def test_a_chain_fills_in_nowhere():
 
 def test_the_pattern_is_kept_while_the_same_pairs_act():
     scene, work = packed(40, 1)
-    assert factorise_sparse(scene, work, STEP)
+    assert factorise_sparse(scene, work, STEP, True)
     pattern = work.elimination.found[PATTERN]
     work.elimination.graph[:] = -7
-    assert factorise_sparse(scene, work, 2.0 * STEP)
+    assert factorise_sparse(scene, work, 2.0 * STEP, True)
     assert np.all(work.elimination.graph == -7)
     assert work.elimination.found[PATTERN] == pattern
     # One more pair acts: the bodies are ordered anew.
     acting = work.pairs[: work.tally[PAIRS], ACTING]
     acting[np.flatnonzero(acting == 0)[0]] = 1
-    assert factorise_sparse(scene, work, STEP)
+    assert factorise_sparse(scene, work, STEP, True)
     assert not np.all(work.elimination.graph == -7)

@@ -7,13 +7,20 @@ import pytest
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.arrays import (
     CARRIED,
+    CLOSED,
     DAMPING,
+    DEVIATION,
+    DOUBT_PLACE,
+    DOUBT_SPEED,
     ERROR_PLACE,
     ERROR_SPEED,
     MASS,
     NOW,
+    OPEN,
     STAGED_STEP,
     SWITCH_PLACE,
+    SWITCH_SPEED,
+    VX,
     work_of,
 )
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
@@ -28,6 +35,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from tests.helpers.fast_scene import flagged
 
 RATE = 2e3
 """Of the trial forces [1/s]."""
@@ -134,7 +142,7 @@ def test_a_vector_is_kept_within_the_sums():
 
 
 def test_shortening_gives_a_cluster_no_momentum():
-    """Errors that a contact has given two bodies, of which one can be wrong by less than it has."""
+    """Errors that a contact has given two bodies, which can be wrong by less than that."""
     bodies = [
         Body(Sphere(radius), (x, 0.0), surface_density=2.0)
         for radius, x in ((5e-6, 0.0), (8e-6, 1.3e-5 - 1e-9))
@@ -146,12 +154,49 @@ def test_shortening_gives_a_cluster_no_momentum():
     masses = scene.bodies[:, MASS]
     work.motion[CARRIED, :, 0] = work.motion[CARRIED, :, 3] = 1e-9 / masses * masses.min()
     work.motion[CARRIED, 1] *= -1.0
-    work.bodies[:, ERROR_PLACE] = 1e-10, 1e-8
+    work.bodies[:, ERROR_PLACE] = 1e-12, 1e-10
     assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
     for axis in (0, 3):
         moved = masses * work.motion[CARRIED, :, axis]
         assert moved[0] != 0.0
         assert moved[0] == pytest.approx(-moved[1], rel=1e-12, abs=0.0)
+
+
+def test_a_body_takes_over_what_others_hand_on_to_it():
+    """One that joins a cluster with no error of its own neither shortens that of the others nor
+    forgets its share of it when it leaves."""
+    bodies = [Body(Sphere(5e-6), (x, 0.0), surface_density=2.0) for x in (0.0, 1e-5 - 1e-9, 3e-5)]
+    system = System(bodies, [Contact()])
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    work.cluster[:] = 0, 0, 2
+    work.motion[CARRIED, :, 0] = 3e-9, 2e-9, 1e-9
+    work.bodies[:, ERROR_PLACE] = 4e-9, 0.0, 5e-10
+    assert stated_error.bound_carried(scene, work) == pytest.approx(3e-9)
+    assert work.motion[CARRIED, :, 0] == pytest.approx([3e-9, 2e-9, 5e-10])
+    assert work.bodies[:, ERROR_PLACE] == pytest.approx([4e-9, 2e-9, 5e-10])
+
+
+def test_a_doubt_counts_for_its_own_body_alone():
+    """A contact that hardly overlaps may have opened; that is no error of others until it has."""
+    bodies = [Body(Sphere(5e-6), (x, 0.0), surface_density=2.0) for x in (0.0, 1e-5 - 1e-13)]
+    scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
+    clock = Implicit(1e-9).fresh_clock()
+    stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
+    assert not work.bodies[:, [SWITCH_SPEED, DOUBT_SPEED]].any()
+    work.motion[DEVIATION, 0, 0] = 1e-12
+    stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
+    assert not work.bodies[:, SWITCH_SPEED].any() and (work.bodies[:, DOUBT_SPEED] > 0.0).all()
+    work.candidates[0, CLOSED] = OPEN
+    work.motion[NOW, 0, VX] = 1e-6
+    stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
+    assert (work.bodies[:, SWITCH_SPEED] > 0.0).all()
+    work.motion[CARRIED] = 0.0
+    work.motion[CARRIED, :, 0] = 1e-9
+    work.bodies[:, DOUBT_PLACE] = 1e-6, 0.0
+    work.bodies[:, ERROR_PLACE] = 0.0, 1e-10
+    work.cluster[:] = 0
+    assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
 
 
 def head_on(damping):

@@ -1,0 +1,155 @@
+"""A step of backward Euler that goes on across switches, as the loop of all methods takes it.
+
+Its steps are as long as the motion allows, however often contacts open and close in them. What they
+do not resolve they damp: bodies come to rest at the first touch, as they do by critical damping.
+"""
+
+import math
+
+from flocsim.arrays import (
+    ACROSS,
+    BEARABLE_STEP,
+    BUSY,
+    CANDIDATES,
+    EDGE_BODY,
+    FULL,
+    GAP,
+    LOOKED_AT,
+    NORMAL_X,
+    NORMAL_Y,
+    NOTHING_FULL,
+    NOW,
+    PREVIOUS_STEP,
+    RATES_KNOWN,
+    SETTLED_STEP,
+    SETTLING,
+    SLIDING,
+    STAGED_STEP,
+    START,
+    STEP,
+    SWITCHES,
+    TOLERANCE,
+    TRIAL,
+    VERTEX_BODY,
+    VX,
+    VY,
+)
+from flocsim.compiler.composer import apart
+from flocsim.integrators.backward_euler.contact_mean import takes_part
+from flocsim.integrators.backward_euler.estimate import estimate_step, write_rates
+from flocsim.integrators.backward_euler.interior import find_closed
+from flocsim.integrators.backward_euler.newton import begin_step, end_step, put_back, solve_end
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.resolution import bounces, memory_of
+from flocsim.integrators.rhs.error import error_ratio
+from flocsim.integrators.rhs.stated_error import pressed_stiffness
+from flocsim.integrators.rhs.views import contact_view
+
+QUICK, MOST_ITERATIONS = 5, 16
+"""Iterations of Newton's method from the start of the step, and from where the interior-point
+method has come, before a step is given up and made smaller."""
+
+FEW = 2
+"""Behind a step with so few switches at most, Newton's method is tried alone."""
+
+SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 5.0, 0.1
+"""The next step is that much shorter than would just do; bounds of the change."""
+
+FIRST_SHARE = 0.1
+"""The first step with located switches behind one across them, over that."""
+
+
+def next_across(clock, step, ratio):
+    """The size of the step after one of that ratio: errors go with h² where motion is smooth, with
+    h where contacts switch."""
+    if ratio > 1.0:
+        return step * max(LEAST_SHARE, SAFETY / ratio)
+    longer = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
+    # A step cut short by the end of the window says nothing against a longer one.
+    return max(clock[STEP], longer) if step < clock[STEP] and ratio <= 0.5 else longer
+
+
+def solve_step(scene, work, clock, step):
+    """Find the end of the step; False where it is not found."""
+    if clock[BUSY] == 0.0:
+        if solve_end(scene, work, clock, step, QUICK):
+            return True
+        if work.tally[FULL] != NOTHING_FULL:
+            return False
+        put_back(work)
+    clock[BUSY] = 1.0
+    if not find_closed(scene, work, clock, step):
+        return False
+    return solve_end(scene, work, clock, step, MOST_ITERATIONS)
+
+
+def speed_along(work, row, state):
+    """How fast the bodies of a pair came at each other in a state [m/s]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    g, motion = work.geometry, work.motion
+    speed = g[NOW, row, NORMAL_X] * (motion[state, b, VX] - motion[state, a, VX])
+    return speed + g[NOW, row, NORMAL_Y] * (motion[state, b, VY] - motion[state, a, VY])
+
+
+@apart
+def fastest_bounce(scene, work, clock, lasting):
+    """ω0 [1/s] of the stiffest contact of the step from which bodies would fly apart again, by
+    more than is allowed; of those alone that have closed in it unless ``lasting``."""
+    fastest = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        closed = work.geometry[TRIAL, row, GAP] >= 0.0 > work.geometry[NOW, row, GAP]
+        if closed or (lasting and takes_part(work, row)):
+            speed = speed_along(work, row, START)
+            if lasting:
+                speed = max(abs(speed), abs(speed_along(work, row, NOW)))
+            if speed * memory_of(work, row) > clock[TOLERANCE]:
+                view = contact_view(scene, work, NOW, row)
+                stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+                if stiffness > 0.0:
+                    frequency = math.sqrt(stiffness / view.effective_mass)
+                    if bounces(scene, view, speed, frequency):
+                        fastest = max(fastest, frequency)
+    return fastest
+
+
+@apart
+def euler_step(scene, work, clock, step, lasting):
+    """One step: (error over tolerance, −1 where it fails; see fastest_bounce)."""
+    begin_step(work)
+    found, bounce = solve_step(scene, work, clock, step), 0.0
+    if found:
+        estimate_step(scene, work, clock, step)
+        bounce = fastest_bounce(scene, work, clock, lasting)
+    end_step(work)
+    return (error_ratio(scene, work, clock, step) if found else -1.0), bounce
+
+
+def note_rates(scene, work, clock, step):
+    """Write down what a step that has been accepted says of the next one."""
+    write_rates(work, step)
+    clock[RATES_KNOWN] = 1.0
+    switches = 0
+    for row in range(work.tally[CANDIDATES]):
+        before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
+        switches += 1 if (before < 0.0) != (after < 0.0) else 0
+    clock[SWITCHES] += switches
+    if switches <= FEW:
+        clock[BUSY] = 0.0
+
+
+def go_across(clock, step):
+    """From now on, steps go on across switches; the size of the first one."""
+    clock[ACROSS], clock[STEP] = 1.0, step
+    clock[RATES_KNOWN] = clock[BUSY] = clock[STAGED_STEP] = 0.0
+    clock[BEARABLE_STEP] = math.inf
+
+
+@apart
+def end_at_switches(scene, work, clock):
+    """From now on, steps end at switches, as pairs are flagged by gaps and displacements now."""
+    clock[ACROSS], clock[STEP], clock[LOOKED_AT] = 0.0, FIRST_SHARE * clock[STEP], math.inf
+    clock[PREVIOUS_STEP] = clock[BEARABLE_STEP] = clock[SETTLED_STEP] = math.inf
+    clock[SETTLING] = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        work.candidates[row, SLIDING] = 0
+    set_modes(scene, work)
