@@ -33,6 +33,7 @@ from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.grazing import any_grazes, hold_gaps, release_gaps
+from flocsim.integrators.radau.overlap_error import doubt_of_release
 from flocsim.integrators.radau.overlap_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve_for_free
@@ -138,7 +139,11 @@ class Implicit(Integrator):
         if not solve_stages(scene, work, clock, step):
             return -1.0
         estimate_error(scene, work, step)
-        return error_ratio(scene, work, clock, step)
+        ratio = error_ratio(scene, work, clock, step)
+        if ratio < 0.0:
+            return ratio
+        doubt = doubt_of_release(scene, work, clock, step)
+        return max(ratio, doubt * doubt)
 
     @staticmethod
     def next_step(clock, step, ratio):

@@ -9,7 +9,17 @@ decides when the contact opens. The stages show it: their overlaps lie on no lin
 
 import math
 
-from flocsim.arrays import FIRST_STAGE, GAP, NOW, STAGED_STEP, TOLERANCE
+from flocsim.arrays import (
+    CANDIDATES,
+    CLOSED,
+    FIRST_STAGE,
+    GAP,
+    HELD,
+    NOW,
+    STAGED_STEP,
+    TOLERANCE,
+    TOUCHES,
+)
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view
@@ -22,14 +32,38 @@ UNRESOLVED = 50.0
 """A step of so many times 1/ω0 leaves a contact's vibration out; a shorter one in part."""
 
 
-def overlap_error(scene, work, clock, row):
-    """By how much the overlap of a contact is likely to be wrong [m]."""
+MOST_SCATTER = 0.4
+"""A step in which a contact is relieved is too long where its overlap scatters by more than this
+share of itself: it may hold where it would have let go."""
+
+
+def scatter_of(scene, work, clock, step, row):
+    """How far the overlap of a contact at the end of a step lies off the line of those at the other
+    stages, as far as the step does not resolve its vibrations [m]."""
     view = contact_view(scene, work, NOW, row)
     stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
     if not stiffness > 0.0:
         return 0.0
-    turns = clock[STAGED_STEP] * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
+    turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
     g, span = work.geometry, NODES[1] - NODES[0]
     slope = (g[SECOND_STAGE, row, GAP] - g[FIRST_STAGE, row, GAP]) / span
     scatter = g[THIRD_STAGE, row, GAP] - g[SECOND_STAGE, row, GAP] - slope * (1.0 - NODES[1])
-    return SHARE_OF_SCATTER * abs(scatter) * min(1.0, turns * turns)
+    return abs(scatter) * min(1.0, turns * turns)
+
+
+def overlap_error(scene, work, clock, row):
+    """By how much the overlap of a contact is likely to be wrong [m]."""
+    return SHARE_OF_SCATTER * scatter_of(scene, work, clock, clock[STAGED_STEP], row)
+
+
+def doubt_of_release(scene, work, clock, step):
+    """By how much it is in doubt whether contacts that are relieved in a step still press, over
+    what is allowed; it goes with the square of the step."""
+    largest, g = 0.0, work.geometry
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, CLOSED] == TOUCHES and work.slip[HELD, row] == 0.0:
+            before, after = -g[NOW, row, GAP], -g[THIRD_STAGE, row, GAP]
+            if after < before and before > 0.0:
+                scatter = scatter_of(scene, work, clock, step, row)
+                largest = max(largest, scatter / (MOST_SCATTER * max(before, -after)))
+    return largest

@@ -12,6 +12,7 @@ from flocsim.arrays import (
     CHANGE,
     CLOSED,
     FIRST_STAGE,
+    GAP,
     GRAZES,
     GRAZING_RESISTANCE,
     MEMORY,
@@ -49,6 +50,10 @@ NEWTON_SHARE = 1e-3
 DOUBTED_PACE = 10.0
 """The second iteration is expected to shrink the first one's change by so many times less than it
 did when it was last made, its pace going with the square of the step, …"""
+
+OVERLAP_SHARE, LEAST_OVERLAP = 0.02, 1e-17
+"""Overlaps are found to this share of themselves, or of so much [m]: what presses is decided by
+them, however far below the tolerance they are."""
 
 GRAZING_SHARE, LEAST_EFFECT = 0.02, 0.1
 """Forces of pairs that graze are found to this share of themselves, or until what they move is this
@@ -104,12 +109,18 @@ def evaluate_states(scene, work, time, step, first, last):
         sum_forces(scene, work, time + node * step, state)
 
 
-def change_of_grazes(scene, work, step, stage, goal):
-    """What the changes of a stage's velocities alter in the forces of pairs that graze, over what
-    may be wrong of them, in terms of the goal for places [m]."""
+def change_of_forces(scene, work, step, stage, goal):
+    """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
+    the forces of those that graze, over what may be wrong of them, in terms of the goal for places
+    [m]."""
     largest = 0.0
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+        if work.candidates[row, CLOSED] == TOUCHES:
+            change = step * abs(along_normal(work, row, CHANGE, VELOCITY))
+            overlap = abs(work.geometry[FIRST_STAGE + stage, row, GAP])
+            allowed = max(OVERLAP_SHARE * overlap, LEAST_OVERLAP)
+            largest = max(largest, goal * change / allowed)
+        elif work.candidates[row, CLOSED] == GRAZES:
             resistance, memory = work.slip[GRAZING_RESISTANCE, row], memory_of(work, row)
             change = abs(resistance * along_normal(work, row, CHANGE, VELOCITY))
             force = abs(grazing_force(work, FIRST_STAGE + stage, row))
@@ -133,7 +144,7 @@ def correct_stages(scene, work, step, goal):
                     return math.inf
                 work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
-        largest = max(largest, change_of_grazes(scene, work, step, stage, goal))
+        largest = max(largest, change_of_forces(scene, work, step, stage, goal))
     return largest
 
 
