@@ -40,9 +40,10 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
-START, CHANGE, DEVIATION, CARRIED, FORCING, LAST_RATES, LOOKED, MOTION_ROWS = range(
-    STATES, STATES + 8
-)
+(
+    START, CHANGE, DEVIATION, CARRIED, FORCING, LAST_RATES, LOOKED, CYCLE_LAST, CYCLE_BEFORE,
+    MOTION_ROWS,
+) = range(STATES, STATES + 10)  # fmt: skip
 """Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
 change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
 such errors, carried on with the motion, have become; in the columns of velocities, forces by which
@@ -56,8 +57,8 @@ SLIP_RATES = STATES
     SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
     HELD, OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
     KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
-    SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 18)  # fmt: skip
+    CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, SLIP_ROWS,
+) = range(2 * STATES, 2 * STATES + 22)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
@@ -175,8 +176,11 @@ NOTHING_FULL, CANDIDATES_FULL, PAIRS_FULL, BLOCKS_FULL = range(4)
     BUSY,
     SWITCHES,
     LOOKED_AT,
+    CYCLE_AT,
+    CYCLE_AT_BEFORE,
+    CYCLE_ERROR,
     CLOCK_SIZE,
-) = range(27)
+) = range(30)
 """The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
 error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
 error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
@@ -193,8 +197,9 @@ when that was (inf: it is to do so anew) [s]."""
 
 (
     STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, LOOK_AT, LOOKED_TRIED,
+    CYCLE_MODES, CYCLE_CODE, CYCLE_CODE_BEFORE, CYCLE_SWITCHES, CYCLES_SEEN, CYCLE_RETURNS,
     COUNTS_SIZE,
-) = range(11)  # fmt: skip
+) = range(17)  # fmt: skip
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
 which to pause, the observer's last code, events located, steps in a row by which no time has
 gone by; steps after which a method looks how far it has come, and how many had been tried when it

@@ -56,6 +56,11 @@ def step_across(scene, work, clock, step):
 
 
 @hook
+def leave_out_cycles(scene, work, clock, counts, until):
+    """Go on by many equal cycles of switches at once, where they are, to before a time [s]."""
+
+
+@hook
 def note_step(scene, work, clock, step):
     """Write down what a method of steps across switches has to know of one that is accepted."""
 

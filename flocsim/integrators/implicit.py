@@ -21,11 +21,18 @@ from flocsim.arrays import (
     X,
 )
 from flocsim.fields import quantity
-from flocsim.hooks import choose_method, end_within, note_step, step_across
+from flocsim.hooks import (
+    choose_method,
+    end_within,
+    leave_out_cycles,
+    note_step,
+    step_across,
+)
 from flocsim.integrators.backward_euler.choice import hand_over, step_or_give_back
 from flocsim.integrators.backward_euler.step import next_across, note_rates
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
+from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
 from flocsim.integrators.events.grazes import leave_early, settle
 from flocsim.integrators.events.modes import leave_at_once, settle_grazes
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
@@ -166,6 +173,7 @@ class Implicit(Integrator):
             choose_method: hand_over,
             step_across: step_or_give_back,
             note_step: note_rates,
+            leave_out_cycles: leave_out,
             carry_vector: carry_error,
             overlap_error: step_overlap_error,
         }

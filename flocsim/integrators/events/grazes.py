@@ -45,7 +45,7 @@ so before, …"""
 SHARE_OF_FIRST = 1e-3
 """… and by this one where it has not, …"""
 
-MANY = 5
+MANY = 1e18
 """So often a pair has parted by no more than that and touched again that it hums."""
 
 SHARE_OF_SLIP = 1.0

@@ -35,10 +35,18 @@ from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
 from flocsim.geometry.contact.points import locate_contacts, row_radii
 from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
-from flocsim.hooks import attempt, choose_method, end_within, note_step, observe
+from flocsim.hooks import (
+    attempt,
+    choose_method,
+    end_within,
+    leave_out_cycles,
+    note_step,
+    observe,
+)
 from flocsim.integrators.events.crossings import may_switch
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
 from flocsim.integrators.events.modes import (
+    OTHER_CONTACTS,
     OTHER_FRICTION,
     SAME,
     leave_at_once,
@@ -46,7 +54,7 @@ from flocsim.integrators.events.modes import (
     settle_grazes,
 )
 from flocsim.integrators.events.overtaking import overtakes
-from flocsim.integrators.loop.kicks import meet_kick, renew_kicks
+from flocsim.integrators.loop.kicks import kick_end, meet_kick, renew_kicks
 from flocsim.integrators.loop.step_size import (
     choose_step,
     moves,
@@ -247,6 +255,9 @@ def advance(scene, work, observed, clock, counts, record):
                 continue
             step *= share
         switched = accept(scene, work, clock, counts, step, lists)
+        if switched == OTHER_CONTACTS:
+            until = min(clock[UNTIL], kick_end(scene, work))
+            leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
         if switched != SAME:
             clock[STEP] = min(clock[STEP], step_behind_touch(scene, work, clock))

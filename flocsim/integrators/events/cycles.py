@@ -1,0 +1,314 @@
+"""Rattling: many equal cycles of switches are left out at once.
+
+Two contacts of a doublet may throw each other open in turn, for ever, where no state of rest
+satisfies the contact law: a cycle of some microseconds and 1e-13 m, by which the doublet creeps by
+next to nothing. What comes of it in the long run is what a cycle does, times their number: where
+the switches, and all that a cycle changes, have been the same in two cycles on end, the pair goes
+on by as many cycles as leave their form as it is (envelope following, or multirevolution: Petzold
+1981; Calvo, Montijano and Rández 2007).
+
+A pair is described as it is seen from its first body: by where the other one is and how both move,
+which a cycle gives back but for next to nothing, and by where the whole of it is, which it moves
+evenly. What a cycle changes is carried on along a line in the first, and along a parabola in the
+second.
+"""
+
+import math
+
+from flocsim.arrays import (
+    ANGLE,
+    BOUNDING_RADIUS,
+    CANDIDATES,
+    CARRIED,
+    CLOSED,
+    CYCLE_AT,
+    CYCLE_AT_BEFORE,
+    CYCLE_BEFORE,
+    CYCLE_CODE,
+    CYCLE_CODE_BEFORE,
+    CYCLE_ERROR,
+    CYCLE_GAP,
+    CYCLE_GAP_BEFORE,
+    CYCLE_LAST,
+    CYCLE_MODES,
+    CYCLE_RETURNS,
+    CYCLE_SLIP,
+    CYCLE_SLIP_BEFORE,
+    CYCLE_SWITCHES,
+    CYCLES_SEEN,
+    DOUBT_PLACE,
+    ERROR,
+    ERROR_PLACE,
+    FLIGHTS,
+    FREE,
+    GAP,
+    GAP_OFFSET,
+    HELD,
+    MASS,
+    MOTION_COLUMNS,
+    NOW,
+    OPEN,
+    SLIDING,
+    SPIN,
+    SWITCH_PLACE,
+    TIME,
+    TRIAL,
+    VX,
+    VY,
+    X,
+    Y,
+)
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.modes import set_modes
+
+MOST_SWITCHES = 64
+"""A cycle of more switches is none."""
+
+FEWEST, MOST_AT_ONCE = 4.0, 1e5
+"""Fewer cycles at once are not worth it; more are never left out."""
+
+FORM = 0.2
+"""By that share of what they are gaps and displacements may change over the cycles left out, …"""
+
+FORM_ERROR = 0.02
+"""… and be wrong, …"""
+
+PACE = 0.1
+"""… so may the motion of the pair as a whole, …"""
+
+MOST_TURN = 0.05
+"""… which may turn by so much [rad]."""
+
+RETURNS = 2
+"""So often the modes in which a cycle begins come again until it ends: what changes to and fro from
+one time to the next has done so once, then."""
+
+BASE, MODULUS = 31, 2147483647
+"""Of the numbers by which modes of contacts, and series of them, are told apart."""
+
+WHOLE = 9
+"""Coordinates from here on say where the pair as a whole is: angle, place (x, y)."""
+
+COORDINATES = 12
+
+
+def share_of_second(scene):
+    """Where the point that stands for the pair lies between its bodies: their centre of mass."""
+    if scene.bodies[0, FREE] == 0.0:
+        return 0.0
+    if scene.bodies[1, FREE] == 0.0:
+        return 1.0
+    return scene.bodies[1, MASS] / (scene.bodies[0, MASS] + scene.bodies[1, MASS])
+
+
+def coordinate(scene, work, state, which):
+    """A coordinate of the pair: place (x, y) and angle of the second body as seen from the first,
+    velocities (x, y, spin) of both along its axes, then its angle, and the place of the pair."""
+    m = work.motion
+    turn = m[state, 0, ANGLE]
+    c, s = math.cos(turn), math.sin(turn)
+    dx, dy = m[state, 1, X] - m[state, 0, X], m[state, 1, Y] - m[state, 0, Y]
+    if which == 0:
+        return c * dx + s * dy
+    if which == 1:
+        return c * dy - s * dx
+    if which == 2:
+        return m[state, 1, ANGLE] - turn
+    if which < WHOLE:
+        body, axis = (which - 3) // 3, (which - 3) % 3
+        if axis == 0:
+            return c * m[state, body, VX] + s * m[state, body, VY]
+        if axis == 1:
+            return c * m[state, body, VY] - s * m[state, body, VX]
+        return m[state, body, SPIN]
+    if which == WHOLE:
+        return turn
+    share = share_of_second(scene)
+    if which == WHOLE + 1:
+        return m[state, 0, X] + share * dx
+    return m[state, 0, Y] + share * dy
+
+
+def place_by(scene, work):
+    """Make the coordinates that lie in TRIAL the motion of NOW."""
+    m, q = work.motion, work.motion[TRIAL]
+    turn, share = q[1, 3], share_of_second(scene)
+    c, s = math.cos(turn), math.sin(turn)
+    dx, dy = c * q[0, 0] - s * q[0, 1], s * q[0, 0] + c * q[0, 1]
+    m[NOW, 0, X], m[NOW, 0, Y] = q[1, 4] - share * dx, q[1, 5] - share * dy
+    m[NOW, 1, X], m[NOW, 1, Y] = m[NOW, 0, X] + dx, m[NOW, 0, Y] + dy
+    m[NOW, 0, ANGLE], m[NOW, 1, ANGLE] = turn, turn + q[0, 2]
+    m[NOW, 0, VX], m[NOW, 0, VY] = c * q[0, 3] - s * q[0, 4], s * q[0, 3] + c * q[0, 4]
+    m[NOW, 0, SPIN], m[NOW, 1, SPIN] = q[0, 5], q[1, 2]
+    m[NOW, 1, VX], m[NOW, 1, VY] = c * q[1, 0] - s * q[1, 1], s * q[1, 0] + c * q[1, 1]
+
+
+def modes_of(work):
+    """A number for how all listed pairs touch."""
+    code = 1
+    for row in range(work.tally[CANDIDATES]):
+        mode = 2 * work.candidates[row, CLOSED] + (1 if work.slip[HELD, row] != 0.0 else 0)
+        mode = 3 * mode + work.candidates[row, SLIDING] + 1
+        code = (code * BASE + mode + 1) % MODULUS
+    return code
+
+
+def takes_part(work, row):
+    """Whether a pair touches, or has done so a moment ago."""
+    return work.candidates[row, CLOSED] != OPEN or work.slip[FLIGHTS, row] > 0.0
+
+
+def begin_at(counts, modes):
+    """Let cycles be counted from these modes on."""
+    counts[CYCLE_MODES], counts[CYCLES_SEEN], counts[CYCLE_SWITCHES] = modes, 0, 0
+    counts[CYCLE_CODE] = counts[CYCLE_CODE_BEFORE] = 0
+
+
+def end_cycle(work, clock, counts):
+    """Keep the state at the end of a cycle beside that of the end before."""
+    for body in range(2):
+        for axis in range(MOTION_COLUMNS):
+            work.motion[CYCLE_BEFORE, body, axis] = work.motion[CYCLE_LAST, body, axis]
+            work.motion[CYCLE_LAST, body, axis] = work.motion[NOW, body, axis]
+    for row in range(work.tally[CANDIDATES]):
+        work.slip[CYCLE_SLIP_BEFORE, row] = work.slip[CYCLE_SLIP, row]
+        work.slip[CYCLE_SLIP, row] = work.slip[NOW, row]
+        work.slip[CYCLE_GAP_BEFORE, row] = work.slip[CYCLE_GAP, row]
+        work.slip[CYCLE_GAP, row] = work.geometry[NOW, row, GAP]
+    clock[CYCLE_AT_BEFORE], clock[CYCLE_AT] = clock[CYCLE_AT], clock[TIME]
+    clock[CYCLE_ERROR] = clock[ERROR]
+    counts[CYCLE_CODE_BEFORE], counts[CYCLE_CODE] = counts[CYCLE_CODE], 0
+    counts[CYCLE_SWITCHES] = counts[CYCLE_RETURNS] = 0
+    counts[CYCLES_SEEN] += 1
+
+
+def allowed(most, change, bend, size):
+    """How many cycles may be left out where something of a size changes by ``change`` in a cycle,
+    and that by ``bend``."""
+    if abs(change) * most > FORM * size:
+        most = FORM * size / abs(change)
+    if abs(bend) * most * most > 2.0 * FORM_ERROR * size:
+        most = math.sqrt(2.0 * FORM_ERROR * size / abs(bend))
+    return most
+
+
+def cycles_of_form(work):
+    """How many cycles leave gaps and displacements about as they are."""
+    gaps = slips = 0.0
+    for row in range(work.tally[CANDIDATES]):
+        if takes_part(work, row):
+            gaps = max(gaps, abs(work.geometry[NOW, row, GAP]))
+            slips = max(slips, abs(work.slip[NOW, row]))
+    most = MOST_AT_ONCE
+    for row in range(work.tally[CANDIDATES]):
+        now, last = work.geometry[NOW, row, GAP], work.slip[CYCLE_GAP, row]
+        bend = now - 2.0 * last + work.slip[CYCLE_GAP_BEFORE, row]
+        if not takes_part(work, row):
+            most = allowed(most, now - last, bend, now)
+        else:
+            most = allowed(most, now - last, bend, gaps)
+            now, last = work.slip[NOW, row], work.slip[CYCLE_SLIP, row]
+            bend = now - 2.0 * last + work.slip[CYCLE_SLIP_BEFORE, row]
+            most = allowed(most, now - last, bend, slips)
+    return most
+
+
+def change_of(scene, work, which):
+    """(What the last cycle has changed of a coordinate, by how much more than the one before)."""
+    now, last = coordinate(scene, work, NOW, which), coordinate(scene, work, CYCLE_LAST, which)
+    before = coordinate(scene, work, CYCLE_BEFORE, which)
+    return now - last, now - 2.0 * last + before
+
+
+def cycles_of_motion(scene, work, clock, until):
+    """How many cycles leave the motion of the pair as a whole about as it is."""
+    size = scene.bodies[0, BOUNDING_RADIUS] + scene.bodies[1, BOUNDING_RADIUS]
+    way = bend = 0.0
+    for which in range(WHOLE, COORDINATES):
+        lever = size if which == WHOLE else 1.0
+        change, more = change_of(scene, work, which)
+        way, bend = max(way, lever * abs(change)), max(bend, lever * abs(more))
+    turn, _ = change_of(scene, work, WHOLE)
+    most = MOST_AT_ONCE
+    if bend * most > PACE * way:
+        most = PACE * way / bend
+    if abs(turn) * most > MOST_TURN:
+        most = MOST_TURN / abs(turn)
+    period = clock[TIME] - clock[CYCLE_AT]
+    longer = period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE]
+    if abs(longer) * most > PACE * period:
+        most = PACE * period / abs(longer)
+    return min(most, 0.5 * (until - clock[TIME]) / period)
+
+
+def leave_out(scene, work, clock, many):
+    """Go on by so many cycles."""
+    half = 0.5 * many * (many + 1.0)
+    for which in range(COORDINATES):
+        change, bend = change_of(scene, work, which)
+        more = half * bend if which >= WHOLE else 0.0
+        now = coordinate(scene, work, NOW, which)
+        work.motion[TRIAL, which // MOTION_COLUMNS, which % MOTION_COLUMNS] = (
+            now + many * change + more
+        )
+    place_by(scene, work)
+    for row in range(work.tally[CANDIDATES]):
+        if takes_part(work, row):
+            work.slip[NOW, row] += many * (work.slip[NOW, row] - work.slip[CYCLE_SLIP, row])
+            gap = work.geometry[NOW, row, GAP]
+            work.slip[CYCLE_GAP, row] = gap + many * (gap - work.slip[CYCLE_GAP, row])
+    period = clock[TIME] - clock[CYCLE_AT]
+    clock[TIME] += many * period + half * (period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE])
+    locate_contacts(scene, work, NOW)
+
+
+def restore_gaps(work):
+    """Count the gaps of pairs that take part as what a cycle makes of them: what a turn bends them
+    by is far below them."""
+    for row in range(work.tally[CANDIDATES]):
+        if takes_part(work, row):
+            work.slip[GAP_OFFSET, row] += work.geometry[NOW, row, GAP] - work.slip[CYCLE_GAP, row]
+            work.geometry[NOW, row, GAP] = work.slip[CYCLE_GAP, row]
+
+
+def carry_on_errors(work, clock, many):
+    """Let what is stated of errors grow on as it has in the last cycle."""
+    grown = clock[ERROR] - clock[CYCLE_ERROR]
+    if grown > 0.0:
+        factor = 1.0 + many * grown / clock[ERROR]
+        for body in range(2):
+            for column in (ERROR_PLACE, SWITCH_PLACE, DOUBT_PLACE):
+                work.bodies[body, column] *= factor
+            for axis in range(MOTION_COLUMNS):
+                work.motion[CARRIED, body, axis] *= factor
+        clock[ERROR] *= factor
+
+
+def leave_out_cycles(scene, work, clock, counts, until):
+    """Look at a switch of two bodies that has just been, and leave out the cycles that it ends, if
+    they have been alike."""
+    if work.bodies.shape[0] != 2:
+        return
+    modes = modes_of(work)
+    counts[CYCLE_CODE] = (counts[CYCLE_CODE] * BASE + modes) % MODULUS
+    counts[CYCLE_SWITCHES] += 1
+    if counts[CYCLE_SWITCHES] > MOST_SWITCHES or counts[CYCLE_MODES] == 0:
+        begin_at(counts, modes)
+    if modes != counts[CYCLE_MODES]:
+        return
+    counts[CYCLE_RETURNS] += 1
+    if counts[CYCLES_SEEN] > 0 and counts[CYCLE_RETURNS] < RETURNS:
+        return
+    many = 0.0
+    if counts[CYCLES_SEEN] >= 2:
+        if counts[CYCLE_CODE] != counts[CYCLE_CODE_BEFORE]:
+            counts[CYCLE_MODES] = 0
+            return
+        many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
+    if many >= FEWEST:
+        leave_out(scene, work, clock, many)
+        restore_gaps(work)
+        carry_on_errors(work, clock, many)
+        set_modes(scene, work)
+        begin_at(counts, modes_of(work))
+    end_cycle(work, clock, counts)
