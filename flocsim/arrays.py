@@ -57,8 +57,8 @@ SLIP_RATES = STATES
     SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
     HELD, OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
     KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
-    CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 22)  # fmt: skip
+    CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, FLOWN_AT, SLIP_ROWS,
+) = range(2 * STATES, 2 * STATES + 23)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been

@@ -60,6 +60,7 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.resolution import above_rounding
 
 MOST_SWITCHES = 64
 """A cycle of more switches is none."""
@@ -182,9 +183,15 @@ def end_cycle(work, clock, counts):
     counts[CYCLES_SEEN] += 1
 
 
-def allowed(most, change, bend, size):
-    """How many cycles may be left out where something of a size changes by ``change`` in a cycle,
-    and that by ``bend``."""
+def known(change, least):
+    """A change of a length, nothing where it may be rounding."""
+    return change if abs(change) > least else 0.0
+
+
+def allowed(most, now, last, before, size, least):
+    """How many cycles may be left out where a length of such a size was so much behind the last
+    ones; what is below ``least`` is rounding."""
+    change, bend = known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
     if abs(change) * most > FORM * size:
         most = FORM * size / abs(change)
     if abs(bend) * most * most > 2.0 * FORM_ERROR * size:
@@ -194,7 +201,7 @@ def allowed(most, change, bend, size):
 
 def cycles_of_form(work):
     """How many cycles leave gaps and displacements about as they are."""
-    gaps = slips = 0.0
+    gaps, slips, least = 0.0, 0.0, above_rounding(work, NOW, 0.0)
     for row in range(work.tally[CANDIDATES]):
         if takes_part(work, row):
             gaps = max(gaps, abs(work.geometry[NOW, row, GAP]))
@@ -202,14 +209,11 @@ def cycles_of_form(work):
     most = MOST_AT_ONCE
     for row in range(work.tally[CANDIDATES]):
         now, last = work.geometry[NOW, row, GAP], work.slip[CYCLE_GAP, row]
-        bend = now - 2.0 * last + work.slip[CYCLE_GAP_BEFORE, row]
-        if not takes_part(work, row):
-            most = allowed(most, now - last, bend, now)
-        else:
-            most = allowed(most, now - last, bend, gaps)
+        size = gaps if takes_part(work, row) else now
+        most = allowed(most, now, last, work.slip[CYCLE_GAP_BEFORE, row], size, least)
+        if takes_part(work, row):
             now, last = work.slip[NOW, row], work.slip[CYCLE_SLIP, row]
-            bend = now - 2.0 * last + work.slip[CYCLE_SLIP_BEFORE, row]
-            most = allowed(most, now - last, bend, slips)
+            most = allowed(most, now, last, work.slip[CYCLE_SLIP_BEFORE, row], slips, least)
     return most
 
 
@@ -252,11 +256,13 @@ def leave_out(scene, work, clock, many):
             now + many * change + more
         )
     place_by(scene, work)
+    least = above_rounding(work, NOW, 0.0)
     for row in range(work.tally[CANDIDATES]):
         if takes_part(work, row):
-            work.slip[NOW, row] += many * (work.slip[NOW, row] - work.slip[CYCLE_SLIP, row])
-            gap = work.geometry[NOW, row, GAP]
-            work.slip[CYCLE_GAP, row] = gap + many * (gap - work.slip[CYCLE_GAP, row])
+            slip, gap = work.slip[NOW, row], work.geometry[NOW, row, GAP]
+            work.slip[NOW, row] += many * known(slip - work.slip[CYCLE_SLIP, row], least)
+            change = known(gap - work.slip[CYCLE_GAP, row], least)
+            work.slip[CYCLE_GAP, row] = gap + many * change
     period = clock[TIME] - clock[CYCLE_AT]
     clock[TIME] += many * period + half * (period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE])
     locate_contacts(scene, work, NOW)

@@ -14,6 +14,7 @@ from flocsim.arrays import (
     CLOSED,
     FLIGHT,
     FLIGHTS,
+    FLOWN_AT,
     FRESH,
     GAP,
     GAP_OFFSET,
@@ -26,6 +27,7 @@ from flocsim.arrays import (
     OPEN,
     PAIR,
     SLIDING,
+    TIME,
     TOLERANCE,
     TOUCHES,
     VERTEX_BODY,
@@ -45,7 +47,7 @@ so before, …"""
 SHARE_OF_FIRST = 1e-3
 """… and by this one where it has not, …"""
 
-MANY = 1e18
+MANY = 5
 """So often a pair has parted by no more than that and touched again that it hums."""
 
 SHARE_OF_SLIP = 1.0
@@ -89,7 +91,7 @@ def pull_of(scene, work, row):
 
 def begins(scene, work, clock, row):
     """Whether a pair that has just parted grazes from now on."""
-    if work.candidates[row, SLIDING] != 0:
+    if work.candidates[row, SLIDING] != 0 or rattles(work, row):
         return False
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
@@ -109,6 +111,14 @@ def spring_of(scene, view):
     return max(-contact_derivatives(scene, view)[7], 0.0)
 
 
+def near(work, row, other):
+    """Whether two rows have one contact point."""
+    body = work.candidates[row, VERTEX_BODY]
+    x, y = contact_point(work, row, body)
+    other_x, other_y = contact_point(work, other, body)
+    return math.hypot(other_x - x, other_y - y) < SAME_PLACE
+
+
 def shares_point(work, row, other):
     """Whether two rows of the same two bodies have one contact point and gap: two corners that
     touch are up to four rows, of both bodies' edges."""
@@ -118,10 +128,7 @@ def shares_point(work, row, other):
         work, NOW, 0.0
     ):
         return False
-    body = work.candidates[row, VERTEX_BODY]
-    x, y = contact_point(work, row, body)
-    other_x, other_y = contact_point(work, other, body)
-    return math.hypot(other_x - x, other_y - y) < SAME_PLACE
+    return near(work, row, other)
 
 
 def enter(scene, work, row):
@@ -213,6 +220,19 @@ def hums(work, row):
     return work.slip[FLIGHTS, row] >= MANY
 
 
+def rattles(work, row):
+    """Whether another contact of the same bodies has done that since this one last touched again:
+    they throw each other open in turn."""
+    if not hums(work, row):
+        return False
+    for other in range(work.tally[CANDIDATES]):
+        same = work.candidates[other, PAIR] == work.candidates[row, PAIR]
+        later = work.slip[FLOWN_AT, other] > work.slip[FLOWN_AT, row]
+        if same and later and hums(work, other) and not near(work, row, other):
+            return True
+    return False
+
+
 def count_flight(work, clock, row):
     """Count how often a pair, which has touched, was apart by far less than the tolerance."""
     flight = work.slip[FLIGHT, row]
@@ -220,6 +240,7 @@ def count_flight(work, clock, row):
         work.slip[FLIGHTS, row] = 0.0
     elif flight > 0.0:
         work.slip[FLIGHTS, row] += 1.0
+        work.slip[FLOWN_AT, row] = clock[TIME]
     work.slip[FLIGHT, row] = 0.0
 
 
@@ -240,7 +261,7 @@ def hold(scene, work, clock, row, step):
     """Whether a pair that has parted stays closed: it was apart before by far less than the
     tolerance, and has not yet come to rest with a pull that nothing gives it."""
     gap = work.geometry[NOW, row, GAP]
-    if not hums(work, row) or gap > SHARE_OF_FLIGHT * clock[TOLERANCE]:
+    if True or gap > SHARE_OF_FLIGHT * clock[TOLERANCE]:
         return False
     if work.candidates[row, SLIDING] != 0:
         return False

@@ -20,6 +20,7 @@ from flocsim.arrays import (
     TOLERANCE,
     TOUCHES,
 )
+from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view
@@ -35,6 +36,9 @@ UNRESOLVED = 50.0
 MOST_SCATTER = 0.4
 """A step in which a contact is relieved is too long where its overlap scatters by more than this
 share of itself: it may hold where it would have let go."""
+
+ABOVE = 30.0
+"""Overlaps below so many times what places can be told apart by scatter by chance."""
 
 
 def scatter_of(scene, work, clock, step, row):
@@ -60,10 +64,11 @@ def doubt_of_release(scene, work, clock, step):
     """By how much it is in doubt whether contacts that are relieved in a step still press, over
     what is allowed; it goes with the square of the step."""
     largest, g = 0.0, work.geometry
+    least = ABOVE * above_rounding(work, NOW, 0.0)
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES and work.slip[HELD, row] == 0.0:
             before, after = -g[NOW, row, GAP], -g[THIRD_STAGE, row, GAP]
             if after < before and before > 0.0:
                 scatter = scatter_of(scene, work, clock, step, row)
-                largest = max(largest, scatter / (MOST_SCATTER * max(before, -after)))
+                largest = max(largest, scatter / (MOST_SCATTER * max(before, -after, least)))
     return largest

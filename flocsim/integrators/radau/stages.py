@@ -26,7 +26,7 @@ from flocsim.arrays import (
     TOUCHES,
     VELOCITY,
 )
-from flocsim.integrators.events.resolution import memory_of
+from flocsim.integrators.events.resolution import above_rounding, memory_of
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
@@ -51,9 +51,9 @@ DOUBTED_PACE = 10.0
 """The second iteration is expected to shrink the first one's change by so many times less than it
 did when it was last made, its pace going with the square of the step, …"""
 
-OVERLAP_SHARE, LEAST_OVERLAP = 0.02, 1e-17
-"""Overlaps are found to this share of themselves, or of so much [m]: what presses is decided by
-them, however far below the tolerance they are."""
+OVERLAP_SHARE = 2e-3
+"""Overlaps are found to this share of themselves: what presses is decided by them, however far
+below the tolerance they are."""
 
 GRAZING_SHARE, LEAST_EFFECT = 0.02, 0.1
 """Forces of pairs that graze are found to this share of themselves, or until what they move is this
@@ -113,12 +113,12 @@ def change_of_forces(scene, work, step, stage, goal):
     """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
-    largest = 0.0
+    largest, least = 0.0, above_rounding(work, NOW, 0.0)
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES:
             change = step * abs(along_normal(work, row, CHANGE, VELOCITY))
             overlap = abs(work.geometry[FIRST_STAGE + stage, row, GAP])
-            allowed = max(OVERLAP_SHARE * overlap, LEAST_OVERLAP)
+            allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
         elif work.candidates[row, CLOSED] == GRAZES:
             resistance, memory = work.slip[GRAZING_RESISTANCE, row], memory_of(work, row)
