@@ -47,6 +47,10 @@ so before, …"""
 SHARE_OF_FIRST = 1e-3
 """… and by this one where it has not, …"""
 
+FIRST_KICK = 3.0
+"""The speed that a tangential spring lets go of where a contact parts displaces bodies by so many
+tolerances at most, or it has to have hummed before."""
+
 MANY = 5
 """So often a pair has parted by no more than that and touched again that it hums."""
 
@@ -103,7 +107,13 @@ def begins(scene, work, clock, row):
     if abs(pull) > LEAST_PULL * abs(force):
         return False
     spring = spring_of(scene, view)
-    return spring == 0.0 or abs(force) <= SHARE_OF_SLIP * clock[TOLERANCE] * spring
+    if spring == 0.0:
+        return True
+    if not hums(work, row):
+        kick = abs(force) / math.sqrt(spring * view.effective_mass)
+        if kick * memory_of(work, row) > FIRST_KICK * clock[TOLERANCE]:
+            return False
+    return abs(force) <= SHARE_OF_SLIP * clock[TOLERANCE] * spring
 
 
 def spring_of(scene, view):
