@@ -48,25 +48,27 @@ STATES = FIRST_STAGE + MOST_STAGES
 change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
 such errors, carried on with the motion, have become; in the columns of velocities, forces by which
 it is carried otherwise than a change of the start [N, N, N m], the accelerations of the last step
-across switches [m/s², 1/s²], and the velocities when a method last looked how far it has come."""
+across switches [m/s², 1/s²], and the velocities when a method last looked how far it has come; the
+motion at the ends of the last cycle of switches and of the one before."""
 
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
 (
     SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
-    HELD, OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
+    OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
     KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
     CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, FLOWN_AT, SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 23)  # fmt: skip
+) = range(2 * STATES, 2 * STATES + 22)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
 held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).  The
-overlap of a pair, what is left of its gap and the changes of both, while an interior-point method
-finds out which pairs close [m].  Displacements, offsets, forces, gaps and flights that are set
-aside while the list is made anew."""
+that was next to nothing (see events.grazes).  The overlap of a pair, what is left of its gap and
+the changes of both, while an interior-point method finds out which pairs close [m].
+Displacements, offsets, forces, gaps and flights that are set aside while the list is made anew.
+Displacements and gaps at the ends of the last cycle of switches and of the one before [m]; when the
+pair last touched again behind a flight that was next to nothing [s]."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
@@ -193,7 +195,8 @@ but a stop on the way (0: it is not) [s]; the pace of the last second iteration 
 is not known), and the size of its step; 1 where steps go on across switches, 0 where they end
 there; of steps across them: 1 where LAST_RATES are known, 1 where so many contacts switch in a step
 that Newton's method alone is slow, and the switches since a method last looked how far it has come;
-when that was (inf: it is to do so anew) [s]."""
+when that was (inf: it is to do so anew) [s]; the ends of the last cycle of switches and of the one
+before [s], and the stated error at the last [m]."""
 
 (
     STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, LOOK_AT, LOOKED_TRIED,
@@ -203,7 +206,9 @@ when that was (inf: it is to do so anew) [s]."""
 """The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
 which to pause, the observer's last code, events located, steps in a row by which no time has
 gone by; steps after which a method looks how far it has come, and how many had been tried when it
-last did."""
+last did; of cycles of switches (see events.cycles): the modes in which one begins (0: none has),
+a number for what has switched since and one for the cycle before, how many switches there were, how
+many cycles have ended, and how often those modes have come again."""
 
 
 class BodyView(NamedTuple):

@@ -23,9 +23,9 @@ EXACT = 1e-18
 """A tolerance [m] at which Newton's method goes on to the last bit."""
 
 
-def even_steps(scene, work, clock, step, count):
+def even_steps(scene, work, clock, counts, step, count):
     """Take equal steps whatever their error; False where one fails."""
-    keep_lists(scene, work, 0.0)
+    keep_lists(scene, work, counts, 0.0)
     for _ in range(count):
         if attempt(scene, work, clock, step) < 0.0:
             return False
@@ -63,7 +63,7 @@ def end_of(name, integrator, count):
     work, clock = work_of(scene, *system.motion()), integrator.fresh_clock()
     clock[TOLERANCE] = min(clock[TOLERANCE], EXACT)
     clock[UNTIL], clock[LARGEST_STEP] = until, until / count
-    assert driver(scene, work, clock, until / count, count)
+    assert driver(scene, work, clock, integrator.fresh_counts(count), until / count, count)
     return work.motion[NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 

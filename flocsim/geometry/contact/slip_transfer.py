@@ -19,7 +19,6 @@ from flocsim.arrays import (
     GAP_OFFSET,
     GRAZES,
     GRAZING_FORCE,
-    HELD,
     KEPT,
     KEPT_EARLIER,
     KEPT_EDGE,
@@ -48,14 +47,11 @@ from flocsim.arrays import (
 )
 from flocsim.hooks import hook
 
-STAYS = 3
-"""KEPT_MODE of a pair that is HELD."""
-
 
 def is_kept(work, row, mode):
     """Whether there is anything to be known of a pair besides where its bodies are."""
     known = work.slip[NOW, row] != 0.0 or work.slip[GAP_OFFSET, row] != 0.0
-    return known or work.slip[FLIGHTS, row] != 0.0 or mode in (GRAZES, STAYS)
+    return known or work.slip[FLIGHTS, row] != 0.0 or mode == GRAZES
 
 
 def keep_slips(work):
@@ -69,8 +65,6 @@ def keep_slips(work):
     count = 0
     for row in range(work.tally[CANDIDATES]):
         mode = work.candidates[row, CLOSED]
-        if work.slip[HELD, row] != 0.0:
-            mode = STAYS
         if is_kept(work, row, mode):
             a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
             work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = max(a, b), min(a, b)
@@ -100,7 +94,7 @@ def restore_slips(work, count):
     first = 0
     for row in range(work.tally[CANDIDATES]):
         work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = work.slip[GAP_OFFSET, row] = 0.0
-        work.slip[FLIGHT, row] = work.slip[FLIGHTS, row] = work.slip[HELD, row] = 0.0
+        work.slip[FLIGHT, row] = work.slip[FLIGHTS, row] = 0.0
         a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
         later, earlier = max(a, b), min(a, b)
         while first < count and comes_before(work, first, later, earlier):
@@ -114,9 +108,6 @@ def restore_slips(work, count):
                 work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
                 work.slip[GAP_OFFSET, row] = work.slip[KEPT_GAP, k]
                 work.slip[FLIGHTS, row] = work.slip[KEPT_FLIGHTS, k]
-                if work.kept[k, KEPT_MODE] == STAYS:
-                    work.candidates[row, CLOSED] = TOUCHES
-                    work.slip[HELD, row] = 1.0
                 if work.kept[k, KEPT_MODE] == GRAZES:
                     work.candidates[row, CLOSED] = GRAZES
                     work.slip[GRAZING_FORCE, row] = work.slip[KEPT_FORCE, k]
@@ -198,8 +189,8 @@ def hand_over(scene, work):
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[CANDIDATES]):
-        stays = work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
-        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0 and not stays:
+        grazes = work.candidates[row, CLOSED] == GRAZES
+        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0 and not grazes:
             heir = heir_of(scene, work, row)
             if heir >= 0:
                 own, given = work.slip[NOW, heir], work.slip[NOW, row]

@@ -11,7 +11,6 @@ from flocsim.arrays import (
     EDGE_BODY,
     GAP,
     GRAZES,
-    HELD,
     NEW,
     NOW,
     TRIAL,
@@ -46,16 +45,11 @@ def interpolate(work, step, share, body):
         motion[TRIAL, body, VELOCITY + axis] = slope / step
 
 
-def stays(work, row):
-    """Whether no step ends where a pair touches or parts: it grazes, or is held."""
-    return work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
-
-
 def margin(work, state, row):
     """What must not become negative while the flags hold [m]: the gap of a pair that is open now,
-    the overlap of a closed one; nothing of one that grazes or is held."""
+    the overlap of a closed one; nothing of one that grazes."""
     gap = work.geometry[state, row, GAP]
-    if stays(work, row):
+    if work.candidates[row, CLOSED] == GRAZES:
         return math.inf
     return -gap if work.geometry[NOW, row, GAP] < 0.0 else gap
 
@@ -63,7 +57,7 @@ def margin(work, state, row):
 def margin_rate(work, state, row):
     """Rate of change of the margin [m/s]."""
     rate = normal_rate(work, state, row)
-    if stays(work, row):
+    if work.candidates[row, CLOSED] == GRAZES:
         return 0.0
     return -rate if work.geometry[NOW, row, GAP] < 0.0 else rate
 

@@ -43,7 +43,6 @@ from flocsim.arrays import (
     FREE,
     GAP,
     GAP_OFFSET,
-    HELD,
     MASS,
     MOTION_COLUMNS,
     NOW,
@@ -148,8 +147,7 @@ def modes_of(work):
     """A number for how all listed pairs touch."""
     code = 1
     for row in range(work.tally[CANDIDATES]):
-        mode = 2 * work.candidates[row, CLOSED] + (1 if work.slip[HELD, row] != 0.0 else 0)
-        mode = 3 * mode + work.candidates[row, SLIDING] + 1
+        mode = 3 * work.candidates[row, CLOSED] + work.candidates[row, SLIDING] + 1
         code = (code * BASE + mode + 1) % MODULUS
     return code
 

@@ -1,10 +1,11 @@
-"""When pairs begin and cease to graze, and which are held: decided by forces at the end of a step.
+"""When pairs begin and cease to graze: decided by forces at the end of a step.
 
 A pair that has just parted goes on grazing (rhs/grazing.py) instead of being apart where its own
 tangential force has lifted it and all that comes of it is far below the tolerance: how high it
-would fly, and the displacement that its tangential spring would lose. One that has parted and
-touched again and again like that is held closed over its flights, without its displacement, until a
-step shows that it would have to pull. Where the tolerance resolves these, the law is followed.
+would fly, and the displacement that its tangential spring would lose. What the spring lets go of
+has to be next to nothing, too, unless the pair has parted and touched again several times like
+that: then it hums. Two contacts that throw each other open in turn do not graze: their cycles are
+followed, and left out (cycles.py). Where the tolerance resolves these, the law is followed.
 """
 
 import math
@@ -21,7 +22,6 @@ from flocsim.arrays import (
     GRAZES,
     GRAZING_FORCE,
     GRAZING_RESISTANCE,
-    HELD,
     NEW,
     NOW,
     OPEN,
@@ -36,7 +36,6 @@ from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding, memory_of
 from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
 from flocsim.laws import contact_derivatives, contact_force
 
@@ -47,7 +46,7 @@ so before, …"""
 SHARE_OF_FIRST = 1e-3
 """… and by this one where it has not, …"""
 
-FIRST_KICK = 3.0
+FIRST_KICK = 30.0
 """The speed that a tangential spring lets go of where a contact parts displaces bodies by so many
 tolerances at most, or it has to have hummed before."""
 
@@ -79,9 +78,6 @@ BEHIND = 1.01
 
 AT_ONCE = 0.02
 """What ceases within this share of a step ceases at its start."""
-
-SETTLED = 5.0
-"""A step of so many times 1/ω0 leaves a vibration at rest."""
 
 TOUCHING_GAP = -1e-30
 """The gap of a pair that touches without overlap [m]: its sign tells."""
@@ -260,43 +256,18 @@ def note_flight(work, row):
     work.slip[FLIGHT, row] = max(work.slip[FLIGHT, row], gap)
 
 
-def is_settled(scene, work, clock, row, step):
-    """Whether a step was long against the vibrations of a contact, which has come to rest in it."""
-    view = contact_view(scene, work, NOW, row)
-    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
-    return step * step * stiffness > SETTLED * SETTLED * view.effective_mass
-
-
-def hold(scene, work, clock, row, step):
-    """Whether a pair that has parted stays closed: it was apart before by far less than the
-    tolerance, and has not yet come to rest with a pull that nothing gives it."""
-    gap = work.geometry[NOW, row, GAP]
-    if True or gap > SHARE_OF_FLIGHT * clock[TOLERANCE]:
-        return False
-    if work.candidates[row, SLIDING] != 0:
-        return False
-    return work.slip[HELD, row] == 0.0 or not is_settled(scene, work, clock, row, step)
-
-
-def part(scene, work, clock, row, step):
+def part(scene, work, clock, row):
     """What becomes of a closed pair that has parted; whether it begins to graze."""
-    if hold(scene, work, clock, row, step):
-        if work.slip[HELD, row] == 0.0:
-            work.slip[NOW, row] = 0.0  # as wherever a contact parts
-        work.slip[HELD, row] = 1.0
+    if not begins(scene, work, clock, row):
         return False
-    work.slip[HELD, row] = 0.0
-    if begins(scene, work, clock, row):
-        for other in range(work.tally[CANDIDATES]):
-            if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
-                work.slip[HELD, other] = 0.0
-                enter(scene, work, other)
-        return True
-    return False
+    for other in range(work.tally[CANDIDATES]):
+        if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
+            enter(scene, work, other)
+    return True
 
 
-def settle(scene, work, clock, step):
-    """Let pairs begin and cease to graze, or to be held, at the end of a step; whether any has."""
+def settle(scene, work, clock):
+    """Let pairs begin and cease to graze at the end of a step; whether any has."""
     changed, entered = False, False
     for row in range(work.tally[CANDIDATES]):
         mode = work.candidates[row, CLOSED]
@@ -307,11 +278,9 @@ def settle(scene, work, clock, step):
             note_flight(work, row)
             if work.geometry[NOW, row, GAP] < 0.0:
                 count_flight(work, clock, row)
-        elif work.geometry[NOW, row, GAP] < 0.0:
-            work.slip[HELD, row] = 0.0
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES and work.geometry[NOW, row, GAP] >= 0.0:
-            entered = part(scene, work, clock, row, step) or entered
+            entered = part(scene, work, clock, row) or entered
     if entered:
         share_forces(work)
         for row in range(work.tally[CANDIDATES]):

@@ -4,9 +4,8 @@ Inside a step the flags stay as they are, so that the forces are smooth function
 driver ends the step where a flag would change (see crossings.py).
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, NOW, OPEN, TOUCHES
+from flocsim.arrays import CANDIDATES, CLOSED, GAP, GRAZES, NOW, OPEN, TOUCHES
 from flocsim.hooks import hook
-from flocsim.integrators.events.crossings import stays
 from flocsim.integrators.rhs.friction import set_sliding
 
 SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
@@ -15,11 +14,11 @@ which pairs touch."""
 
 
 def set_closed(work, state=NOW):
-    """Flag every listed pair by its gap in a state, but for those that graze or are held; whether
+    """Flag every listed pair by its gap in a state, but for those that graze; whether
     any has changed."""
     changed = False
     for row in range(work.tally[CANDIDATES]):
-        if stays(work, row):
+        if work.candidates[row, CLOSED] == GRAZES:
             continue
         closed = TOUCHES if work.geometry[state, row, GAP] < 0.0 else OPEN
         changed = changed or work.candidates[row, CLOSED] != closed
@@ -34,8 +33,8 @@ def leave_at_once(scene, work, clock, step):
 
 
 @hook
-def settle_grazes(scene, work, clock, step):
-    """Let pairs begin and cease to graze, or to be held, behind a step, where a method has that;
+def settle_grazes(scene, work, clock):
+    """Let pairs begin and cease to graze behind a step, where a method has that;
     whether any has."""
     return False
 

@@ -7,6 +7,7 @@ from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     CODE,
+    CYCLE_MODES,
     FULL,
     GAP,
     GEOMETRY_COLUMNS,
@@ -121,7 +122,7 @@ def accept(scene, work, clock, counts, step, lists):
             _, depth = resolutions_of(work, clock)
             add_switch_errors(scene, work, clock, step, depth)
         forget_offsets(work)
-    grazes = controlled and not across and settle_grazes(scene, work, clock, step)
+    grazes = controlled and not across and settle_grazes(scene, work, clock)
     hand_over(scene, work)
     switched = set_modes(scene, work)
     if across:
@@ -156,7 +157,7 @@ def pause_reason(clock, counts, record):
     return 0
 
 
-def keep_lists(scene, work, ahead):
+def keep_lists(scene, work, counts, ahead):
     """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
     or they are too wide; False without room."""
     if spent(scene, work, NOW) > 0.5 or too_wide(scene, work, ahead):
@@ -164,6 +165,7 @@ def keep_lists(scene, work, ahead):
             return False
         locate_contacts(scene, work, NOW)
         set_modes(scene, work)
+        counts[CYCLE_MODES] = 0
     return True
 
 
@@ -223,7 +225,7 @@ def advance(scene, work, observed, clock, counts, record):
         status = pause_reason(clock, counts, record)
         if status != 0:
             return status
-        if lists and trials == 0 and not keep_lists(scene, work, clock[STEP]):
+        if lists and trials == 0 and not keep_lists(scene, work, counts, clock[STEP]):
             return NO_ROOM
         choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)

@@ -14,7 +14,6 @@ from flocsim.arrays import (
     CLOSED,
     FIRST_STAGE,
     GAP,
-    HELD,
     NOW,
     STAGED_STEP,
     TOLERANCE,
@@ -66,7 +65,7 @@ def doubt_of_release(scene, work, clock, step):
     largest, g = 0.0, work.geometry
     least = ABOVE * above_rounding(work, NOW, 0.0)
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES and work.slip[HELD, row] == 0.0:
+        if work.candidates[row, CLOSED] == TOUCHES:
             before, after = -g[NOW, row, GAP], -g[THIRD_STAGE, row, GAP]
             if after < before and before > 0.0:
                 scatter = scatter_of(scene, work, clock, step, row)

@@ -39,7 +39,6 @@ from flocsim.arrays import (
     FREE,
     GAP,
     GRAZES,
-    HELD,
     INERTIA,
     MASS,
     MOST_PLACE,
@@ -287,7 +286,7 @@ def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0:
+        if work.candidates[row, CLOSED] == GRAZES:
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
         late = doubtful_time(work, row, step, doubt)
