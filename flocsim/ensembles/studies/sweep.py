@@ -17,6 +17,7 @@ from flocsim.ensembles.studies.opened import GROUPS, StudyResults, open_results
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number
+from flocsim.io.files import held
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
 from flocsim.io.opening import kind_of
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
@@ -179,7 +180,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
 
 def open_sweep(path: str | os.PathLike) -> SweepResults:
     """The SweepResults in a joined file; FileError for one that is absent, damaged or none."""
-    swept, groups = read_sweep(Path(path))
+    swept, groups = read_sweep(path)
     return SweepResults(Path(path), swept, groups)
 
 
@@ -191,7 +192,8 @@ def open_any(
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    kind = kind_of(Path(path))
+    source = held(path)
+    kind = kind_of(source)
     if kind == SWARM_FORMAT:
-        return read_swarm(Path(path))
-    return open_sweep(path) if kind == FORMAT else open_results(path, folder)
+        return read_swarm(source)
+    return open_sweep(source) if kind == FORMAT else open_results(source, folder)
