@@ -221,8 +221,8 @@ def trajectory_text(path):
 
 def sweep_text(path):
     """What the joined file of a sweep holds: Pr[A] at every value."""
-    swept, groups = sweep_file.read_sweep(path)
-    table = groups["probabilities"]
+    found = sweep_file.read_sweep(path)
+    swept, table = found.swept, found.labelled("probabilities")
     lines = [f"{path}: a sweep", ""]
     for name, each in swept.items():
         unit = "" if each.unit == "1" else f" {each.unit}"

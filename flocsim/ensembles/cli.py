@@ -72,8 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--no-pilot", action="store_true", help="with --dry-run: at once, without the pilot"
     )
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
-    # What Study.run says to its own process: with whom it is to end.
+    # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
     parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--plan", help=argparse.SUPPRESS)
     return parser
 
 
@@ -179,7 +180,7 @@ def study(config, comm, arguments):
     output = config.output.file
     try:
         ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet,
-                            arguments.overwrite)  # fmt: skip
+                            arguments.overwrite, arguments.plan)  # fmt: skip
     except RankZeroFailed as error:
         return error.args[0]
     except SharedError as error:

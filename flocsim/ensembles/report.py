@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.estimates.capture import MOST_UNKNOWN
 from flocsim.ensembles.estimates.statistics import HOOK
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
@@ -202,7 +203,7 @@ def undecided_line(results: Results) -> str:
         int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
     )
     none_known = failed + undecided == total
-    if not failed + undecided or not (none_known or results.kernel is not None):
+    if not failed + undecided or (results.kernel is None and not none_known):
         return ""
     notes = json.loads(str(results.run.get("failed", "[]")))
     first = f"; the first: {describe_note(notes[0])}" if notes else ""
@@ -210,10 +211,11 @@ def undecided_line(results: Results) -> str:
         ": raise integrator.max_steps or scene.time_limit, for another output" if undecided else ""
     )
     ends = f"{failed} failed and {undecided} are undecided"
-    if none_known:
+    if none_known or results.kernel is None:
         return f"no replicate has come to an outcome, {ends}{advice}{first}"
     share = np.nanmax(results.kernel.arrays["undecided"], initial=0.0)
-    open_ = "; where they are more than 5 % no estimate is given" if has_withheld(results) else ""
+    limit = f"; where they are more than {100.0 * MOST_UNKNOWN:g} % no estimate is given"
+    open_ = limit if has_withheld(results) else ""
     return (
         f"of {total} points {ends}, up to {100.0 * share:.2g} % of a pair's encounters: intervals "
         f"hold whatever they could have come to{open_}{advice}{first}"

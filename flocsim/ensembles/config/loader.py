@@ -29,7 +29,6 @@ from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
-from flocsim.io.files import held
 from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
 SCENES: dict[str, type] = {"binary": SceneConfig, "swarm": SwarmScene, "kernel": KernelScene}
@@ -175,7 +174,7 @@ class Reader:
                 f'"{NAME_OF_SHIPPED}", the one that ships with flocsim'
             )
             self.problems.note(("shapes", "file"), text)
-        return held(path)
+        return self.sources.library(path)
 
     def forces(self, table):
         """{name: force} in the fixed order, then the user's own as in the file."""

@@ -247,7 +247,9 @@ def estimate(
         weight = points.plane if flow else weight
         most = float(weight.max())
 
-        def bounds(flags: np.ndarray, weight=weight, most=most) -> tuple[float, float, float]:
+        def bounds(
+            flags: np.ndarray, weight: np.ndarray = weight, most: float = most
+        ) -> tuple[float, float, float]:
             unseen = high_share * (1.0 if flags.any() else float(weight.mean()))
             agree = bool(flags.all() or not flags.any()), unseen
             return mean_of(parts(weight * flags), agree, most * scrambles / n)
