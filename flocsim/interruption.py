@@ -131,9 +131,13 @@ def end_in_time() -> None:
 def end_with_parent(parent: int | None = None) -> None:
     """End this process when the one that started it is gone: a rank without its launcher.
 
-    ``parent``: its number, from who may be gone already by now.
+    ``parent``: its number, where it may be gone already; what multiprocessing started knows it.
     """
-    parent = os.getppid() if parent is None else parent
+    import multiprocessing
+
+    if parent is None:
+        starter = multiprocessing.parent_process()
+        parent = os.getppid() if starter is None or starter.pid is None else starter.pid
 
     def look() -> None:
         while os.getppid() == parent:

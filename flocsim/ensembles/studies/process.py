@@ -42,9 +42,11 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
     environment = os.environ | {"PYTHONUNBUFFERED": "1", **path_to_flocsim()}
+    # On Windows a virtual environment's Python is the child of a process that starts it.
+    ends_with_this = [] if os.name == "nt" else ["--parent", str(os.getpid())]
     # -P: what lies beside a config is no part of Python.
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "flocsim", *words, "--parent", str(os.getpid())],
+        [sys.executable, "-P", "-m", "flocsim", *words, *ends_with_this],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         cwd=folder, env=environment, encoding="utf-8", errors="replace",
     ) as process:  # fmt: skip
