@@ -52,7 +52,10 @@ def grow(beta, volume, start, times):
 def kernels(kernel, vertices):
     """(β of shapes that meet and stick, β of spheres that always do) [m³/s], mechanisms added."""
     v = kernel.vertices.tolist().index(vertices)
-    return tuple(kernel.arrays[name][:, v].sum(axis=0) for name in ("beta3", "beta3_reference"))
+    found = tuple(kernel.arrays[name][:, v].sum(axis=0) for name in ("beta3", "beta3_reference"))
+    if np.isnan(found[0]).any():
+        raise SystemExit("kernels are not known: too many points are undecided, or pairs not run")
+    return found
 
 
 def mean_radius(n, volume):

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from flocsim.ensembles.studies.compare import Comparison, compare
     from flocsim.ensembles.studies.opened import StudyResults
     from flocsim.ensembles.studies.study import Study
-    from flocsim.ensembles.studies.sweep import SweepResults, sweep
     from flocsim.ensembles.studies.sweep import open_any as open
+    from flocsim.ensembles.studies.sweep import sweep
     from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from flocsim.integrators.base import Status
     from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
+    from flocsim.io.results.sweep_file import SweepResults
     from flocsim.swarms.swarm import Swarm
     from flocsim.swarms.trajectory import SwarmTrajectory
     from flocsim.swarms.walls import floor, wall
@@ -45,7 +46,7 @@ HOMES = {
     "Study": "ensembles.studies.study",
     "Comparison": "ensembles.studies.compare",
     "StudyResults": "ensembles.studies.opened",
-    "SweepResults": "ensembles.studies.sweep",
+    "SweepResults": "io.results.sweep_file",
     "System": "system",
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.studies.compare",

@@ -32,6 +32,7 @@ from flocsim.commands import (
     work_precision,
 )
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
+from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError
 
 COMMANDS = (
@@ -42,6 +43,11 @@ COMMANDS = (
 
 STUDIES = {"ensemble", "kernel", "swarm"}
 """Commands that run studies, also under mpirun."""
+
+ALONE = (
+    "flocsim: {} is the work of one rank, the others of this job have ended: start it without a "
+    "launcher, and with --jobs where it has that"
+)
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -66,6 +72,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             with silent_unless_first():
                 arguments = make_parser().parse_args(argv)
+            if launched_rank() > 0:
+                return 0  # what is no study is one rank's work
+            if (launched_size() or 0) > 1:
+                print(ALONE.format(arguments.command), file=sys.stderr)
         code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

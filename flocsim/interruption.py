@@ -18,6 +18,9 @@ from typing import Any
 STOPPED = 75
 """Exit code of a run that was stopped early and can be resumed."""
 
+WITHHELD = 65
+"""Exit code of a study that is complete, but leaves rates open: too many points are undecided."""
+
 INTERRUPTED = 130
 """Exit code where somebody insists: a second signal ends the process at once."""
 
@@ -37,7 +40,7 @@ INSISTENCE = 0.25
 """Seconds within which a second signal is taken for the same one: a launcher forwards what the
 whole process group has got as well."""
 
-PARENT_SECONDS = 1.0
+PARENT_SECONDS = 0.5
 """Seconds between two looks at whether the launcher still lives."""
 
 SIGNALS = tuple(
@@ -125,9 +128,16 @@ def end_in_time() -> None:
     INTERRUPTION.leave(STOPPED)
 
 
-def end_with_parent() -> None:
-    """End this process when the one that started it is gone: a rank without its launcher."""
-    parent = os.getppid()
+def end_with_parent(parent: int | None = None) -> None:
+    """End this process when the one that started it is gone: a rank without its launcher.
+
+    ``parent``: its number, where it may be gone already; what multiprocessing started knows it.
+    """
+    import multiprocessing
+
+    if parent is None:
+        starter = multiprocessing.parent_process()
+        parent = os.getppid() if starter is None or starter.pid is None else starter.pid
 
     def look() -> None:
         while os.getppid() == parent:

@@ -29,6 +29,7 @@ from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io import trajectory
+from flocsim.io.files import held
 from flocsim.io.opening import kind_of
 from flocsim.io.results import strength_file, swarm_file, sweep_file
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview, read_results
@@ -70,9 +71,10 @@ def run(args: Namespace) -> int:
     if not args.config:
         print(text_of(args.results))
         return 0
-    swarm = kind_of(args.results) == swarm_file.FORMAT
+    source = held(args.results)
+    swarm = kind_of(source) == swarm_file.FORMAT
     read = swarm_file.read_swarm if swarm else partial(read_results, replicates=False)
-    results = read(args.results)
+    results = read(source)
     if results.run.get("config"):
         sys.stdout.write(str(results.run["config"]))
     else:
@@ -82,6 +84,7 @@ def run(args: Namespace) -> int:
 
 def text_of(path):
     """What a file holds, of whatever kind it is."""
+    path = held(path)
     kind = kind_of(path)
     if kind == trajectory.KIND:
         return trajectory_text(path)
@@ -218,8 +221,8 @@ def trajectory_text(path):
 
 def sweep_text(path):
     """What the joined file of a sweep holds: Pr[A] at every value."""
-    swept, groups = sweep_file.read_sweep(path)
-    table = groups["probabilities"]
+    found = sweep_file.read_sweep(path)
+    swept, table = found.swept, found.labelled("probabilities")
     lines = [f"{path}: a sweep", ""]
     for name, each in swept.items():
         unit = "" if each.unit == "1" else f" {each.unit}"

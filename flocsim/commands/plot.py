@@ -140,6 +140,7 @@ def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
     from flocsim.io import trajectory
+    from flocsim.io.files import held
     from flocsim.io.opening import kind_of
     from flocsim.io.results import strength_file, swarm_file, sweep_file
     from flocsim.io.results.file import read_results
@@ -149,6 +150,7 @@ def read_content(path):
     if (journal := journal_of(path)) is not None:
         found = read_unfinished(journal)
         return found.results, FIGURES, found.progress
+    path = held(path)
     kind = kind_of(path)
     if kind == trajectory.KIND:
         moved = trajectory.read_trajectory(path)

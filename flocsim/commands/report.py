@@ -8,7 +8,7 @@ from flocsim.commands.reporting.examples import examples_of
 from flocsim.commands.reporting.page import report_page
 from flocsim.ensembles.studies.opened import open_results
 from flocsim.errors import UsageError
-from flocsim.io.files import write_file
+from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.own_mark import marked
 from flocsim.io.results.file import read_overview
@@ -42,10 +42,11 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--output {path}: a page's name must end in .html")
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.results])
-    results, totals = read_overview(args.results)
+    source = held(args.results)
+    results, totals = read_overview(source)
     examples = []
     if not args.no_motion:
-        examples = examples_of(open_results(args.results, args.folder))
+        examples = examples_of(open_results(source, args.folder))
     page = report_page(str(args.results), results, totals, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:

@@ -68,7 +68,7 @@ def run(args: Namespace) -> int:
         raise UsageError("--over names one key twice: give all its values at once")
     output = args.output or f"{Path(args.config).stem}-sweep.h5"
     if args.dry_run:
-        for path, part in planned(study, over, Path(output)):
+        for path, part in planned(study, over, Path(output)).items():
             words = " ".join(f"--set {quoted(f'{k}={v}')}" for k, v in settings_of(part.overrides))
             tell(f"flocsim ensemble {quoted(args.config)} {words} -o {quoted(str(path))}")
         return 0

@@ -19,7 +19,7 @@ from flocsim.ensembles.parallel.communicator import (
 )
 from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
-from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED
+from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, WITHHELD, end_with_parent
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
@@ -72,6 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--no-pilot", action="store_true", help="with --dry-run: at once, without the pilot"
     )
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
+    # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
+    parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--plan", help=argparse.SUPPRESS)
     return parser
 
 
@@ -177,7 +180,7 @@ def study(config, comm, arguments):
     output = config.output.file
     try:
         ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet,
-                            arguments.overwrite)  # fmt: skip
+                            arguments.overwrite, arguments.plan)  # fmt: skip
     except RankZeroFailed as error:
         return error.args[0]
     except SharedError as error:
@@ -201,13 +204,19 @@ def study(config, comm, arguments):
 
 
 def verdict(results, output):
-    """0, or the code of an error where not one replicate has come to an outcome: said why."""
-    from flocsim.ensembles.report import undecided_line
+    """0, or the code of an error where not one replicate has come to an outcome, or of rates that
+    are left open: said why."""
+    from flocsim.ensembles.report import has_withheld, undecided_line
 
     line = undecided_line(results)
-    if line:
-        tell(f"flocsim: {line}; the rows are in {output}", sys.stderr)
-    return INTERNAL if line else 0
+    if not line:
+        return 0
+    table = results.probabilities
+    unknown = table["n_failed"] + table["n_undecided"]
+    none_known = unknown.sum() == table["n_total"].sum()
+    kind = "" if none_known else "warning: "
+    tell(f"flocsim: {kind}{line}; the rows are in {output}", sys.stderr)
+    return INTERNAL if none_known else WITHHELD if has_withheld(results) else 0
 
 
 def report(ended, output):
@@ -311,6 +320,8 @@ def on_process(comm, arguments):
 
 
 def run_command(arguments: argparse.Namespace) -> int:
+    if arguments.parent is not None:
+        end_with_parent(arguments.parent)
     comm: Communicator = SerialCommunicator()
     try:
         comm = find_communicator()

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
+from flocsim.ensembles.estimates.capture import MOST_UNKNOWN
 from flocsim.ensembles.estimates.statistics import HOOK
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
@@ -134,30 +135,31 @@ def kernel_lines(kernel: Kernel) -> list[str]:
             f"warning: up to {100.0 * edge:.2g} % of what aggregates came from the outermost "
             "offsets, so that attraction may reach farther than was sampled"
         )
-    undecided = np.nanmax(kernel.arrays["undecided"], initial=0.0)
-    if undecided > 0.0:
-        lines.append(
-            f"up to {100.0 * undecided:.2g} % of a pair's encounters are undecided or failed: they "
-            "count as not aggregated"
-        )
     return lines
 
 
 def kernel_row(kernel, place):
     """One pair of size classes; nothing for bodies that do not meet."""
     found = {name: float(values[place]) for name, values in kernel.arrays.items()}
-    if not found["width_c"] > 0.0:
+    if found["width_c"] == 0.0:
         return ()
-    error = max(found["alpha"] - found["alpha_low"], found["alpha_high"] - found["alpha"])
-    spread = max(found["beta3"] - found["beta3_low"], found["beta3_high"] - found["beta3"])
-    numerical = found["alpha_numerical"]
-    told = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
-    alpha = "-" if np.isnan(found["alpha"]) else f"{share(found['alpha'])} +-{share(error)} {told}"
+
+    def told(name, form, scale=1.0, spread=None):
+        """An estimate with its error by a function ``spread``; where it is not known, its ends."""
+        value, low, high = (scale * found[name + end] for end in ("", "_low", "_high"))
+        if np.isnan(value):
+            return "-" if np.isnan(high) else f"[{form(low)}, {form(high)}]"
+        return form(value) + (f" +-{spread(max(value - low, high - value))}" if spread else "")
+
+    numerical, few = found["alpha_numerical"], "{:.3g}".format
+    added = "" if np.isnan(found["alpha"]) else (
+        " -" if np.isnan(numerical) else f" +-{share(numerical)}"
+    )  # fmt: skip
     return (
         visible(kernel.labels[place[2]], ""), visible(kernel.labels[place[3]], ""),
-        f"{1e6 * found['width_c']:.2f}", f"{1e6 * found['width_a']:.2f}", alpha,
-        f"{found['beta2']:.3g}", f"{found['beta3']:.3g} +-{spread:.1g}",
-        f"{found['efficiency3']:.3f}",
+        told("width_c", "{:.2f}".format, 1e6), told("width_a", "{:.2f}".format, 1e6),
+        told("alpha", share, spread=share) + added, told("beta2", few),
+        told("beta3", few, spread="{:.1g}".format), told("efficiency3", "{:.3f}".format),
     )  # fmt: skip
 
 
@@ -180,20 +182,43 @@ def touch_lines(results: Results) -> list[str]:
     return lines
 
 
+def has_withheld(results: Results) -> bool:
+    """Whether rates are left open, as too many of their points are undecided or failed."""
+    if results.kernel is None:
+        return False
+    arrays = results.kernel.arrays
+    unknown = [np.isnan(arrays[name]) & ~np.isnan(arrays[f"{name}_high"]) for name in OPEN]
+    return bool(np.any(unknown))
+
+
+OPEN = ("alpha", "beta2", "beta3", "efficiency3")
+"""What is looked at for that."""
+
+
 def undecided_line(results: Results) -> str:
-    """What to say where no replicate has missed or come to a class; "" where one has."""
+    """What to say where no replicate has missed or come to a class, and of rates where there is any
+    such; "" else."""
     table = results.probabilities
     total, failed, undecided = (
         int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
     )
-    if total == 0 or failed + undecided < total:
+    none_known = failed + undecided == total
+    if not failed + undecided or (results.kernel is None and not none_known):
         return ""
     notes = json.loads(str(results.run.get("failed", "[]")))
     first = f"; the first: {describe_note(notes[0])}" if notes else ""
-    advice = ": raise integrator.max_steps or scene.time_limit" if undecided else ""
+    advice = (
+        ": raise integrator.max_steps or scene.time_limit, for another output" if undecided else ""
+    )
+    ends = f"{failed} failed and {undecided} are undecided"
+    if none_known or results.kernel is None:
+        return f"no replicate has come to an outcome, {ends}{advice}{first}"
+    share = np.nanmax(results.kernel.arrays["undecided"], initial=0.0)
+    limit = f"; where they are more than {100.0 * MOST_UNKNOWN:g} % no estimate is given"
+    open_ = limit if has_withheld(results) else ""
     return (
-        f"no replicate has come to an outcome, {failed} failed and {undecided} are undecided"
-        f"{advice}{first}"
+        f"of {total} points {ends}, up to {100.0 * share:.2g} % of a pair's encounters: intervals "
+        f"hold whatever they could have come to{open_}{advice}{first}"
     )
 
 

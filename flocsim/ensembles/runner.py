@@ -47,6 +47,7 @@ from flocsim.ensembles.pilot.ladder import Job, trial
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
+from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study, flocs_of
@@ -108,14 +109,15 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
 
 def run_to_file(
     config: Config, comm: Communicator, output: str | Path, mode: str, quiet: bool = True,
-    overwrite: bool = False,
+    overwrite: bool = False, plan: str | None = None,
 ) -> Ended:  # fmt: skip
     """Run a config's study into the results file ``output``: how it Ended.
 
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
     finished goes into a journal beside the file, and from there into the file when all is. Rank 0
     locks it before it does anything else, and to the end. ``overwrite``: what lies at ``output``
-    and is not to be extended is kept under another name.
+    and is not to be extended is kept under another name. ``plan``: that of a sweep, which says what
+    study this has to be.
     """
     if comm.rank > 0:
         return follow(join(config, comm).study, comm)
@@ -127,6 +129,8 @@ def run_to_file(
         joint = join(config, comm, records, quiet)
         progress = Progress(joint.study.size, quiet)
         with sharing_errors(comm):
+            if plan is not None:
+                refuse_other_part(plan, str(output), joint.identity)
             start = begin(
                 joint.study, joint.identity, output, mode, journal, joint.cpus, overwrite,
                 joint.accuracy,

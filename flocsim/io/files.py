@@ -20,7 +20,7 @@ from typing import BinaryIO
 import attrs
 
 from flocsim.errors import FileError
-from flocsim.io.pieces import is_in_pieces, size_of_pieces
+from flocsim.io.pieces import PIECES_LINE, is_in_pieces, size_of_pieces
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
@@ -344,6 +344,38 @@ def check_writable(path: str | os.PathLike, suffix: str = "") -> None:
         raise unwritable(path, error) from error
 
 
+@attrs.frozen
+class Held(os.PathLike):
+    """A path, and the end of the file that lay there, which has the digest of all of it: whoever
+    reads it later, wherever a path is taken, reads that file or is told that it has changed."""
+
+    path: Path
+    end: bytes
+
+    def __fspath__(self) -> str:
+        return os.fspath(self.path)
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+
+def held(path: str | os.PathLike) -> str | os.PathLike:
+    """A path to be read more than once, as Held; as it is, where no ordinary file lies there."""
+    if isinstance(path, Held) or not os.path.isfile(path):
+        return path
+    try:
+        with open(path, "rb") as file:
+            return Held(Path(path), end_of(file))
+    except OSError:
+        return path  # who reads it says so
+
+
+def end_of(file):
+    """The end of an open file, whichever seal it has."""
+    file.seek(max(file.seek(0, os.SEEK_END) - max(SEAL_LENGTH, PIECES_LINE), 0))
+    return file.read()
+
+
 def seal(data: bytes) -> bytes:
     """The bytes of an HDF5 file with their checksum appended."""
     return data + seal_of(hashlib.blake2b(data, digest_size=32))
@@ -371,6 +403,9 @@ def checked_sealed(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, int]]:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path} could not be read: {reason}; check the name") from error
     with file:
+        if isinstance(path, Held) and path.end != end_of(file):
+            raise FileError(f"{path} has changed since it was opened: open it again")
+        file.seek(0)
         size = check_seal(path, file)
         file.seek(0)
         yield file, size

@@ -1,8 +1,8 @@
 """An HDF5 file that flocsim wrote, opened: its checksum first, then its structure, then h5py."""
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from flocsim.errors import FileError, UsageError
@@ -30,7 +30,7 @@ def parsed(data: BinaryIO, size: int) -> Iterator[tuple[Any, dict[str, Node]]]:
 
 @contextlib.contextmanager
 def opened_file(
-    path: str | Path, complaint: Callable[[str], str]
+    path: str | os.PathLike, complaint: Callable[[str], str]
 ) -> Iterator[tuple[Any, dict[str, Node]]]:
     """(open h5py file, its structure), once checksum and structure were found right.
 
@@ -52,7 +52,7 @@ def text_of(file: Any, nodes: dict[str, Node], name: str) -> str:
     return str(file.attrs[name]) if known == ("text", ()) else ""
 
 
-def kind_of(path: str | Path) -> str:
+def kind_of(path: str | os.PathLike) -> str:
     """What a file says that it is, its `kind` or `format`; "" where that cannot be read: who then
     reads it as one of these says what is wrong.
 

@@ -1,6 +1,7 @@
 """Trajectory files: one replicate's motion in HDF5."""
 
 import io
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -121,7 +122,7 @@ class StoredTrajectory:
         return f"replicate {self.facts['replicate']}" if "replicate" in self.facts else "motion"
 
 
-def read_trajectory(path: str | Path) -> StoredTrajectory:
+def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
     """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
     with opened_file(
         path, lambda reason: f"{path} holds no readable trajectory: {reason}; write it again"

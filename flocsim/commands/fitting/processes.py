@@ -6,10 +6,8 @@ A task that raises, runs out of memory or has its process killed gives a `Lost` 
 import contextlib
 import functools
 import multiprocessing
-import os
 import signal
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
@@ -19,6 +17,7 @@ from typing import Any
 import attrs
 
 from flocsim.errors import FlocsimError
+from flocsim.interruption import end_with_parent
 
 AHEAD = 2
 """Tasks for each process that are handed out before there are results: none has to wait."""
@@ -150,11 +149,4 @@ def result_of(future):
 def begin_process():
     """Ctrl-C is the parent's to handle; without a parent there is nobody to work for."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=end_after, args=(parent,), daemon=True).start()
-
-
-def end_after(parent):
-    parent.join()
-    os._exit(FlocsimError.exit_code)
+    end_with_parent()

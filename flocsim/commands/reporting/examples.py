@@ -25,7 +25,7 @@ class Example:
 
 def examples_of(opened: StudyResults) -> list[Example]:
     """The first replicate of each class that the file has, of its flocs with the most vertices."""
-    found = first_of_each(opened.path)
+    found = first_of_each(opened.source)
     return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
 
 

@@ -174,7 +174,7 @@ class Reader:
                 f'"{NAME_OF_SHIPPED}", the one that ships with flocsim'
             )
             self.problems.note(("shapes", "file"), text)
-        return path
+        return self.sources.library(path)
 
     def forces(self, table):
         """{name: force} in the fixed order, then the user's own as in the file."""

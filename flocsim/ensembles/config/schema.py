@@ -11,6 +11,7 @@ named.
 """
 
 import itertools
+import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -456,9 +457,8 @@ class ShapesConfig:
         shown='"synthetic"',
         help="grown by flocsim, or fitted to images",
     )
-    file: Path | None = attrs.field(
+    file: str | os.PathLike | None = attrs.field(
         default=None,
-        converter=attrs.converters.optional(Path),
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",

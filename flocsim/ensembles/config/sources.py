@@ -14,6 +14,7 @@ from types import CodeType, ModuleType
 import attrs
 
 from flocsim.ensembles.config.toml_text import read_text_file
+from flocsim.io.files import held
 
 INSTALLED = ("site-packages", "dist-packages")
 """Folders whose modules are no part of a study, even where they lie below its config."""
@@ -22,10 +23,16 @@ INSTALLED = ("site-packages", "dist-packages")
 @attrs.define(eq=False)
 class Sources:
     """What has been read: ``config`` is the text of the config file, None before that; ``modules``
-    has the bytes of the user's modules by their place, relative to the config's folder."""
+    has the bytes of the user's modules by their place, relative to the config's folder;
+    ``libraries`` the shape libraries by their paths, which are to stay as they were."""
 
     config: str | None = None
     modules: dict[str, bytes] = attrs.Factory(dict)
+    libraries: dict[str, str | os.PathLike] = attrs.Factory(dict)
+
+    def library(self, path: Path) -> str | os.PathLike:
+        """A shape library's path, held from when it was first named."""
+        return self.libraries.setdefault(str(path), held(path))
 
     def text(self, path: str | os.PathLike) -> str:
         """The text of the config file; ConfigError where it cannot be read."""

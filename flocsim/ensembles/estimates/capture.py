@@ -15,6 +15,14 @@ for shapes (they lie in the plane) and for forces in a flow.
 Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all
 points agree, it is Wilson's at their number. What numerics do is bounded by the share of points
 that flip where run again (`estimates.numerical`), times the largest weight of a point.
+
+A point that is undecided or has failed has no χ, or only χ_c, where it had touched. What it could
+do is in the interval (Manski's bounds): its low end is that of χ = 0 at all such points, its high
+end that of χ = 1. As χ, whichever it is taken for, follows from the point alone, the means of the
+scrambles are independent draws of either bound, and Student's interval holds for each by itself:
+from the low end of the one to the high end of the other covers whatever the points would have come
+to. The estimate is that of the decided points, whose flux stands for all, and NaN where the others
+are more than MOST_UNKNOWN of the flux: what is undecided is no sample, but what takes longest.
 """
 
 import math
@@ -35,6 +43,9 @@ from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
 UNKNOWN = [OUTCOMES.index(name) for name in ("undecided", "failed")]
 COLUMNS = ("outcome", "inside", "checked_outcome", "checked_inside", "floc_i", "floc_j")
+MOST_UNKNOWN = 0.05
+"""Share of the flux that may be unknown where there is an estimate."""
+
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
 
@@ -103,12 +114,26 @@ def weighted(
     return Weighted(*found)
 
 
-def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, np.ndarray]:
-    """{c, inside, a: χ (n,)} of codes as in the results file."""
+@attrs.frozen(eq=False)
+class Chi:
+    """χ (n,) of points: ``least`` where the unknown ones are taken for 0, ``most`` for 1."""
+
+    least: np.ndarray
+    most: np.ndarray
+
+    @property
+    def known(self) -> np.ndarray:
+        """Whether it is known."""
+        return self.least == self.most
+
+
+def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, Chi]:
+    """{c, inside, a: Chi} of codes as in the results file."""
+    unknown, touched = np.isin(outcome, UNKNOWN), inside != NOT_APPLICABLE
+    least = {"c": touched, "inside": inside == 1, "a": np.isin(outcome, BOUND)}
     return {
-        "c": inside != NOT_APPLICABLE,
-        "inside": inside == 1,
-        "a": np.isin(outcome, BOUND),
+        name: Chi(each, each | (unknown if name == "a" else unknown & ~touched))
+        for name, each in least.items()
     }
 
 
@@ -159,23 +184,24 @@ def ratio_of(
 
 def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, float]:
     """(low, high) of an efficiency (value, low, high), at least Wilson's where all encounters that
-    touched, or none of them, aggregated."""
+    touched, or none of them, aggregated; never above 1."""
     _, low, high = ends
     if touched and bound in (0, touched):
         least, most = (float(end) for end in wilson(bound, touched))
-        return min(low, least), max(high, most)
-    return low, high
+        low, high = min(low, least), max(high, most)
+    return low, min(high, 1.0)
 
 
 @attrs.define(eq=False)
 class Estimated:
     """The numbers of one condition, but for what numerics do: ``values`` {name: number},
-    ``flipped`` {X: how many}, ``checked`` and ``trials``; ``largest`` {name: how much a point
-    that flips changes the estimate, over the share of those that do}."""
+    ``flipped`` and ``checked`` {X: how many, of those that are known both times}, and ``trials``;
+    ``largest`` {name: how much a point that flips changes the estimate, over the share of those
+    that do}."""
 
     values: dict[str, float]
     flipped: dict[str, int]
-    checked: int
+    checked: dict[str, int]
     trials: int
     largest: dict[str, float]
 
@@ -185,15 +211,25 @@ def flow_width(plane: float, factor: float) -> float:
     return 2.0 * math.sqrt(max(plane, 0.0) / factor)
 
 
+def known_part(value: float, weight: np.ndarray, known: np.ndarray) -> float:
+    """What a sum over the ``known`` points is with all of them, in proportion to the weights; NaN
+    where they lack too much."""
+    unknown = float(np.sum(weight * ~known) / np.sum(weight))
+    return value / (1.0 - unknown) if unknown <= MOST_UNKNOWN else math.nan
+
+
 def estimate(
     points: Weighted, rows: dict[str, np.ndarray], meeting: str, rate: float | None, scrambles: int
 ) -> Estimated:
     """What the points of a condition come to."""
     chi = became(rows["outcome"], rows["inside"])
     n = len(points.plane)
-    checked = rows["checked_outcome"] != NOT_APPLICABLE
     again = became(rows["checked_outcome"], rows["checked_inside"])
-    flipped = {name: int(np.sum(checked & (chi[name] != again[name]))) for name in WHAT}
+    run_again = rows["checked_outcome"] != NOT_APPLICABLE
+    checked = {name: run_again & chi[name].known & again[name].known for name in WHAT}
+    flipped = {
+        name: int(np.sum(checked[name] & (chi[name].least != again[name].least))) for name in WHAT
+    }
 
     def parts(values: np.ndarray) -> np.ndarray:
         """The means of the scrambles, which replicates belong to in turn."""
@@ -201,7 +237,6 @@ def estimate(
 
     values: dict[str, float] = {}
     largest: dict[str, float] = {}
-    by_scramble: dict[str, np.ndarray] = {}
     high_share = float(wilson(0, n)[1])
     columns = {
         "beta2_c": (points.plane, "c"), "beta2": (points.plane, "a"),
@@ -210,47 +245,73 @@ def estimate(
     for name, (weight, what) in columns.items():
         flow = name.startswith("width") and meeting != SETTLING
         weight = points.plane if flow else weight
-        agrees = bool(chi[what].all() or not chi[what].any())
-        unseen = high_share * (1.0 if chi[what].any() else float(weight.mean()))
-        by_scramble[name] = parts(weight * chi[what])
-        point = float(weight.max()) * scrambles / n
-        ends = list(mean_of(by_scramble[name], (agrees, unseen), point))
         most = float(weight.max())
+
+        def bounds(
+            flags: np.ndarray, weight: np.ndarray = weight, most: float = most
+        ) -> tuple[float, float, float]:
+            unseen = high_share * (1.0 if flags.any() else float(weight.mean()))
+            agree = bool(flags.all() or not flags.any()), unseen
+            return mean_of(parts(weight * flags), agree, most * scrambles / n)
+
+        least, low, _ = bounds(chi[what].least)
+        ends = [known_part(least, weight, chi[what].known), low, bounds(chi[what].most)[2]]
         if flow:
             assert rate is not None
             factor = rate * (1.0 if meeting == SHEAR else 2.0)
             # As the width grows with the root of the rate, it changes by dK/(G W/2).
-            width = max(flow_width(ends[0], factor), flow_width(float(weight.mean()) / n, factor))
+            width = max(flow_width(least, factor), flow_width(float(weight.mean()) / n, factor))
             most *= 2.0 / (factor * width)
             ends = [flow_width(each, factor) for each in ends]
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         largest[name] = most
-    for name, (above, below) in {
-        "alpha": (by_scramble["beta2"], by_scramble["beta2_c"]),
-        "efficiency2": (by_scramble["beta2"], parts(points.reference[0])),
-        "efficiency3": (by_scramble["beta3"], parts(points.reference[1])),
-    }.items():
-        weight = points.space if name == "efficiency3" else points.plane
-        sure = name == "alpha" and np.array_equal(chi["a"], chi["c"])
+    touched, stays = chi["c"], chi["a"]
+    for name, weight, (under, over) in (
+        # The unknown lower α most where all touch and none stays, and raise it where all stay.
+        ("alpha", points.plane, (points.plane * touched.least, points.plane * touched.most)),
+        ("efficiency2", points.plane, (points.reference[0],) * 2),
+        ("efficiency3", points.space, (points.reference[1],) * 2),
+    ):
+        sure = name == "alpha" and np.array_equal(stays.least, touched.least)
         point = 0.0 if sure else float(weight.max()) * scrambles / n
-        ends = list(ratio_of(above, below, point))
+        ratios = [ratio_of(parts(weight * each), parts(over), point)
+                  for each in (stays.least, stays.most)]  # fmt: skip
+        ends = [known_part(ratios[0][0], weight, stays.known), ratios[0][1], ratios[1][2]]
         if name == "alpha":
-            ends[1:] = widened(ends, int(np.sum(chi["c"] & chi["a"])), int(np.sum(chi["c"])))
+            ends = [alpha_of(points.plane, touched, stays)]
+            ends += [
+                widened(each, int(np.sum(flags)), int(np.sum(touched.most)))[side]
+                for side, each, flags in zip((0, 1), ratios, (stays.least, stays.most), strict=True)
+            ]
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
-        largest[name] = float(weight.max() / below.mean()) if below.mean() > 0.0 else math.nan
+        below = float(parts(under).mean())
+        largest[name] = float(weight.max()) / below if below > 0.0 else math.nan
     unknown = np.isin(rows["outcome"], UNKNOWN)
-    caught = float(np.sum(points.plane * chi["a"]))
+    caught = float(np.sum(points.plane * stays.least))
+    edge = float(np.sum(points.plane * stays.least * points.edge))
     values |= {
         "beta2_reference": float(points.reference[0].mean()),
         "beta3_reference": float(points.reference[1].mean()),
         "speed": float(points.speed.mean()),
-        "checked": float(checked.sum()),
+        "checked": float(run_again.sum()),
         "undecided": float(np.sum(points.plane * unknown) / np.sum(points.plane)),
-        "edge": float(np.sum(points.plane * chi["a"] * points.edge)) / caught if caught else 0.0,
+        "edge": edge / caught if caught else 0.0,
     }
+    counts = {name: int(each.sum()) for name, each in checked.items()}
     for name, count in flipped.items():
-        values[f"flips_{name}"] = count / checked.sum() if checked.any() else math.nan
-    return Estimated(values, flipped, int(checked.sum()), n, largest)
+        values[f"flips_{name}"] = count / counts[name] if counts[name] else math.nan
+    return Estimated(values, flipped, counts, n, largest)
+
+
+def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi) -> float:
+    """Of the flux that touches, and of which it is known what becomes of it, what aggregates; NaN
+    where there is none, or the rest is too much of all that touches or may have."""
+    seen = touched.least & stays.known
+    flux = float(np.sum(weight * seen))
+    lost = float(np.sum(weight * ~stays.known))
+    if not flux > 0.0 or lost > MOST_UNKNOWN * float(np.sum(weight * touched.most)):
+        return math.nan
+    return float(np.sum(weight * stays.least)) / flux
 
 
 def of_what(name: str) -> Sequence[str]:
@@ -268,7 +329,7 @@ def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> di
     for what in WHAT:
         counts = np.zeros((3, *shape))
         for place, each in found.items():
-            counts[(slice(None), *place)] = each.flipped[what], each.checked, each.trials
+            counts[(slice(None), *place)] = each.flipped[what], each.checked[what], each.trials
         bounds[what] = numerical_error(*counts)
     told: dict[tuple, dict] = {}
     for place, each in found.items():

@@ -11,7 +11,7 @@ from typing import Any
 
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.errors import FlocsimError
-from flocsim.interruption import INTERRUPTION, STOPPED, install, stop_requested
+from flocsim.interruption import INTERRUPTION, STOPPED, end_with_parent, install, stop_requested
 
 LAST_SECONDS = 5.0
 """Seconds in which the others end by themselves when the work is done."""
@@ -124,5 +124,6 @@ def start_processes(
 def join_job(target, rank, jobs, pipe, life, arguments):
     """Where a process that rank 0 has started begins."""
     install()
+    end_with_parent()
     INTERRUPTION.speaks = False
     sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}, life={0: life}), arguments))

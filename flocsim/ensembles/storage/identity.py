@@ -46,10 +46,18 @@ list against all that a replicate imports."""
 PACKAGE = Path(__file__).parents[2]
 
 
-def identity_of(study: Study) -> dict:
-    """{name: text or number} of all that the rows of a Study follow from."""
+def machine_facts() -> dict:
+    """What all studies of this process follow from: flocsim's code, and how the machine rounds."""
+    return {"code": physics_digest(), "arithmetic": arithmetic_digest()}
+
+
+def identity_of(study: Study, machine: dict | None = None) -> dict:
+    """{name: text or number} of all that the rows of a Study follow from.
+
+    ``machine``: the machine_facts, where they are known.
+    """
     config = study.config
-    facts = {"seed": config.seed, "code": physics_digest(), "arithmetic": arithmetic_digest()}
+    facts = {"seed": config.seed} | (machine or machine_facts())
     for table in ("scene", "shapes", "bodies", "fluid", "zone"):
         facts |= settings(table, getattr(config, table))
     if config.shapes.own is not None:

@@ -2,12 +2,11 @@
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from flocsim.errors import FlocsimError
@@ -30,73 +29,38 @@ def dealt(
     tasks. A FlocsimError there is raised here; LostProcess where a process dies. None of them
     outlives the iteration, whatever ends it, nor this process, if it is killed.
     """
+    others = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
-    waiting, busy = list(reversed(tasks)), {}
-    processes: dict[Connection, BaseProcess] = {}
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), context, begin_process, (begin, given))
+    mine: set = set()
     try:
-        for _ in range(min(jobs, len(tasks))):
-            pipe, far_end = context.Pipe()
-            process = context.Process(target=serve, args=(far_end, begin, given), daemon=True)
-            processes[pipe] = process
-            with deaf_to_interrupts():
-                process.start()
-            far_end.close()
-            busy[pipe] = waiting.pop()
-            send(pipe, busy[pipe], process)
-        while busy:
-            ready: Any = wait(list(busy))
-            for pipe in ready:
-                answer = received(pipe, processes[pipe])
-                task = busy.pop(pipe)
-                if waiting:
-                    busy[pipe] = waiting.pop()
-                    send(pipe, busy[pipe], processes[pipe])
-                yield task, answer
+        with deaf_to_interrupts():  # they begin with the tasks
+            asked = {pool.submit(answer, task): task for task in tasks}
+        mine = set(multiprocessing.active_children()) - others
+        for done in as_completed(asked):
+            yield asked[done], done.result()
+    except BrokenProcessPool:
+        for process in mine:
+            process.join(LAST_SECONDS)
+        codes = {process.exitcode for process in mine} - {None, 0, -signal.SIGTERM}
+        raise LostProcess(
+            f"a process that tested doublets has died (exit code {min(codes, default=0)}): see "
+            "that there is memory for all of --jobs, and go on with --resume"
+        ) from None
     finally:
-        end(processes.values())
-
-
-def send(pipe: Connection, task: Any, process: BaseProcess) -> None:
-    """Hand over a task; LostProcess where there is nobody to take it."""
-    try:
-        pipe.send(task)
-    except OSError:
-        raise lost(process) from None
-
-
-def received(pipe: Connection, process: BaseProcess) -> Any:
-    """An answer; LostProcess where there will be none, or the FlocsimError in its place."""
-    try:
-        answer = pipe.recv()
-    except (EOFError, OSError):
-        raise lost(process) from None
-    if isinstance(answer, FlocsimError):
-        raise answer
-    return answer
-
-
-def lost(process):
-    """The LostProcess of a process that has gone."""
-    process.join(LAST_SECONDS)
-    return LostProcess(
-        f"a process that tested doublets has died (exit code {process.exitcode}): see that there "
-        "is memory for all of --jobs, and go on with --resume"
-    )
-
-
-def end(processes):
-    """End them at once: what they were at is begun anew by whoever goes on."""
-    begun = [each for each in processes if each.pid is not None]
-    for process in begun:
-        process.kill()
-    for process in begun:
-        process.join(LAST_SECONDS)
+        # At once: what they were at is begun anew by whoever goes on.
+        mine |= set(multiprocessing.active_children()) - others
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in mine:
+            process.kill()
+        for process in mine:
+            process.join(LAST_SECONDS)
 
 
 @contextlib.contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Start a process that Ctrl-C, which goes to all of a terminal, does not reach: it is ended by
-    the one that has started it."""
+    """Start processes that Ctrl-C, which goes to all of a terminal, does not reach: they are ended
+    by the one that has started them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -107,20 +71,19 @@ def deaf_to_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def serve(pipe: Connection, begin: Callable[..., Callable[[Any], Any]], given: tuple) -> None:
-    """Where a process begins: answer tasks until nobody asks any more."""
+TO_DO: dict[str, Any] = {}
+"""Of this process: how it begins, and, once it has, what answers its tasks."""
+
+
+def begin_process(begin: Callable[..., Callable[[Any], Any]], given: tuple) -> None:
+    """Where a process begins: it goes with the one that started it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
-    answer_to: Callable[[Any], Any] | None = None
-    while True:
-        try:
-            task = pipe.recv()
-        except (EOFError, OSError):
-            os._exit(0)
-        try:
-            answer_to = answer_to or begin(*given)
-            answer = answer_to(task)
-        except FlocsimError as error:
-            answer = error
-        with contextlib.suppress(OSError):
-            pipe.send(answer)
+    TO_DO["begin"] = lambda: begin(*given)
+
+
+def answer(task: Any) -> Any:
+    """What this process says to a task."""
+    if "answer" not in TO_DO:
+        TO_DO["answer"] = TO_DO["begin"]()
+    return TO_DO["answer"](task)

@@ -149,11 +149,13 @@ def answers(
         for each in todo:
             yield each, opening_of(results, each, flow, precision)
         return
-    given = os.fspath(results.path), os.fspath(results.folder), flow, precision
+    given = results.source, os.fspath(results.folder), flow, precision
     yield from dealt(tester, given, todo, jobs)
 
 
-def tester(path: str, folder: str, flow: str, precision: float) -> Callable[[Bound], Opening]:
+def tester(
+    path: os.PathLike, folder: str, flow: str, precision: float
+) -> Callable[[Bound], Opening]:
     """What a process does: the Opening of each doublet of a file that it is asked for."""
     return partial(opened_again, open_results(path, folder), flow, precision)
 

@@ -23,6 +23,7 @@ from flocsim.ensembles.studies.replicates import (
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
+from flocsim.io.files import held
 from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled, about_of
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
@@ -65,8 +66,9 @@ class StudyResults:
     None in others; ``run`` where it came from.
     """
 
-    def __init__(self, results: Results, path: Path, folder: Path) -> None:
-        self.results, self.path, self.folder = results, path, folder
+    def __init__(self, results: Results, source: str | os.PathLike, folder: Path) -> None:
+        self.results, self.source, self.folder = results, source, folder
+        self.path = Path(source)
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
@@ -75,8 +77,9 @@ class StudyResults:
 
     @functools.cached_property
     def replicates(self) -> dict[str, np.ndarray]:
-        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file."""
-        found = read_results(self.path).replicates
+        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file that
+        was opened; FileError where another has taken its place."""
+        found = read_results(self.source).replicates
         assert found is not None
         return found
 
@@ -220,6 +223,6 @@ def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = Non
     ``folder``: where the config lay, its shape library and its own modules (default: where the
     results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    place = Path(path)
-    found = read_results(place, replicates=False)
-    return StudyResults(found, place, place.parent if folder is None else Path(folder))
+    source = held(path)
+    found = read_results(source, replicates=False)
+    return StudyResults(found, source, Path(path).parent if folder is None else Path(folder))

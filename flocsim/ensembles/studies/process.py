@@ -12,7 +12,7 @@ from pathlib import Path
 from flocsim.ensembles.config.sources import INSTALLED
 from flocsim.ensembles.parallel.communicator import launched_size
 from flocsim.errors import FileError, FlocsimError, PlausibilityWarning, UsageError
-from flocsim.interruption import INTERRUPTED, STOPPED
+from flocsim.interruption import INTERRUPTED, STOPPED, WITHHELD
 
 SAVING = 30.0
 """Seconds that an interrupted run has to keep what it has finished."""
@@ -42,9 +42,11 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
     environment = os.environ | {"PYTHONUNBUFFERED": "1", **path_to_flocsim()}
+    # On Windows a virtual environment's Python is the child of a process that starts it.
+    ends_with_this = [] if os.name == "nt" else ["--parent", str(os.getpid())]
     # -P: what lies beside a config is no part of Python.
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "flocsim", *words],
+        [sys.executable, "-P", "-m", "flocsim", *words, *ends_with_this],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         cwd=folder, env=environment, encoding="utf-8", errors="replace",
     ) as process:  # fmt: skip
@@ -59,7 +61,7 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             raise
     if process.returncode in (INTERRUPTED, -signal.SIGINT):
         raise KeyboardInterrupt
-    if process.returncode:
+    if process.returncode not in (0, WITHHELD):  # that is a warning, said already
         raise error_of(process.returncode, said)
 
 

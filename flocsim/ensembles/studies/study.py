@@ -49,9 +49,12 @@ class Study:
         else:
             raise UsageError("folder goes with a dict; a file's own folder is taken for a file")
 
-    def _take(self, path: Path, text: str, overrides: dict[str, Any]) -> None:
+    def _take(
+        self, path: Path, text: str, overrides: dict[str, Any], sources: Sources | None = None
+    ) -> None:
         self.path, self.text, self.overrides = path, text, overrides
-        self.config: Config = load_config(path, overrides, Sources(text))
+        self.sources = sources or Sources(text)
+        self.config: Config = load_config(path, overrides, self.sources)
 
     @classmethod
     def of_text(
@@ -66,7 +69,8 @@ class Study:
         """A new Study with other values: a nested dict, dotted keys, or top-level keys by name.
 
         ``study.with_({"forces.contact.k_n": "10 N/m"}, seed=3, scene={"delta": [0.0]})``. Checked
-        like the file; a force is left out by False, as ``{"forces.double_layer": False}``.
+        like the file; a force is left out by False, as ``{"forces.double_layer": False}``. Modules
+        and libraries are those that this one has read.
         """
         found: dict[str, Any] = {}
         for key, value in {**(changes or {}), **keys}.items():
@@ -76,11 +80,13 @@ class Study:
                 found = lay_over(found, nested([(key.split("."), value)]))
             except TypeError:
                 raise ConfigError(f"{key} cannot be given here") from None
-        return Study.of_text(self.path, self.text, lay_over(self.overrides, found))
+        study = Study.__new__(Study)
+        study._take(self.path, self.text, lay_over(self.overrides, found), self.sources)
+        return study
 
     def run(
         self, jobs: int = 1, *, output: str | os.PathLike | None = None, mode: str = "new",
-        overwrite: bool = False, quiet: bool = True,
+        overwrite: bool = False, quiet: bool = True, plan: str | os.PathLike | None = None,
     ) -> StudyResults:  # fmt: skip
         """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
 
@@ -88,8 +94,9 @@ class Study:
         ``output``, instead of the config's file; ``mode``: "new", "resume" (go on, extend, or take
         finished results as they are) or "restart"; ``overwrite``: keep a file that is in the way
         under another name; ``quiet=False`` prints what the command prints. What is finished is kept
-        when it is interrupted: go on with ``mode="resume"``. UsageError for a file in the way,
-        FileError where it cannot be written.
+        when it is interrupted: go on with ``mode="resume"``. ``plan``: of a sweep of which this is
+        a part, and has to be what it says. UsageError for a file in the way, FileError where it
+        cannot be written.
         """
         if not is_whole(jobs) or jobs < 1:
             raise UsageError(f"jobs must be a whole number from 1, found {jobs!r}")
@@ -105,6 +112,7 @@ class Study:
         words += [f"--{mode}"] if mode != "new" else []
         words += ["--overwrite"] if overwrite else []
         words += ["--quiet"] if quiet else []
+        words += ["--plan", os.path.abspath(plan)] if plan is not None else []
         for key, value in settings_of(self.overrides):
             words += ["--set", f"{key}={value}"]
         run_command(words, self.text, self.path.parent, quiet)

@@ -1,10 +1,13 @@
 """One study at several values of its keys, joined in one file with the swept keys as dimensions.
 
-Every value has a results file of its own in a folder beside the joined one, NAME.parts: a sweep
-that was stopped goes on there, and a cluster may fill it by `flocsim ensemble`.
+Every value is a part: a study with a results file of its own in a folder beside the joined one,
+NAME.parts. What each of them is, is fixed before the first is run (`storage.plan`), and what is
+found, made or joined is held against that. So a sweep that was stopped goes on there, and a cluster
+may fill it by `flocsim ensemble`.
 """
 
 import itertools
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -13,52 +16,49 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
+from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.pilot.choice import first_methods
+from flocsim.ensembles.storage.identity import identity_of, machine_facts
+from flocsim.ensembles.storage.plan import (
+    AXES,
+    NAME,
+    Facts,
+    Plan,
+    apart,
+    hold,
+    listed,
+    plan_of,
+    plan_text,
+    read_plan,
+    write_plan,
+)
+from flocsim.ensembles.storage.resume import asked_of
 from flocsim.ensembles.studies.opened import GROUPS, StudyResults, open_results
 from flocsim.ensembles.studies.study import WAYS, Study
+from flocsim.ensembles.study import flocs_of
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number
-from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.files import held
+from flocsim.io.journal.journal import journal_path
+from flocsim.io.labelled import Column, Labelled
 from flocsim.io.opening import kind_of
-from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
+from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
 from flocsim.io.results.schema import RADII
 from flocsim.io.results.swarm_file import FORMAT as SWARM_FORMAT
 from flocsim.io.results.swarm_file import SwarmResults, read_swarm
-from flocsim.io.results.sweep_file import FORMAT, Swept, read_sweep, write_sweep
-
-JOINED = ("probabilities", "pooled")
-"""The groups of the parts that are joined; the rows stay in the parts."""
+from flocsim.io.results.sweep_file import (
+    FORMAT,
+    SCHEMAS,
+    SweepResults,
+    Swept,
+    read_sweep,
+    write_sweep,
+)
 
 MOST_PARTS = 10_000
-FIXED = (
-    "seed", "output.file", "scene.types", "scene.pairs", "scene.classes", "scene.delta",
-    "shapes.vertices",
-)  # fmt: skip
-"""Keys that are no dimension of a sweep: they are dimensions already, or no physics."""
-
-
-class SweepResults:
-    """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys."""
-
-    def __init__(self, path: Path, swept: dict[str, Swept], groups: dict[str, Labelled]) -> None:
-        self.path, self.swept, self.groups = path, swept, groups
-
-    def labelled(self, group: str) -> Labelled:
-        """The arrays of a group; UsageError for an unknown one."""
-        if group not in self.groups:
-            raise UsageError(f"group must be one of {', '.join(self.groups)}, found {group!r}")
-        return self.groups[group]
-
-    def to_xarray(self, group: str = "probabilities") -> Dataset:
-        """A group, "probabilities" or "pooled", with the swept keys as its first dimensions."""
-        return self.labelled(group).to_xarray()
-
-    def to_pandas(self, group: str = "probabilities") -> DataFrame:
-        """The same as a DataFrame, a row for each value and condition."""
-        return self.labelled(group).to_pandas((*self.swept, *GROUPS[group][1]))
-
-    def __repr__(self) -> str:
-        over = ", ".join(f"{each.key}: {len(each.values)} values" for each in self.swept.values())
-        return f"SweepResults({str(self.path)!r}: {over})"
+FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
+NO_PHYSICS = ("output", "stop")
+"""Keys, and tables, that cannot be swept: they are dimensions already, or no physics."""
 
 
 def sweep(
@@ -72,26 +72,47 @@ def sweep(
     there, extends it, or takes it as it is, as Study.run does with each part; ``tell`` is given a
     line for each; ``ways``: what to say where a file is in the way. All values have the study's
     seed: what differs between them is paired. UsageError for a key that is none, a value that does
-    not fit, or a file in the way.
+    not fit, a file in the way, and for a part that is, or becomes, another than when it began.
     """
-    parts = planned(study, over, Path(output))
+    output = Path(output)
+    parts = planned(study, over, output)
+    swept = swept_keys(over, [part.config for part in parts.values()])
+    folder, goes_on = parts_folder(output), mode == "resume" and not overwrite
+    before = read_plan(folder / NAME) if goes_on else {}
     rule = data_rule(overwrite)
-    if mode == "resume" and Path(output).exists():
-        read_sweep(Path(output))  # what is replaced has to be a sweep
+    if mode == "resume" and output.exists():
+        joined_before = read_sweep(output)  # what is replaced has to be a sweep
         rule = extension_rule(output)
+        if joined_before.plan and goes_on:
+            before = plan_of(joined_before.plan, output) | before
     check_outputs([Output(output, rule, ways=ways)], [study.path])
-    folder = parts_folder(Path(output))
+    for path in parts if mode == "new" and not overwrite else ():
+        for name in filter(os.path.lexists, (path, journal_path(path))):
+            raise in_the_way(name, ways)
+    plan = fixed(parts)
+    hold(before, plan, folder)
+    there = {
+        path: fitting(path, part, plan[path.name])
+        for path, part in parts.items()
+        if goes_on and os.path.lexists(path)
+    }
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise FileError(f"{folder} could not be made: {error.strerror}") from error
+    write_plan(folder, plan)
     found = []
-    for number, (path, part) in enumerate(parts, 1):
+    for number, (path, part) in enumerate(parts.items(), 1):
         tell(f"{number} of {len(parts)}: {path}")
-        found.append(part.run(jobs, output=path, mode=mode, overwrite=overwrite, quiet=quiet))
-    swept = swept_keys(over, [part.config for _, part in parts])
-    write_sweep(Path(output), swept, joined(swept, found), rule)
-    return open_sweep(output)
+        facts = plan[path.name]
+        if path not in there or apart(facts_in(there[path]), facts, whole=True):
+            part.run(jobs, output=path, mode=mode, overwrite=overwrite, quiet=quiet,
+                     plan=folder / NAME)  # fmt: skip
+            there[path] = fitting(path, part, facts, part.config.stop.half_width is None)
+        found.append(there[path])
+    results = SweepResults(output, swept, joined(swept, found), plan_text(plan))
+    write_sweep(results, rule)
+    return results
 
 
 def parts_folder(output: Path) -> Path:
@@ -99,22 +120,66 @@ def parts_folder(output: Path) -> Path:
     return output.with_name(f"{output.stem}.parts")
 
 
-def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> list[tuple[Path, Study]]:
-    """(its results file, Study) of every value; UsageError for keys that cannot be swept."""
+def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Path, Study]:
+    """{its results file: Study} of every value; UsageError for keys that cannot be swept."""
     values = {key: list(each) for key, each in over.items()}
     if not values or not all(values.values()):
         raise UsageError("a sweep is over at least one key and one value: --over KEY=VALUE,VALUE")
     if int(np.prod([len(each) for each in values.values()], dtype=object)) > MOST_PARTS:
         raise UsageError(f"a sweep has at most {MOST_PARTS} values")
     for key in values:
-        if key in FIXED or key.split(".")[0] == "output":
+        if key in FIXED or key.split(".")[0] in NO_PHYSICS:
             raise UsageError(f"{key} cannot be swept: it is a dimension already, or no physics")
     folder = parts_folder(output)
-    found = []
-    for number, point in enumerate(itertools.product(*values.values())):
-        part = study.with_(dict(zip(values, point, strict=True)))
-        found.append((folder / f"{number:04d}.h5", part))
+    return {
+        folder / f"{number:04d}.h5": study.with_(dict(zip(values, point, strict=True)))
+        for number, point in enumerate(itertools.product(*values.values()))
+    }
+
+
+def fixed(parts: Mapping[Path, Study]) -> Plan:
+    """The plan of all parts; UsageError where they could not be joined, as they differ in an axis.
+
+    All of the study's modules and libraries were read once, for all parts (`Study.with_`).
+    """
+    plan: Plan = {}
+    machine = machine_facts()
+    drawn: tuple[Any, list] = None, []
+    for path, part in parts.items():
+        config = part.config
+        if drawn[0] != (config.shapes, config.seed):
+            drawn = (config.shapes, config.seed), flocs_of(config)
+        study = study_of(config, drawn[1], first_methods(config))
+        facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(asked_of(study)))}
+        if config.integrator.is_chosen:  # a pilot has yet to say by what method each type is run
+            facts = {k: v for k, v in facts.items() if not k.endswith(".integrator")}
+        plan[path.name] = facts
+        first = next(iter(plan.values()))["asked"]
+        for axis in AXES:
+            if facts["asked"][axis] != first[axis]:
+                raise UsageError(
+                    f"the parts of a sweep cannot be joined: {axis} are {listed(first[axis])} in "
+                    f"the first, {listed(facts['asked'][axis])} in {path}; run them one by one"
+                )
+    return plan
+
+
+def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> StudyResults:
+    """The results at a part's path; UsageError where they are not what was planned, or cannot
+    become so by more rows (``whole``: where they have less)."""
+    found = open_results(path, study.path.parent)
+    if wrong := apart(facts_in(found), planned, whole):
+        raise UsageError(
+            f"{path} is no part of this sweep: {wrong}; ask for what it holds, or name another "
+            "output"
+        )
     return found
+
+
+def facts_in(results: StudyResults) -> Facts:
+    """What a results file says that it is."""
+    axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
+    return results.stored("identity") | {"asked": axes | {"replicates": results.count}}
 
 
 def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[str, Swept]:
@@ -161,7 +226,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in JOINED:
+    for group in SCHEMAS:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):
@@ -177,12 +242,6 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
     return found
 
 
-def open_sweep(path: str | os.PathLike) -> SweepResults:
-    """The SweepResults in a joined file; FileError for one that is absent, damaged or none."""
-    swept, groups = read_sweep(Path(path))
-    return SweepResults(Path(path), swept, groups)
-
-
 def open_any(
     path: str | os.PathLike, folder: str | os.PathLike | None = None
 ) -> StudyResults | SweepResults | SwarmResults:
@@ -191,7 +250,8 @@ def open_any(
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    kind = kind_of(Path(path))
+    source = held(path)
+    kind = kind_of(source)
     if kind == SWARM_FORMAT:
-        return read_swarm(Path(path))
-    return open_sweep(path) if kind == FORMAT else open_results(path, folder)
+        return read_swarm(source)
+    return read_sweep(source) if kind == FORMAT else open_results(source, folder)

@@ -76,6 +76,8 @@ def draw_line(axes, kernel, name, place, colour, lines):
         kernel.arrays[name + end][m, v, smaller, larger] for end in ("", "_low", "_high")
     )
     known = np.isfinite(value)
+    left_open = ~known & np.isfinite(high)
+    axes.vlines(ratio[left_open], low[left_open], high[left_open], color=colour, linestyle=":")
     style = {"color": colour, "marker": MARKERS[v % len(MARKERS)]}
     if kernel.vertices[v] == 1:
         style |= {"linestyle": ":", "markerfacecolor": "white"}

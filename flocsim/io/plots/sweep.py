@@ -23,6 +23,7 @@ from flocsim.io.plots.style import (
     set_probability_axis,
     type_title,
 )
+from flocsim.io.results.sweep_file import SweepResults
 
 PREFIXED = ("m", "s", "J", "N", "V")
 """Units whose values are written with a prefix, as 500 nm."""
@@ -31,13 +32,12 @@ STEEP = 20.0
 """Ratio of the largest value to the least from which on the axis is logarithmic."""
 
 
-def against_key(content: tuple[dict[str, Any], dict[str, Any]]) -> Figure:
+def against_key(results: SweepResults) -> Figure:
     """Pr[A] against the first swept key: a panel per type, a line per N, delta and further keys."""
     from matplotlib.ticker import EngFormatter, NullFormatter, StrMethodFormatter
 
-    swept, groups = content
-    first = next(iter(swept.values()))
-    table = groups["probabilities"]
+    first = next(iter(results.swept.values()))
+    table = results.labelled("probabilities")
     axes_names = table.columns["pr_a"].axes
     place = axes_names.index("type")
     ends = ("", "_low", "_high", "_numerical")

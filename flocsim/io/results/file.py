@@ -17,6 +17,7 @@ checked before HDF5 parses it, and is written a block at a time (see `flocsim.io
 """
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,7 @@ def write_results(path: str | Path, results: Results, rule: Rule = keep) -> None
         file.complete(results, digests)
 
 
-def read_results(path: str | Path, replicates: bool = True) -> Results:
+def read_results(path: str | os.PathLike, replicates: bool = True) -> Results:
     """The Results in a file; FileError if it is absent, damaged, of another kind or version.
 
     With ``replicates=False`` the table of replicates, which may be larger than the memory, stays
@@ -97,7 +98,7 @@ def read_results(path: str | Path, replicates: bool = True) -> Results:
         return results_in(file, replicates)
 
 
-def read_overview(path: str | Path) -> tuple[Results, "Totals"]:
+def read_overview(path: str | os.PathLike) -> tuple[Results, "Totals"]:
     """The Results in a file without its table of replicates, and the Totals of that table.
 
     For files larger than the memory; FileError as `read_results`.
@@ -186,7 +187,7 @@ def totals_in(rows, reasons):
     return totals
 
 
-def first_of_each(path: str | Path) -> dict[str, tuple[int, int, int, int]]:
+def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
     """{outcome: place (type, vertices, delta, replicate)} of its first replicate, where it has one.
 
     Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
@@ -217,7 +218,7 @@ def parts_of(shape):
 
 
 @contextlib.contextmanager
-def opened(path: str | Path) -> Iterator[Any]:
+def opened(path: str | os.PathLike) -> Iterator[Any]:
     """An open h5py file of a known schema, once the checksum over all of it was found right.
 
     And once its structure was found to be one that flocsim writes: HDF5 sees no other.

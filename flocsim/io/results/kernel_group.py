@@ -39,8 +39,8 @@ EFFICIENCIES = {
 ESTIMATES = WIDTHS | RATES | EFFICIENCIES
 BOUNDS = {
     "": "",
-    "_low": ", lower 95 % bound",
-    "_high": ", upper 95 % bound",
+    "_low": ", lower 95 % bound, undecided and failed points taken for misses",
+    "_high": ", upper 95 % bound, undecided and failed points taken for captures",
     "_numerical": ", by how much numerics change it: 95 % bound",
 }
 FLIPS = {

@@ -115,6 +115,8 @@ def kernel_matrix(
         what = [f"{quantity} [{KERNEL[quantity][1]}] in {mechanism}: {KERNEL[quantity][2]}"]
     else:
         raise UsageError(f"a matrix holds one of {', '.join(QUANTITIES)}, found {quantity}")
+    if np.isnan(values).any():
+        what.append("where there is nothing it is not known, as where points are undecided")
     lines = [
         *what,
         f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",

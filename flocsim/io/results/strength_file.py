@@ -12,6 +12,7 @@ there is so far.
 
 import io
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -161,7 +162,7 @@ EXPECTED = {
 }  # fmt: skip
 
 
-def read_strengths(path: str | Path) -> Strengths:
+def read_strengths(path: str | os.PathLike) -> Strengths:
     """The Strengths of a file; FileError for one that is absent, damaged, or of another kind."""
     with opened_file(
         path, lambda reason: f"{path} holds no readable strengths of bonds: {reason}"

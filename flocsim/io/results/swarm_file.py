@@ -9,6 +9,7 @@
 """
 
 import io
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -195,7 +196,7 @@ def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> N
     write_file(path, seal(image.getvalue()), rule)
 
 
-def read_swarm(path: str | Path) -> SwarmResults:
+def read_swarm(path: str | os.PathLike) -> SwarmResults:
     """The SwarmResults in a file; FileError for one that is absent, damaged, of another kind or
     version."""
     with opened_file(path, lambda why: f"{path} holds no readable results of a swarm: {why}") as (

@@ -1,27 +1,28 @@
 """The joined file of a sweep: tables of a study's probabilities, the swept keys first.
 
 HDF5 as the results file is: groups `probabilities` and `pooled` with dimension scales, units and
-meanings, a checksum behind; the attribute `swept` (JSON) names the keys.
+meanings, a checksum behind; the attribute `swept` (JSON) names the keys, and `run/plan` (JSON) has
+what the rows of each part follow from.
 """
 
 import io
 import json
-from collections.abc import Mapping
+import os
 from pathlib import Path
 
 import attrs
 import numpy as np
 
+from flocsim.errors import UsageError
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.hdf5.expected import Column as Expected
 from flocsim.io.hdf5.expected import check_root, hold_against
-from flocsim.io.json_text import read_json
-from flocsim.io.labelled import Column, Labelled
+from flocsim.io.json_text import matches, read_json
+from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
 from flocsim.io.opening import opened_file
 from flocsim.io.results.groups import write_labelled
 from flocsim.io.results.schema import (
     AXES,
-    COORDINATES,
     LAST_AXES,
     POOLED,
     RADII,
@@ -56,28 +57,54 @@ class Swept:
         return Column((name,), values, {"units": self.unit, "long_name": self.key})
 
 
-def write_sweep(
-    path: str | Path, swept: Mapping[str, Swept], groups: Mapping[str, Labelled], rule: Rule = keep
-) -> None:
+@attrs.frozen(eq=False)
+class SweepResults:
+    """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
+    ``plan`` (JSON) says what each of its parts is."""
+
+    path: Path
+    swept: dict[str, Swept]
+    groups: dict[str, Labelled]
+    plan: str = ""
+
+    def labelled(self, group: str) -> Labelled:
+        """The arrays of a group; UsageError for an unknown one."""
+        if group not in self.groups:
+            raise UsageError(f"group must be one of {', '.join(self.groups)}, found {group!r}")
+        return self.groups[group]
+
+    def to_xarray(self, group: str = "probabilities") -> Dataset:
+        """A group, "probabilities" or "pooled", with the swept keys as its first dimensions."""
+        return self.labelled(group).to_xarray()
+
+    def to_pandas(self, group: str = "probabilities") -> DataFrame:
+        """The same as a DataFrame, a row for each value and condition."""
+        return self.labelled(group).to_pandas((*self.swept, *SCHEMAS[group][1]))
+
+    def __repr__(self) -> str:
+        over = ", ".join(f"{each.key}: {len(each.values)} values" for each in self.swept.values())
+        return f"SweepResults({str(self.path)!r}: {over})"
+
+
+def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
     import h5py
 
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
-        about = {name: {"key": each.key, "unit": each.unit} for name, each in swept.items()}
+        about = {name: {"key": each.key, "unit": each.unit} for name, each in results.swept.items()}
         file.attrs.update(
             {"format": FORMAT, "schema_version": SCHEMA_VERSION, "swept": json.dumps(about)}
         )
-        for group, labelled in groups.items():
+        for group, labelled in results.groups.items():
             write_labelled(file.create_group(group), labelled)
-    write_file(path, seal(image.getvalue()), rule)
+        file.create_group("run")["plan"] = results.plan
+    write_file(results.path, seal(image.getvalue()), rule)
 
 
-def read_sweep(path: str | Path) -> tuple[dict[str, Swept], dict[str, Labelled]]:
-    """({dimension: Swept}, {group: Labelled}) of a joined file.
-
-    FileError for one that is absent, damaged, of another kind or version.
-    """
+def read_sweep(path: str | os.PathLike) -> SweepResults:
+    """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
+    or version."""
     with opened_file(
         path,
         lambda reason: f"{path} holds no readable sweep: {reason}; join it again with --resume",
@@ -88,20 +115,18 @@ def read_sweep(path: str | Path) -> tuple[dict[str, Swept], dict[str, Labelled]]
         ):
             raise ValueError(f"its format is not {FORMAT} of version {SCHEMA_VERSION}")
         about = read_json(str(file.attrs["swept"]), {})
-        names = list(about)
-        if not all(
-            isinstance(each, dict) and all(isinstance(each.get(k), str) for k in ("key", "unit"))
-            for each in about.values()
-        ):
+        if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept names no keys")
-        hold_against(nodes, expected(nodes, names), SCHEMAS)
-        groups = {group: labelled_of(file[group], group, names) for group in SCHEMAS}
+        wanted = expected(nodes, list(about))
+        hold_against(nodes, wanted | {"run": {"plan": Expected("text")}}, SCHEMAS)
+        groups = {group: labelled_of(file[group], wanted[group]) for group in SCHEMAS}
         first = groups["probabilities"].axes
         swept = {
             name: Swept(each["key"], first[name].values.tolist(), each["unit"])
             for name, each in about.items()
         }
-        return swept, groups
+        plan = file["run/plan"].asstr()[()] if "run" in file else ""
+        return SweepResults(Path(path), swept, groups, plan)
 
 
 def expected(nodes, names):
@@ -125,27 +150,17 @@ def expected(nodes, names):
     return groups
 
 
-def labelled_of(place, group, names):
-    """A group of an open file as Labelled."""
-    schema, axes = SCHEMAS[group]
-    columns = {}
-    for name, (_, units, text) in schema.items():
-        further = (last_axis(name),) if group == "probabilities" and last_axis(name) else ()
-        about = {"units": units, "long_name": text}
-        columns[name] = Column((*names, *axes, *further), place[name][()], about)
-    used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
-    sizes = {
-        name: Column((*names, "type"), place[name][()], {"units": units, "long_name": text})
-        for name, (_, units, text) in RADII.items()
-    }
-    return Labelled({axis: coordinate(place[axis], axis) for axis in used} | sizes, columns)
-
-
-def coordinate(dataset, axis):
-    """A dimension scale as a Column."""
-    words = dataset.dtype.kind == "O"
-    values = np.array(dataset.asstr()[()].tolist(), dtype=object) if words else dataset[()]
-    about = {name: str(dataset.attrs[name]) for name in ("units", "long_name")}
-    if axis in COORDINATES:
-        about = dict(zip(("units", "long_name"), COORDINATES[axis], strict=True))
-    return Column((axis,), values, about)
+def labelled_of(place, expected):
+    """A group of an open file, which was held against these columns, as Labelled."""
+    found = {}
+    for name, each in expected.items():
+        dataset, words = place[name], each.type == "text"
+        values = np.array(dataset.asstr()[()].tolist(), dtype=object) if words else dataset[()]
+        axes = tuple(a if isinstance(a, str) else last_axis(name) or name for a in each.axes)
+        about = {about: str(dataset.attrs[about]) for about in ("units", "long_name")}
+        found[name] = Column(axes, values, about)
+    axes = {name for name, each in found.items() if each.axes == (name,) or name in RADII}
+    return Labelled(
+        {name: each for name, each in found.items() if name in axes},
+        {name: each for name, each in found.items() if name not in axes},
+    )

@@ -27,6 +27,7 @@ for every N, so that between conditions nothing changes but N.  Every dataset ha
 """
 
 import io
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -246,13 +247,13 @@ def _write_column(group, name, values, units, long_name):
     dataset.attrs["long_name"] = long_name
 
 
-def is_library(path: str | Path) -> bool:
+def is_library(path: str | os.PathLike) -> bool:
     """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
     with opened(path) as (file, nodes):
         return text_of(file, nodes, "kind") == KIND
 
 
-def read_settings(path: str | Path) -> dict[str, Any]:
+def read_settings(path: str | os.PathLike) -> dict[str, Any]:
     """{name: value} of what the fits of a shape library were made with."""
     with opened(path) as (file, _):
         return {
@@ -262,7 +263,7 @@ def read_settings(path: str | Path) -> dict[str, Any]:
         }
 
 
-def read_library(path: str | Path) -> list[ShapeEntry]:
+def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
     """The flocs of a shape library, in the order of writing.
 
     Raises FileError for a file that is missing, damaged, of another kind or another version, or
@@ -284,7 +285,7 @@ def read_library(path: str | Path) -> list[ShapeEntry]:
     return entries
 
 
-def opened(path: str | Path) -> AbstractContextManager[tuple[Any, dict[str, Node]]]:
+def opened(path: str | os.PathLike) -> AbstractContextManager[tuple[Any, dict[str, Node]]]:
     """(open h5py file, its structure), once checksum and structure were found right."""
     return opened_file(
         path,

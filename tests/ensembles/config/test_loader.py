@@ -1,5 +1,7 @@
 """What a config file means: units, presets, overrides."""
 
+from pathlib import Path
+
 import attrs
 import pytest
 
@@ -101,4 +103,4 @@ def test_a_library_is_found_beside_the_config(tmp_path, monkeypatch):
     ]
     (tmp_path / "shapes.h5").touch()
     monkeypatch.chdir("/")
-    assert load_text(tmp_path, text).shapes.file == tmp_path / "shapes.h5"
+    assert Path(load_text(tmp_path, text).shapes.file) == tmp_path / "shapes.h5"

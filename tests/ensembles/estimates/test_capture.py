@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.estimates.capture import (
+    MOST_UNKNOWN,
     estimate,
     flow_width,
     kernel_of,
@@ -16,7 +17,9 @@ from flocsim.ensembles.estimates.capture import (
 )
 from flocsim.ensembles.kernels.sampling import points_of
 from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.report import has_withheld, kernel_lines, undecided_line
 from flocsim.ensembles.runner import run
+from flocsim.io.results.kernel_group import ESTIMATES
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.kernel_study import kernel_config
 
@@ -88,6 +91,72 @@ def test_flips_are_counted_and_bound_the_change(tmp_path):
     assert found.flipped == {"c": 2, "inside": 2, "a": 2}
     assert found.values["flips_a"] == pytest.approx(2 / 64)
     assert found.largest["width_a"] == pytest.approx(points.width.max())
+
+
+UNDECIDED = OUTCOMES.index("undecided")
+
+
+@pytest.mark.parametrize(("meeting", "rate"), CASES)
+@pytest.mark.parametrize("share", [0.01, 0.05, 0.2, 0.6, 1.0])
+@pytest.mark.parametrize("which", ["any", "captures", "misses", "touched"])
+def test_the_unknown_cannot_leave_the_interval(tmp_path, meeting, rate, share, which):
+    """Whatever points are undecided or have failed, and whatever they would have come to."""
+    scene = "" if meeting == "settling" else f"rate = {rate}"
+    config = kernel_config(tmp_path, meeting=f'"{meeting}"', scene=scene, replicates=128)
+    study = study_of(config)
+    rng = np.random.default_rng([int(100 * share), len(which)])
+    for _ in range(4):
+        start, width = rng.uniform(-0.9, 0.4), rng.uniform(0.1, 0.9)
+        points, rows = made_up(study, 0, lambda b, s=start, w=width: (b > s) & (b < s + w))
+        lost = rng.random(128) < 0.4 * rng.random()  # touched, and parted again
+        rows["outcome"] = np.where(lost & (rows["outcome"] == 0), 1, rows["outcome"])
+        truth = estimate(points, rows, meeting, config.scene.rate, 4).values
+        touched = rows["inside"] != NOT_APPLICABLE
+        of = {"any": True, "captures": rows["outcome"] == 0, "misses": ~touched, "touched": touched}
+        unknown = (rng.random(128) < share) & of[which]
+        kept = rng.random(128) < 0.5  # of those that touch, some are seen to
+        rows["outcome"] = np.where(unknown, UNDECIDED + (rng.random(128) < 0.3), rows["outcome"])
+        rows["inside"] = np.where(unknown & ~kept, NOT_APPLICABLE, rows["inside"])
+        found = estimate(points, rows, meeting, config.scene.rate, 4).values
+        for name in ESTIMATES:
+            value, low, high = (found[name + end] for end in ("", "_low", "_high"))
+            assert np.isnan(truth[name]) or low <= truth[name] * (1 + 1e-12), name
+            assert np.isnan(truth[name]) or high >= truth[name] * (1 - 1e-12), name
+            assert np.isnan(value) or low <= value * (1 + 1e-12) <= high * (1 + 2e-12), name
+        assert np.isnan(found["alpha_high"]) or 0.0 <= found["alpha_low"] <= 1.0
+        assert np.isnan(found["alpha_high"]) or found["alpha_high"] <= 1.0
+        assert np.isnan(found["beta2"]) == (found["undecided"] > MOST_UNKNOWN)
+
+
+def test_what_is_undecided_flips_nothing(tmp_path):
+    config = kernel_config(tmp_path, replicates=512)
+    points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9)
+    rows["checked_outcome"][:] = np.where(
+        rows["checked_outcome"] == NOT_APPLICABLE, NOT_APPLICABLE, UNDECIDED
+    )
+    rows["checked_inside"][:] = NOT_APPLICABLE
+    found = estimate(points, rows, "settling", None, 4)
+    assert not any(found.flipped.values()) and not any(found.checked.values())
+    assert np.isnan(found.values["flips_a"]) and found.values["checked"] == 64
+
+
+def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
+    """The same points, some of them without the steps that they need."""
+    about = {"preset": "tang2014", "meeting": '["shear"]', "scene": 'rate = "10 1/s"',
+             "sizes": '["5 um", "8 um"]'}  # fmt: skip
+    whole, cut = (
+        run(kernel_config(tmp_path, **about, more=f"[integrator]\nmax_steps = {steps}"))
+        for steps in (100_000, 90)
+    )
+    there, here = whole.kernel.arrays, cut.kernel.arrays
+    assert there["undecided"].max() == 0.0 and here["undecided"].min() > MOST_UNKNOWN
+    for name in ESTIMATES:
+        assert np.all(here[f"{name}_low"] <= there[name]), name
+        assert np.all(there[name] <= here[f"{name}_high"]), name
+    assert np.isnan(here["beta2"]).all() and here["alpha_high"].max() <= 1.0
+    assert has_withheld(cut) and not has_withheld(whole)
+    assert "undecided" in undecided_line(cut) and undecided_line(whole) == ""
+    assert "[0.00, " in "\n".join(kernel_lines(cut.kernel))
 
 
 def test_intervals_are_students_of_the_scrambles():

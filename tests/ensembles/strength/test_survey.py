@@ -25,7 +25,7 @@ class FakeResults:
     """A results file of 2 × 2 × 2 conditions of three replicates, run again by nobody."""
 
     types, vertices, delta = AXES
-    path, folder = "study.h5", "."
+    path, source, folder = "study.h5", "study.h5", "."
 
     def __init__(self, seed=1):
         self.seed = seed

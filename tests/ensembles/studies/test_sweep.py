@@ -84,12 +84,13 @@ def test_a_grid_has_an_axis_for_each_key(tmp_path):
     study = flocsim.Study(write_small(tmp_path)).with_(ONE)
     over = {HAMAKER: ["10 zJ", 1e-19], "forces.contact.friction": [0.1, 0.2, 0.3]}
     parts = planned(study, over, tmp_path / "x.h5")
-    assert len(parts) == 6 and parts[5][0].name == "0005.h5"
-    found = swept_keys(over, [part.config for _, part in parts])
+    assert len(parts) == 6 and list(parts)[5].name == "0005.h5"
+    found = swept_keys(over, [part.config for part in parts.values()])
     assert found["hamaker"].values == [1e-20, 1e-19] and found["hamaker"].unit == "J"
     assert found["friction"].values == [0.1, 0.2, 0.3]
     words = {"fluid.buoyancy": [False], "scene.receiver": ["free", "fixed"]}
-    found = swept_keys(words, [part.config for _, part in planned(study, words, tmp_path / "y.h5")])
+    parts = planned(study, words, tmp_path / "y.h5").values()
+    found = swept_keys(words, [part.config for part in parts])
     assert found["receiver"].values == ["free", "fixed"]
 
 
@@ -108,7 +109,7 @@ def test_what_cannot_be_swept_is_told(tmp_path, over, text):
     study = flocsim.Study(write_small(tmp_path)).with_(ONE)
     with pytest.raises(UsageError, match=text):
         parts = planned(study, over, tmp_path / "x.h5")
-        swept_keys(over, [part.config for _, part in parts])
+        swept_keys(over, [part.config for part in parts.values()])
 
 
 def test_values_are_parted_by_commas_outside_quotes_and_brackets():

@@ -1,5 +1,7 @@
 """The shape library that ships with flocsim."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -43,4 +45,4 @@ def test_a_config_names_it_by_one_word(tmp_path):
 def test_a_library_of_the_users_own_of_that_name_comes_first(tmp_path):
     (tmp_path / "synthetic").write_bytes(SHIPPED.read_bytes())
     text = SMALL.replace("pool = 2", 'source = "library"\nfile = "synthetic"')
-    assert load_text(tmp_path, text).shapes.file == tmp_path / "synthetic"
+    assert Path(load_text(tmp_path, text).shapes.file) == tmp_path / "synthetic"

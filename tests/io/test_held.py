@@ -1,0 +1,121 @@
+"""What is read more than once is read of one file, whatever takes its place meanwhile."""
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.ensembles.collision.flocs import read_flocs
+from flocsim.errors import FileError
+from flocsim.io import files
+from flocsim.io.results.file import read_results, write_results
+from tests.helpers.small_study import SMALL, load_text, write_star_library
+from tests.helpers.synthetic_results import make_results
+
+CHANGED = "has changed since it was opened"
+LATER = {
+    "rows": lambda opened: opened.replicates,
+    "xarray": lambda opened: opened.to_xarray("replicates"),
+    "pandas": lambda opened: opened.to_pandas("replicates"),
+    "compared": lambda opened: flocsim.compare(opened, opened),
+}
+
+
+@pytest.fixture
+def two(tmp_path):
+    """A results file r.h5, which is to be replaced by the other."""
+    write_results(tmp_path / "r.h5", make_results())
+    write_results(tmp_path / "other.h5", make_results(types=("I", "II"), seed=8))
+    return tmp_path / "r.h5", tmp_path / "other.h5"
+
+
+@pytest.mark.parametrize("how", ["another file", "in place", "copied again"])
+@pytest.mark.parametrize("name", LATER)
+def test_an_opened_file_stays_what_was_opened(two, name, how):
+    if name in ("xarray", "pandas"):
+        pytest.importorskip(name)
+    path, other = two
+    opened, before = flocsim.open(path), flocsim.open(path).replicates
+    if how == "another file":
+        os.replace(other, path)
+    elif how == "in place":
+        shutil.copyfile(other, path)
+    else:
+        shutil.copyfile(path, other)
+        os.replace(other, path)  # the same bytes are the same file
+        LATER[name](opened)
+        np.testing.assert_array_equal(opened.replicates["t_end"], before["t_end"])
+        return
+    with pytest.raises(FileError, match=CHANGED) as caught:
+        LATER[name](opened)
+    assert "\n" not in str(caught.value)
+    assert list(flocsim.open(path).types) == ["I", "II"]
+
+
+COMMANDS = {
+    "info": ["info", "r.h5"],
+    "info --config": ["info", "r.h5", "--config"],
+    "plot": ["plot", "r.h5", "--figures", "4", "--format", "svg", "--overwrite"],
+    "report": ["report", "r.h5", "--no-motion", "--overwrite"],
+    "report in motion": ["report", "r.h5", "--overwrite"],
+    "compare": ["compare", "r.h5", "r.h5"],
+}
+
+
+@pytest.mark.parametrize("look", [1, 2, 3])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_reads_one_file(two, name, look, monkeypatch, capsys):
+    """Another takes its place between two looks: all is of the one, of the other, or refused."""
+    path, other = two
+    monkeypatch.chdir(path.parent)
+    shutil.copyfile(path, "kept.h5")
+
+    def outcome():
+        code, said = main(COMMANDS[name]), capsys.readouterr()
+        drawn = [each.read_bytes() for each in sorted(path.parent.glob("*.[sh][vt][gm]*"))]
+        return code, said.out, said.err, drawn
+
+    one = outcome()
+    shutil.copyfile(other, path)
+    another = outcome()
+    shutil.copyfile("kept.h5", path)
+    looks, check = [], files.check_seal
+
+    def replaced(place, file):
+        looks.append(place)
+        if len(looks) == look:
+            shutil.copyfile(other, "new.h5")
+            os.replace("new.h5", path)
+        return check(place, file)
+
+    monkeypatch.setattr(files, "check_seal", replaced)
+    found = outcome()
+    refused = found[0] == FileError.exit_code and CHANGED in found[2] and found[2].count("\n") == 1
+    twice = name == "compare" and look > 1  # two files are named
+    assert refused or twice or found[:3] in (one[:3], another[:3])
+    assert refused or found[3] in (one[3], another[3])
+
+
+def test_a_library_is_that_of_the_config(tmp_path):
+    """A config names it; when its flocs are read it may be another."""
+    write_star_library(tmp_path / "shapes.h5")
+    text = SMALL.replace("pool = 2", 'source = "library"\nfile = "shapes.h5"')
+    text = text.replace("[1, 4, 16]", "[4]")
+    config = load_text(tmp_path, text)
+    assert len(read_flocs(config.shapes)) == 3
+    write_star_library(tmp_path / "other.h5", ratios=(9.0, 17.0))
+    os.replace(tmp_path / "other.h5", tmp_path / "shapes.h5")
+    with pytest.raises(FileError, match=CHANGED):
+        read_flocs(config.shapes)
+    assert len(read_flocs(load_text(tmp_path, text).shapes)) == 2
+
+
+def test_what_is_no_file_is_not_held(tmp_path):
+    os.mkfifo(tmp_path / "pipe")  # would wait for ever
+    for name in ("pipe", "nothing", "."):
+        assert files.held(tmp_path / name) == tmp_path / name
+    with pytest.raises(FileError, match="could not be read"):
+        read_results(files.held(tmp_path / "nothing"))
