@@ -59,13 +59,13 @@ SLIP_RATES = STATES
     SLIP_ROWS,
 ) = range(2 * STATES, 2 * STATES + 18)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
-along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
-begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
-held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).  The
-overlap of a pair, what is left of its gap and the changes of both, while an interior-point method
-finds out which pairs close [m].  Displacements, offsets, forces, gaps and flights that are set
-aside while the list is made anew."""
+along the tangent. Of a pair that grazes: its tangential force now [N], of one that is held, the
+impulse of that since it is [N s]; 1 where it has only just begun to graze; by how much that force
+falls with the rate of the gap [N s/m]; the gap at which it has been held, which counts as none [m].
+How far a pair has been apart since it last parted [m], how often that was next to nothing, and 1
+where it stays closed though it is apart (see events.grazes). The overlap of a pair, what is left of
+its gap and the changes of both, while an interior-point method finds out which pairs close [m].
+Displacements, offsets, forces, gaps and flights that are set aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,

@@ -7,11 +7,8 @@ import math
 
 from flocsim.arrays import (
     CANDIDATES,
-    CLOSED,
     EDGE_BODY,
     GAP,
-    GRAZES,
-    HELD,
     NEW,
     NOW,
     TRIAL,
@@ -20,8 +17,9 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import hook
-from flocsim.integrators.events.resolution import memory_of, release_resolution, touch_resolution
-from flocsim.integrators.rhs.views import normal_rate
+from flocsim.integrators.events.resolution import release_resolution, touch_resolution
+from flocsim.integrators.rhs.grazing import stays
+from flocsim.integrators.rhs.views import memory_of, normal_rate
 
 NEVER = 2.0
 """The share of the step at which a switch comes that does not come in it."""
@@ -44,11 +42,6 @@ def interpolate(work, step, share, body):
         motion[TRIAL, body, axis] = motion[NOW, body, axis] + share * change + share * rest * bend
         slope = change + (rest - share) * bend + share * rest * (end - start)
         motion[TRIAL, body, VELOCITY + axis] = slope / step
-
-
-def stays(work, row):
-    """Whether no step ends where a pair touches or parts: it grazes, or is held."""
-    return work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
 
 
 def margin(work, state, row):

@@ -32,10 +32,16 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.events.resolution import above_rounding, memory_of
+from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.integrators.rhs.stated_error import let_go, pressed_stiffness
+from flocsim.integrators.rhs.views import (
+    contact_view,
+    memory_of,
+    normal_rate,
+    pressed_view,
+    tangential_rate,
+)
 from flocsim.laws import contact_derivatives, contact_force
 
 SHARE_OF_FLIGHT = 0.1
@@ -252,13 +258,14 @@ def part(scene, work, clock, row, step):
     if hold(scene, work, clock, row, step):
         if work.slip[HELD, row] == 0.0:
             work.slip[NOW, row] = 0.0  # as wherever a contact parts
+            work.slip[GRAZING_FORCE, row] = 0.0
         work.slip[HELD, row] = 1.0
         return False
-    work.slip[HELD, row] = 0.0
+    let_go(scene, work, row)
     if begins(scene, work, clock, row):
         for other in range(work.tally[CANDIDATES]):
             if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
-                work.slip[HELD, other] = 0.0
+                let_go(scene, work, other)
                 enter(scene, work, other)
         return True
     return False
@@ -277,7 +284,7 @@ def settle(scene, work, clock, step):
             if work.geometry[NOW, row, GAP] < 0.0:
                 count_flight(work, clock, row)
         elif work.geometry[NOW, row, GAP] < 0.0:
-            work.slip[HELD, row] = 0.0
+            let_go(scene, work, row)
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES and work.geometry[NOW, row, GAP] >= 0.0:
             entered = part(scene, work, clock, row, step) or entered

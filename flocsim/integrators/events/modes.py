@@ -6,8 +6,8 @@ driver ends the step where a flag would change (see crossings.py).
 
 from flocsim.arrays import CANDIDATES, CLOSED, GAP, NOW, OPEN, TOUCHES
 from flocsim.hooks import hook
-from flocsim.integrators.events.crossings import stays
 from flocsim.integrators.rhs.friction import set_sliding
+from flocsim.integrators.rhs.grazing import stays
 
 SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
 """What changed when pairs were flagged: nothing; what sticks and slides, by which no force jumps;

@@ -14,12 +14,15 @@ where it ceases to slide it sticks again, T being taken over by its spring.
 """
 
 from flocsim.arrays import (
+    CLOSED,
     EDGE_ARM_N,
     EDGE_ARM_T,
     EDGE_BODY,
     FREE,
+    GRAZES,
     GRAZING_FORCE,
     GRAZING_RESISTANCE,
+    HELD,
     INERTIA,
     MASS,
     NOW,
@@ -32,6 +35,11 @@ from flocsim.integrators.rhs.views import normal_rate
 STIFFER = 1e5
 """The gap of a pair that grazes is held so many times as stiffly as by inertia, drag and the other
 contacts in a step."""
+
+
+def stays(work, row):
+    """Whether a pair grazes, or is held: it is neither open nor closed by its gap."""
+    return work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0
 
 
 def grazing_force(work, state, row):

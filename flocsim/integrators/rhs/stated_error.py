@@ -39,6 +39,7 @@ from flocsim.arrays import (
     FREE,
     GAP,
     GRAZES,
+    GRAZING_FORCE,
     HELD,
     INERTIA,
     MASS,
@@ -50,6 +51,7 @@ from flocsim.arrays import (
     OPEN,
     RELAXATION,
     SHORTENED,
+    SLIDING,
     SLIP_OFFSET,
     SPIN,
     STEP_ERROR,
@@ -59,6 +61,7 @@ from flocsim.arrays import (
     SWITCH_SPEED,
     TOLERANCE,
     TOUCHES,
+    VELOCITY,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
@@ -68,8 +71,16 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.geometry.contact.separation import length_of
+from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.views import along_normal, contact_view, normal_rate, pressed_view
+from flocsim.integrators.rhs.grazing import coupling, grazing_force, normal_mobility, stays
+from flocsim.integrators.rhs.views import (
+    along_normal,
+    contact_view,
+    memory_of,
+    normal_rate,
+    pressed_view,
+)
 from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 OF_SWITCHES = 1.5
@@ -77,6 +88,10 @@ OF_SWITCHES = 1.5
 
 OF_VECTOR = 13.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
+
+OF_BOUNDS = OF_SWITCHES / OF_VECTOR
+"""What is bounded, and not estimated, is in the vector by this share, so that it counts OF_SWITCHES
+times there, too."""
 
 LEAST = 0.006
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
@@ -283,11 +298,67 @@ def signed_time(work, row, step, depth, doubt):
     return step if -max(depth, doubt, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
 
 
+def tangential_force(scene, work, row):
+    """The tangential force of a closed pair now [N]."""
+    if work.candidates[row, CLOSED] == GRAZES:
+        return grazing_force(work, NOW, row)
+    _, force = contact_force(scene, contact_view(scene, work, NOW, row))
+    return force
+
+
+def lifted_load(scene, work, row, tangential):
+    """The load [N] that a tangential force lifts, and which presses where that is not there."""
+    return tangential * coupling(scene, work, row) / normal_mobility(scene, work, row)
+
+
+def doubted(scene, work, row, tangential):
+    """What the carried error is to know of a tangential force [N] that may not have been there, its
+    load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
+    it enlarges the error. What different contacts and times have lost must not cancel."""
+    normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
+    apart = along_normal(work, row, CARRIED, X)
+    apart += memory * along_normal(work, row, CARRIED, VELOCITY)
+    along = slip_error(work, row, X) + memory * slip_error(work, row, VELOCITY)
+    share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
+    return share * normal, share * tangential
+
+
+def doubt_tangential(scene, work, row, step):
+    """Count as an error all that the tangential force of a pair that grazes, or is held, has done
+    in a step: by the law the pair loses it whenever it parts, and is pressed by what it has lifted
+    instead."""
+    force = tangential_force(scene, work, row)
+    impulse = step * length_of(lifted_load(scene, work, row, force), force)
+    add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, SWITCH_SPEED)
+    add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, SWITCH_SPEED)
+    if work.slip[HELD, row] != 0.0:
+        work.slip[GRAZING_FORCE, row] += step * force
+
+
+def let_go(scene, work, row):
+    """A pair is no longer held; what its tangential force has done meanwhile, which its own spring
+    would have kept from the carried error, goes into that."""
+    if work.slip[HELD, row] != 0.0:
+        kick_pair(scene, work, row, *doubted(scene, work, row, work.slip[GRAZING_FORCE, row]))
+        work.slip[HELD, row] = work.slip[GRAZING_FORCE, row] = 0.0
+
+
+def forget_offsets(work):
+    """Of pairs that are open, or slide, no displacement knows of the error that there is already:
+    ξ counts from where they will stick. By the law one that grazes, or is held, has lost it."""
+    for row in range(work.tally[CANDIDATES]):
+        kept, slides = stays(work, row), work.candidates[row, SLIDING] != 0
+        if kept or slides or not is_closed(work, row):
+            lost = OF_BOUNDS * work.slip[NOW, row] if kept else 0.0
+            work.slip[SLIP_OFFSET, row] = lost - slip_error(work, row, X)
+
+
 def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES or work.slip[HELD, row] != 0.0:
+        if stays(work, row):
+            doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
         late = doubtful_time(work, row, step, doubt)

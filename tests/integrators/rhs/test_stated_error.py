@@ -26,7 +26,6 @@ from flocsim.arrays import (
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import forget_offsets
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.events.modes import set_modes
@@ -35,6 +34,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.integrators.rhs.stated_error import forget_offsets
 from tests.helpers.fast_scene import flagged
 
 RATE = 2e3
