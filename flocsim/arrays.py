@@ -59,28 +59,30 @@ SLIP_RATES = STATES
     SLIP_ROWS,
 ) = range(2 * STATES, 2 * STATES + 18)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
-along the tangent. Of a pair that grazes: its tangential force now [N], of one that is held, the
-impulse of that since it is [N s]; 1 where it has only just begun to graze; by how much that force
-falls with the rate of the gap [N s/m]; the gap at which it has been held, which counts as none [m].
-How far a pair has been apart since it last parted [m], how often that was next to nothing, and 1
-where it stays closed though it is apart (see events.grazes). The overlap of a pair, what is left of
-its gap and the changes of both, while an interior-point method finds out which pairs close [m].
-Displacements, offsets, forces, gaps and flights that are set aside while the list is made anew."""
+along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
+begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
+held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
+that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).  The
+overlap of a pair, what is left of its gap and the changes of both, while an interior-point method
+finds out which pairs close [m].  Displacements, offsets, forces, gaps and flights that are set
+aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    DOUBT_PLACE, DOUBT_SPEED, SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
-    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, FRAMES,
+    DOUBT_PLACE, DOUBT_SPEED, LOST_PLACE, LOST_SPEED, SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT,
+    KICK_SPAN, KICK_X, KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, FRAMES,
 ) = (
-    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 21, 23, 24, 25, 28, 29, 30, 31, 32,
+    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 23, 25, 26, 27, 30, 31, 32,
+    33, 34,
 )  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
 sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
 (x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s]; what all steps' errors, those of switches, and contacts that may have opened
-have led to; of the first body of a cluster: the share to which the carried error is shortened,
-the sums of forces, and of masses times accelerations (x, y); of body 0, where the present
+of velocity [m/s]; what all steps' errors, those of switches, contacts that may have opened, and
+forces of pairs that are held have led to; of the first body of a cluster: the share to which the
+carried error is shortened, the sums of forces, and of masses times accelerations (x, y); of body 0,
+where the present
 kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
 angle, and its cosine and sine, as they are remembered; of the first body of a cluster, by how much
 the place of one of its bodies may be wrong [m]; its frames at an implicit step's stages."""
@@ -319,7 +321,7 @@ class Work(NamedTuple):
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
     ``slip`` (34, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
-    ``bodies`` (n, 41): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    ``bodies`` (n, 43): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
     ``jacobian`` (2, 2 n + 2 pairs, 3, 3): blocks of DAMPING and STIFFNESS, see rhs.blocks.
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.

@@ -8,8 +8,8 @@ import numpy as np
 from flocsim.arrays import ACROSS, MOTION_COLUMNS, STEP, Scene
 from flocsim.geometry.contact.sweep import DISC_COLUMNS
 
-ERROR_COLUMNS = 6
-"""Columns of ``errors``: from ERROR_PLACE to DOUBT_SPEED of a run."""
+ERROR_COLUMNS = 8
+"""Columns of ``errors``: from ERROR_PLACE to LOST_SPEED of a run."""
 
 BEGIN, END, HORIZON_AT, TIME_COUNT = range(4)
 """Places in ``times``: when the window begins and ends, and when the run does [s]."""
@@ -39,7 +39,7 @@ class Swarm(NamedTuple):
     """n bodies at a common time.
 
     ``bodies`` (n, 10), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
-    ``carried`` (n, 6), ``errors`` (n, 6), ``steps`` (n,): the state, the vector of its error, what
+    ``carried`` (n, 6), ``errors`` (n, 8), ``steps`` (n,): the state, the vector of its error, what
     the errors of steps and switches have led to, the size of the next step [s].  ``methods`` (n,):
     1 where the steps of its island went on across switches, as ACROSS in a clock.  ``wander``
     (n,): how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),

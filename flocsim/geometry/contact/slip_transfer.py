@@ -111,12 +111,12 @@ def restore_slips(work, count):
                 work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
                 work.slip[GAP_OFFSET, row] = work.slip[KEPT_GAP, k]
                 work.slip[FLIGHTS, row] = work.slip[KEPT_FLIGHTS, k]
-                work.slip[GRAZING_FORCE, row] = work.slip[KEPT_FORCE, k]
                 if work.kept[k, KEPT_MODE] == STAYS:
                     work.candidates[row, CLOSED] = TOUCHES
                     work.slip[HELD, row] = 1.0
                 if work.kept[k, KEPT_MODE] == GRAZES:
                     work.candidates[row, CLOSED] = GRAZES
+                    work.slip[GRAZING_FORCE, row] = work.slip[KEPT_FORCE, k]
                     work.slip[FRESH, row] = 0.0
     work.tally[KEPT] = 0
 

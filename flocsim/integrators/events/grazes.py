@@ -34,7 +34,7 @@ from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
-from flocsim.integrators.rhs.stated_error import let_go, pressed_stiffness
+from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import (
     contact_view,
     memory_of,
@@ -258,14 +258,13 @@ def part(scene, work, clock, row, step):
     if hold(scene, work, clock, row, step):
         if work.slip[HELD, row] == 0.0:
             work.slip[NOW, row] = 0.0  # as wherever a contact parts
-            work.slip[GRAZING_FORCE, row] = 0.0
         work.slip[HELD, row] = 1.0
         return False
-    let_go(scene, work, row)
+    work.slip[HELD, row] = 0.0
     if begins(scene, work, clock, row):
         for other in range(work.tally[CANDIDATES]):
             if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
-                let_go(scene, work, other)
+                work.slip[HELD, other] = 0.0
                 enter(scene, work, other)
         return True
     return False
@@ -284,7 +283,7 @@ def settle(scene, work, clock, step):
             if work.geometry[NOW, row, GAP] < 0.0:
                 count_flight(work, clock, row)
         elif work.geometry[NOW, row, GAP] < 0.0:
-            let_go(scene, work, row)
+            work.slip[HELD, row] = 0.0
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == TOUCHES and work.geometry[NOW, row, GAP] >= 0.0:
             entered = part(scene, work, clock, row, step) or entered

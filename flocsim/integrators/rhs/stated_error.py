@@ -39,9 +39,9 @@ from flocsim.arrays import (
     FREE,
     GAP,
     GRAZES,
-    GRAZING_FORCE,
-    HELD,
     INERTIA,
+    LOST_PLACE,
+    LOST_SPEED,
     MASS,
     MOST_PLACE,
     MOTION_COLUMNS,
@@ -129,24 +129,26 @@ def carry_errors(scene, work, clock, step):
         carried(work, body, ERROR_PLACE, ERROR_SPEED, step)
         carried(work, body, SWITCH_PLACE, SWITCH_SPEED, step)
         carried(work, body, DOUBT_PLACE, DOUBT_SPEED, step)
+        carried(work, body, LOST_PLACE, LOST_SPEED, step)
         errors[body, ERROR_PLACE] += weight * errors[body, STEP_PLACE]
         errors[body, ERROR_SPEED] += weight * errors[body, STEP_SPEED]
         known = known or errors[body, STEP_PLACE] + errors[body, STEP_SPEED] > 0.0
-    largest = 0.0
+    largest, lost = 0.0, 0.0
     for body in range(work.bodies.shape[0]):
         if not known:
             errors[body, ERROR_PLACE] += clock[STEP_ERROR]
         stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * (errors[body, SWITCH_PLACE] + errors[body, DOUBT_PLACE])
         largest = max(largest, stated)
+        lost = max(lost, OF_SWITCHES * errors[body, LOST_PLACE])
         if across:
             for axis in range(MOTION_COLUMNS):
                 work.motion[CARRIED, body, axis] += work.motion[DEVIATION, body, axis]
     if across:
-        clock[ERROR] = largest
+        clock[ERROR] = largest + lost
         return
     vector = max(carry_vector(scene, work, clock, step), LEAST * clock[TOLERANCE])
-    clock[ERROR] = min(largest, OF_VECTOR * vector)
+    clock[ERROR] = min(largest, OF_VECTOR * vector) + lost
 
 
 @hook
@@ -329,27 +331,19 @@ def doubt_tangential(scene, work, row, step):
     instead."""
     force = tangential_force(scene, work, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
-    add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, SWITCH_SPEED)
-    add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, SWITCH_SPEED)
-    if work.slip[HELD, row] != 0.0:
-        work.slip[GRAZING_FORCE, row] += step * force
-
-
-def let_go(scene, work, row):
-    """A pair is no longer held; what its tangential force has done meanwhile, which its own spring
-    would have kept from the carried error, goes into that."""
-    if work.slip[HELD, row] != 0.0:
-        kick_pair(scene, work, row, *doubted(scene, work, row, work.slip[GRAZING_FORCE, row]))
-        work.slip[HELD, row] = work.slip[GRAZING_FORCE, row] = 0.0
+    kind = SWITCH_SPEED if work.candidates[row, CLOSED] == GRAZES else LOST_SPEED
+    add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, kind)
+    add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, kind)
 
 
 def forget_offsets(work):
     """Of pairs that are open, or slide, no displacement knows of the error that there is already:
     ξ counts from where they will stick. By the law one that grazes, or is held, has lost it."""
     for row in range(work.tally[CANDIDATES]):
-        kept, slides = stays(work, row), work.candidates[row, SLIDING] != 0
-        if kept or slides or not is_closed(work, row):
-            lost = OF_BOUNDS * work.slip[NOW, row] if kept else 0.0
+        slides = work.candidates[row, SLIDING] != 0
+        if stays(work, row) or slides or not is_closed(work, row):
+            grazes = work.candidates[row, CLOSED] == GRAZES
+            lost = OF_BOUNDS * work.slip[NOW, row] if grazes else 0.0
             work.slip[SLIP_OFFSET, row] = lost - slip_error(work, row, X)
 
 
