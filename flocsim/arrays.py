@@ -77,13 +77,12 @@ aside while the list is made anew."""
     33, 34,
 )  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
-sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
-(x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s]; what all steps' errors, those of switches, contacts that may have opened, and
-forces of pairs that are held have led to; of the first body of a cluster: the share to which the
-carried error is shortened, the sums of forces, and of masses times accelerations (x, y); of body 0,
-where the present
-kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
+sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift (x,
+y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and of
+velocity [m/s]; what all steps' errors, those of switches, contacts that may have opened, and forces
+of pairs that are held have led to; of the first body of a cluster: the share to which the carried
+error is shortened, the sums of forces, and of masses times accelerations (x, y); of body 0, where
+the present kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
 angle, and its cosine and sine, as they are remembered; of the first body of a cluster, by how much
 the place of one of its bodies may be wrong [m]; its frames at an implicit step's stages."""
 
