@@ -54,6 +54,7 @@ from flocsim.arrays import (
     SLIDING,
     SLIP_OFFSET,
     SPIN,
+    STAGED_STEP,
     STEP_ERROR,
     STEP_PLACE,
     STEP_SPEED,
@@ -98,6 +99,9 @@ LEAST = 0.006
 
 DOUBT = 2.0
 """A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
+
+UNRESOLVED = 50.0
+"""A step of so many times 1/ω0 leaves a contact's vibration out; a shorter one in part."""
 
 LONG = 1e6
 """A relaxation so many times as long as a step counts as none."""
@@ -265,7 +269,7 @@ def has_switched(work, row):
     return closed != work.candidates[row, CLOSED]
 
 
-def doubtful_time(work, row, step, doubt):
+def doubtful_time(work, row, step, doubt, resolved):
     """For how much of a step it is in doubt whether a pair touched [s].
 
     How finely its touch was located says nothing of that later on: a contact that rests in a hair's
@@ -275,7 +279,7 @@ def doubtful_time(work, row, step, doubt):
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)))
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)) * resolved)
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -285,6 +289,17 @@ def pressed_stiffness(scene, view, overlap):
         return 0.0
     force, _ = contact_force(scene, pressed_view(view, overlap, 0.0))
     return force / overlap
+
+
+def unresolved(scene, work, clock, row):
+    """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
+    its vibration out, so that the load decides whether it is there."""
+    view = contact_view(scene, work, NOW, row)
+    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+    if not stiffness > 0.0:
+        return 0.0
+    turns = clock[STAGED_STEP] * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
+    return min(1.0, turns * turns)
 
 
 def signed_time(work, row, step, depth, doubt):
@@ -355,7 +370,7 @@ def add_switch_errors(scene, work, clock, step, depth):
             doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        late = doubtful_time(work, row, step, doubt)
+        late = doubtful_time(work, row, step, doubt, 1.0 - unresolved(scene, work, clock, row))
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
