@@ -55,6 +55,7 @@ from flocsim.arrays import (
     SLIP_OFFSET,
     SPIN,
     STAGED_STEP,
+    STATED,
     STEP_ERROR,
     STEP_PLACE,
     STEP_SPEED,
@@ -119,16 +120,18 @@ def carried(work, body, place, speed, step):
 @hook
 def carry_vector(scene, work, clock, step):
     """Carry the error as a vector, too, where the method has the forces' derivatives; how large it
-    is in the place of an outline [m]."""
+    is in the place of an outline [m], inf where it has not."""
     return math.inf
 
 
 def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
     known, errors = False, work.bodies
-    # Of steps across switches all counts that is estimated, and nothing is carried on with motion.
+    # All counts that is estimated where features come to share in a surface force inside of steps,
+    # and of steps across switches, of which nothing is carried on with motion.
     across = clock[ACROSS] == 1.0
-    weight = 1.0 / clock[ESTIMATE_SHARE] if across else 1.0
+    share = 1.0 if scene.surface_reach > 0.0 else clock[ESTIMATE_SHARE]
+    weight = 1.0 / share if across else 1.0
     for body in range(work.bodies.shape[0]):
         carried(work, body, ERROR_PLACE, ERROR_SPEED, step)
         carried(work, body, SWITCH_PLACE, SWITCH_SPEED, step)
@@ -137,22 +140,25 @@ def carry_errors(scene, work, clock, step):
         errors[body, ERROR_PLACE] += weight * errors[body, STEP_PLACE]
         errors[body, ERROR_SPEED] += weight * errors[body, STEP_SPEED]
         known = known or errors[body, STEP_PLACE] + errors[body, STEP_SPEED] > 0.0
-    largest, lost = 0.0, 0.0
+    largest = 0.0
     for body in range(work.bodies.shape[0]):
         if not known:
             errors[body, ERROR_PLACE] += clock[STEP_ERROR]
-        stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
+        stated = share * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * (errors[body, SWITCH_PLACE] + errors[body, DOUBT_PLACE])
         largest = max(largest, stated)
-        lost = max(lost, OF_SWITCHES * errors[body, LOST_PLACE])
         if across:
             for axis in range(MOTION_COLUMNS):
                 work.motion[CARRIED, body, axis] += work.motion[DEVIATION, body, axis]
-    if across:
-        clock[ERROR] = largest + lost
-        return
-    vector = max(carry_vector(scene, work, clock, step), LEAST * clock[TOLERANCE])
-    clock[ERROR] = min(largest, OF_VECTOR * vector) + lost
+    vector = math.inf if across else carry_vector(scene, work, clock, step)
+    clock[ERROR] = 0.0
+    for body in range(work.bodies.shape[0]):
+        stated = largest
+        if vector < math.inf:
+            own = max(carried_size(scene, work, body), LEAST * clock[TOLERANCE])
+            stated = min(stated, OF_VECTOR * own)
+        errors[body, STATED] = stated + OF_SWITCHES * errors[body, LOST_PLACE]
+        clock[ERROR] = max(clock[ERROR], errors[body, STATED])
 
 
 @hook
