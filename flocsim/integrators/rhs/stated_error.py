@@ -7,14 +7,17 @@ A step's error of place stays, one of velocity goes on moving a body until drag 
 with what every step adds to both. A switch adds to E_v: a touch that is noticed g too deep, or a
 parting g too late, at the speed v, leaves out (or adds) the contact's force for a time g/v.
 A contact that may be open, because it overlaps by no more than its gap may be wrong by, leaves the
-force in doubt for all of the step.
+force in doubt for all of the step; where a step leaves its vibration out, the load decides.
+One that grazes or is held (events/grazes.py) has a tangential force that it may have lost by the
+law, where it parts again and again: all of it counts as an error, and the load that it lifts.
 
 These sums know nothing of what contacts take up, nor that errors cancel. A method that has the
 forces' derivatives carries the error on as a vector, too (radau/carried_error.py), and the smaller
-of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of what it estimates
-for its steps, were found on random runs that make a nudge grow less than
-tenfold (benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over
-one way or the other, is told by a nudged companion alone.
+of both is stated. What held pairs have lost comes on top: in the matrices of a step they resist an
+error, which by the law they do not. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of
+what it estimates for its steps, were found on random runs that make a nudge grow less than tenfold
+(benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over one way
+or the other, is told by a nudged companion alone.
 """
 
 import math

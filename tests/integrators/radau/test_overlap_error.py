@@ -49,9 +49,7 @@ def test_a_step_that_resolves_the_vibration_has_it_right():
     stages = on_a_line(1e-11, 0.0)
     stages[2] += 1e-12
     tenth = 0.1 * stated_error.UNRESOLVED
-    assert error_of(stages, tenth) == pytest.approx(
-        2e-14, rel=1e-6, abs=0.0
-    )
+    assert error_of(stages, tenth) == pytest.approx(2e-14, rel=1e-6, abs=0.0)
     assert error_of(stages, 0.1) < 1e-17
 
 
