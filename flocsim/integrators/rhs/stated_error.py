@@ -94,9 +94,12 @@ OF_SWITCHES = 1.5
 OF_VECTOR = 13.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
-OF_BOUNDS = OF_SWITCHES / OF_VECTOR
-"""What is bounded, and not estimated, is in the vector by this share, so that it counts OF_SWITCHES
-times there, too."""
+OF_LOST = 2.5
+"""By how much motion may have made that grow which pairs that graze, or are held, have lost: a
+carried error does not know that contacts end sooner or later by it, …"""
+
+OF_BOUNDS = OF_LOST / OF_VECTOR
+"""… and has it by this share, for it is a bound, and no estimate that the vector has to cover."""
 
 LEAST = 0.006
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
@@ -355,6 +358,7 @@ def doubt_tangential(scene, work, row, step):
     instead."""
     force = tangential_force(scene, work, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
+    impulse *= OF_LOST / OF_SWITCHES
     kind = SWITCH_SPEED if work.candidates[row, CLOSED] == GRAZES else LOST_SPEED
     add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, kind)
     add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, kind)

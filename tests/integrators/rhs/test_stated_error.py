@@ -253,12 +253,12 @@ def test_what_a_pair_that_grazes_or_is_held_has_lost_counts_as_an_error():
     work.slip[GRAZING_FORCE, row] = force
     stated_error.add_switch_errors(scene, work, clock, step, 1e-12)
     least = force * step / scene.bodies[1, MASS]
-    assert least < work.bodies[1, SWITCH_SPEED] < 20.0 * least
+    assert least < work.bodies[1, SWITCH_SPEED] < 40.0 * least
     assert not work.bodies[:, LOST_SPEED].any()
     scene, work, row = corner_on_slab(force)
     work.slip[HELD, row] = 1.0
     stated_error.add_switch_errors(scene, work, clock, step, 1e-12)
-    assert least < work.bodies[1, LOST_SPEED] < 20.0 * least
+    assert least < work.bodies[1, LOST_SPEED] < 40.0 * least
     assert not work.bodies[:, SWITCH_SPEED].any()
 
 
