@@ -74,19 +74,21 @@ pair last touched again behind a flight that was next to nothing [s]."""
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
     RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
     DOUBT_PLACE, DOUBT_SPEED, SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
-    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, FRAMES,
+    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, STATED, FRAMES,
 ) = (
     0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 21, 23, 24, 25, 28, 29, 30, 31, 32,
+    33,
 )  # fmt: skip
 """First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
-sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift
-(x, y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and
-of velocity [m/s]; what all steps' errors, those of switches, and contacts that may have opened
-have led to; of the first body of a cluster: the share to which the carried error is shortened,
-the sums of forces, and of masses times accelerations (x, y); of body 0, where the present
-kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
+sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift (x,
+y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and of
+velocity [m/s]; what all steps' errors, those of switches, and contacts that may have opened have
+led to; of the first body of a cluster: the share to which the carried
+error is shortened, the sums of forces, and of masses times accelerations (x, y); of body 0, where
+the present kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
 angle, and its cosine and sine, as they are remembered; of the first body of a cluster, by how much
-the place of one of its bodies may be wrong [m]; its frames at an implicit step's stages."""
+the place of one of its bodies may be wrong [m]; the stated error of a body [m]; its frames at an
+implicit step's stages."""
 
 TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
 """Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
@@ -325,11 +327,11 @@ class Elimination(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused.
 
-    ``motion`` (16, n, 6): places and velocities in the states, then see START.
+    ``motion`` (18, n, 6): places and velocities in the states, then see START.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (34, capacity): tangential displacements in the states, their rates there, then see
+    ``slip`` (39, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
-    ``bodies`` (n, 41): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
+    ``bodies`` (n, 45): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
     ``jacobian`` (2, 2 n + 2 pairs, 3, 3): blocks of DAMPING and STIFFNESS, see rhs.blocks.
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.

@@ -14,7 +14,6 @@ from flocsim.arrays import (
     CARRIED,
     CLOCK_SIZE,
     COUNTS_SIZE,
-    ERROR,
     ERROR_PLACE,
     EVALUATIONS,
     FREE,
@@ -37,6 +36,7 @@ from flocsim.arrays import (
     OPEN,
     PAIRS,
     REJECTED,
+    STATED,
     STATES,
     STEP,
     STEPS,
@@ -278,7 +278,7 @@ def take_state(swarm, work, observed, clock, members, first):
         for kind in range(ERROR_COLUMNS):
             swarm.new_errors[member, kind] = work.bodies[body, ERROR_PLACE + kind]
         swarm.new_steps[member] = clock[STEP]
-        swarm.stated[member] = clock[ERROR]
+        swarm.stated[member] = work.bodies[body, STATED]
         swarm.new_methods[member] = clock[ACROSS]
 
 

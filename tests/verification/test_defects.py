@@ -133,10 +133,6 @@ def test_a_contact_that_sticks_and_slides_is_decided():
     assert row["steps"] + row["rejected"] < 10_000
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the stated error does not know what grazing and held pairs leave out before a lift-off",
-)
 def test_the_stated_error_covers_a_lift_off():
     """A doublet rolls apart while its contact opens and closes by less than an atom."""
     rows = [

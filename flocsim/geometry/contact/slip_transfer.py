@@ -3,7 +3,6 @@
 import math
 
 from flocsim.arrays import (
-    ANGLE,
     CANDIDATES,
     CARRIED,
     CLOSED,
@@ -35,15 +34,12 @@ from flocsim.arrays import (
     NOW,
     PAIR,
     RADIUS,
-    SLIDING,
     SLIP_OFFSET,
-    TOUCHES,
     VERTEX,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
     X,
-    Y,
 )
 from flocsim.hooks import hook
 
@@ -198,28 +194,20 @@ def hand_over(scene, work):
                 agreement = tangent_agreement(work, row, heir)
                 total = own + given * agreement
                 work.slip[NOW, heir] = min(max(total, -most), most)
-                wrong = slip_error(work, row) + work.slip[SLIP_OFFSET, row]
+                wrong = slip_error(work, row, X) + work.slip[SLIP_OFFSET, row]
                 work.slip[SLIP_OFFSET, heir] += wrong * agreement
             work.slip[NOW, row] = 0.0
 
 
-def slip_error(work, row):
+def slip_error(work, row, first):
     """How wrong a pair's two contact points lie along the tangent, as carried on with the motion
-    [m]."""
+    [m], for ``first`` X; how wrong they move there [m/s], for VELOCITY."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     e, g = work.motion, work.geometry
-    along = g[NOW, row, NORMAL_X] * (e[CARRIED, a, Y] - e[CARRIED, b, Y])
-    along -= g[NOW, row, NORMAL_Y] * (e[CARRIED, a, X] - e[CARRIED, b, X])
-    along += g[NOW, row, VERTEX_ARM_T] * e[CARRIED, a, ANGLE]
-    return along - g[NOW, row, EDGE_ARM_T] * e[CARRIED, b, ANGLE]
-
-
-def forget_offsets(work):
-    """Of pairs that are open, or slide, no displacement knows of the error that there is already:
-    ξ counts from where they will stick."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] != TOUCHES or work.candidates[row, SLIDING] != 0:
-            work.slip[SLIP_OFFSET, row] = -slip_error(work, row)
+    along = g[NOW, row, NORMAL_X] * (e[CARRIED, a, first + 1] - e[CARRIED, b, first + 1])
+    along -= g[NOW, row, NORMAL_Y] * (e[CARRIED, a, first] - e[CARRIED, b, first])
+    along += g[NOW, row, VERTEX_ARM_T] * e[CARRIED, a, first + 2]
+    return along - g[NOW, row, EDGE_ARM_T] * e[CARRIED, b, first + 2]
 
 
 def tangent_agreement(work, row, other):

@@ -40,10 +40,10 @@ from flocsim.integrators.backward_euler.estimate import estimate_step, write_rat
 from flocsim.integrators.backward_euler.interior import find_closed
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, put_back, solve_end
 from flocsim.integrators.events.modes import set_modes
-from flocsim.integrators.events.resolution import bounces, memory_of
+from flocsim.integrators.events.resolution import bounces
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view
+from flocsim.integrators.rhs.views import contact_view, memory_of
 
 QUICK, MOST_ITERATIONS = 5, 16
 """Iterations of Newton's method from the start of the step, and from where the interior-point

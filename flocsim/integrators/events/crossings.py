@@ -19,8 +19,8 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import hook
-from flocsim.integrators.events.resolution import memory_of, release_resolution, touch_resolution
-from flocsim.integrators.rhs.views import normal_rate
+from flocsim.integrators.events.resolution import release_resolution, touch_resolution
+from flocsim.integrators.rhs.views import memory_of, normal_rate
 
 NEVER = 2.0
 """The share of the step at which a switch comes that does not come in it."""

@@ -49,6 +49,7 @@ from flocsim.arrays import (
     OPEN,
     SLIDING,
     SPIN,
+    STATED,
     SWITCH_PLACE,
     TIME,
     TRIAL,
@@ -281,7 +282,7 @@ def carry_on_errors(work, clock, many):
     if grown > 0.0:
         factor = 1.0 + many * grown / clock[ERROR]
         for body in range(2):
-            for column in (ERROR_PLACE, SWITCH_PLACE, DOUBT_PLACE):
+            for column in (ERROR_PLACE, SWITCH_PLACE, DOUBT_PLACE, STATED):
                 work.bodies[body, column] *= factor
             for axis in range(MOTION_COLUMNS):
                 work.motion[CARRIED, body, axis] *= factor

@@ -34,9 +34,15 @@ from flocsim.arrays import (
 )
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.events.resolution import above_rounding, memory_of
+from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
-from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.integrators.rhs.views import (
+    contact_view,
+    memory_of,
+    normal_rate,
+    pressed_view,
+    tangential_rate,
+)
 from flocsim.laws import contact_derivatives, contact_force
 
 SHARE_OF_FLIGHT = 0.1

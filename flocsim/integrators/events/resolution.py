@@ -6,9 +6,8 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 
 import math
 
-from flocsim.arrays import EDGE_BODY, MEMORY, VERTEX_BODY
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view
+from flocsim.integrators.rhs.views import contact_view, memory_of, normal_rate, pressed_view
 from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 SHARE_OF_DEPTH = 0.02
@@ -46,12 +45,6 @@ def bounces(scene, view, speed, frequency):
     """Whether bodies fly apart again: damping below critical, or none that pulls."""
     drag = 2.0 * NEARLY * frequency * speed * view.effective_mass
     return pressed(scene, view, 0.0, speed) < drag or (pressed(scene, view, 0.0, -speed) >= 0.0)
-
-
-def memory_of(work, row):
-    """How long a velocity of either body of a pair is remembered [s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
 
 
 def furthest_place(work, state):

@@ -35,7 +35,7 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
 from flocsim.geometry.contact.points import locate_contacts, row_radii
-from flocsim.geometry.contact.slip_transfer import forget_offsets, hand_over
+from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import (
     attempt,
     choose_method,
@@ -67,7 +67,7 @@ from flocsim.integrators.loop.step_size import (
 )
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
-from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors
+from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
 

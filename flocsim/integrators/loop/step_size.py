@@ -30,10 +30,10 @@ from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolutions_of
 from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
-from flocsim.integrators.events.resolution import memory_of, touch_resolution
+from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate
+from flocsim.integrators.rhs.views import contact_view, inertia, memory_of, normal_rate
 
 SAFETY = 0.9
 """Aim that far below the step at which the error would meet the tolerance."""

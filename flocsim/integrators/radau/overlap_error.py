@@ -7,8 +7,6 @@ tolerance may hold by a force that is wrong by several times itself where little
 decides when the contact opens. The stages show it: their overlaps lie on no line.
 """
 
-import math
-
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
@@ -16,20 +14,15 @@ from flocsim.arrays import (
     GAP,
     NOW,
     STAGED_STEP,
-    TOLERANCE,
     TOUCHES,
 )
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view
+from flocsim.integrators.rhs.stated_error import unresolved
 
 SHARE_OF_SCATTER = 2.0
 """The end's overlap is wrong by about half of how far it lies off the line of the other two, and
 where a contact lets go slowly by a few times as much (tests/verification/test_slow_release.py)."""
-
-UNRESOLVED = 50.0
-"""A step of so many times 1/ω0 leaves a contact's vibration out; a shorter one in part."""
 
 
 MOST_SCATTER = 0.4
@@ -43,15 +36,10 @@ ABOVE = 30.0
 def scatter_of(scene, work, clock, step, row):
     """How far the overlap of a contact at the end of a step lies off the line of those at the other
     stages, as far as the step does not resolve its vibrations [m]."""
-    view = contact_view(scene, work, NOW, row)
-    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
-    if not stiffness > 0.0:
-        return 0.0
-    turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
     g, span = work.geometry, NODES[1] - NODES[0]
     slope = (g[SECOND_STAGE, row, GAP] - g[FIRST_STAGE, row, GAP]) / span
     scatter = g[THIRD_STAGE, row, GAP] - g[SECOND_STAGE, row, GAP] - slope * (1.0 - NODES[1])
-    return abs(scatter) * min(1.0, turns * turns)
+    return abs(scatter) * unresolved(scene, work, clock, step, row)
 
 
 def overlap_error(scene, work, clock, row):

@@ -26,7 +26,7 @@ from flocsim.arrays import (
     TOUCHES,
     VELOCITY,
 )
-from flocsim.integrators.events.resolution import above_rounding, memory_of
+from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
@@ -36,7 +36,7 @@ from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_sta
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
-from flocsim.integrators.rhs.views import along_normal, lever
+from flocsim.integrators.rhs.views import along_normal, lever, memory_of
 
 MOST_ITERATIONS = 10
 """Newton steps before a step is given up and made smaller."""

@@ -48,6 +48,7 @@ from flocsim.geometry.contact.points import row_radii
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
+from flocsim.integrators.rhs.stated_error import doubted
 from flocsim.integrators.rhs.surface_gap import (
     mean_direction,
     run_end,
@@ -216,8 +217,12 @@ def add_grazing(scene, work, row):
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     pair, resistance = work.candidates[row, PAIR], work.slip[GRAZING_RESISTANCE, row]
     along, across = normal_rows(work, row), tangent_rows(work, row)
+    force = work.slip[GRAZING_FORCE, row]
     add_product(scene, work, DAMPING, pair, a, b, across, along, resistance)
-    add_turning(scene, work, row, 0.0, work.slip[GRAZING_FORCE, row])
+    add_turning(scene, work, row, 0.0, force)
+    pressed, tangential = doubted(scene, work, row, force)
+    add_forcing(work, a, b, along, pressed)
+    add_forcing(work, a, b, across, tangential)
 
 
 def add_forcing(work, a, b, out, size):

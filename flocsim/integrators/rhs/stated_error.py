@@ -7,14 +7,16 @@ A step's error of place stays, one of velocity goes on moving a body until drag 
 with what every step adds to both. A switch adds to E_v: a touch that is noticed g too deep, or a
 parting g too late, at the speed v, leaves out (or adds) the contact's force for a time g/v.
 A contact that may be open, because it overlaps by no more than its gap may be wrong by, leaves the
-force in doubt for all of the step.
+force in doubt for all of the step; where a step leaves its vibration out, the load decides.
+One that grazes (events/grazes.py) has a tangential force that it may have lost by the law, where it
+parts again and again: all of it counts as an error, and the load that it lifts.
 
 These sums know nothing of what contacts take up, nor that errors cancel. A method that has the
 forces' derivatives carries the error on as a vector, too (radau/carried_error.py), and the smaller
-of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of what it estimates
-for its steps, were found on random runs that make a nudge grow less than
-tenfold (benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over
-one way or the other, is told by a nudged companion alone.
+of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of
+what it estimates for its steps, were found on random runs that make a nudge grow less than tenfold
+(benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over one way
+or the other, is told by a nudged companion alone.
 """
 
 import math
@@ -49,8 +51,11 @@ from flocsim.arrays import (
     OPEN,
     RELAXATION,
     SHORTENED,
+    SLIDING,
     SLIP_OFFSET,
     SPIN,
+    STAGED_STEP,
+    STATED,
     STEP_ERROR,
     STEP_PLACE,
     STEP_SPEED,
@@ -58,6 +63,7 @@ from flocsim.arrays import (
     SWITCH_SPEED,
     TOLERANCE,
     TOUCHES,
+    VELOCITY,
     VERTEX_ARM_N,
     VERTEX_ARM_T,
     VERTEX_BODY,
@@ -67,8 +73,16 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.geometry.contact.separation import length_of
+from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.views import along_normal, contact_view, normal_rate, pressed_view
+from flocsim.integrators.rhs.grazing import coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.views import (
+    along_normal,
+    contact_view,
+    memory_of,
+    normal_rate,
+    pressed_view,
+)
 from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 OF_SWITCHES = 1.5
@@ -77,11 +91,21 @@ OF_SWITCHES = 1.5
 OF_VECTOR = 13.0
 """By how much the error may be larger than the vector of it that is carried along, …"""
 
+OF_LOST = 2.5
+"""By how much motion may have made that grow which pairs that graze have lost: a
+carried error does not know that contacts end sooner or later by it, …"""
+
+OF_BOUNDS = OF_LOST / OF_VECTOR
+"""… and has it by this share, for it is a bound, and no estimate that the vector has to cover."""
+
 LEAST = 0.006
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
 
 DOUBT = 2.0
 """A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
+
+UNRESOLVED = 50.0
+"""A step of so many times 1/ω0 leaves a contact's vibration out; a shorter one in part."""
 
 LONG = 1e6
 """A relaxation so many times as long as a step counts as none."""
@@ -99,16 +123,18 @@ def carried(work, body, place, speed, step):
 @hook
 def carry_vector(scene, work, clock, step):
     """Carry the error as a vector, too, where the method has the forces' derivatives; how large it
-    is in the place of an outline [m]."""
+    is in the place of an outline [m], inf where it has not."""
     return math.inf
 
 
 def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
     known, errors = False, work.bodies
-    # Of steps across switches all counts that is estimated, and nothing is carried on with motion.
+    # All counts that is estimated where features come to share in a surface force inside of steps,
+    # and of steps across switches, of which nothing is carried on with motion.
     across = clock[ACROSS] == 1.0
-    weight = 1.0 / clock[ESTIMATE_SHARE] if across else 1.0
+    share = 1.0 if scene.surface_reach > 0.0 else clock[ESTIMATE_SHARE]
+    weight = 1.0 / share if across else 1.0
     for body in range(work.bodies.shape[0]):
         carried(work, body, ERROR_PLACE, ERROR_SPEED, step)
         carried(work, body, SWITCH_PLACE, SWITCH_SPEED, step)
@@ -120,17 +146,21 @@ def carry_errors(scene, work, clock, step):
     for body in range(work.bodies.shape[0]):
         if not known:
             errors[body, ERROR_PLACE] += clock[STEP_ERROR]
-        stated = clock[ESTIMATE_SHARE] * errors[body, ERROR_PLACE]
+        stated = share * errors[body, ERROR_PLACE]
         stated += OF_SWITCHES * (errors[body, SWITCH_PLACE] + errors[body, DOUBT_PLACE])
         largest = max(largest, stated)
         if across:
             for axis in range(MOTION_COLUMNS):
                 work.motion[CARRIED, body, axis] += work.motion[DEVIATION, body, axis]
-    if across:
-        clock[ERROR] = largest
-        return
-    vector = max(carry_vector(scene, work, clock, step), LEAST * clock[TOLERANCE])
-    clock[ERROR] = min(largest, OF_VECTOR * vector)
+    vector = math.inf if across else carry_vector(scene, work, clock, step)
+    clock[ERROR] = 0.0
+    for body in range(work.bodies.shape[0]):
+        stated = largest
+        if vector < math.inf:
+            own = max(carried_size(scene, work, body), LEAST * clock[TOLERANCE])
+            stated = min(stated, OF_VECTOR * own)
+        errors[body, STATED] = stated
+        clock[ERROR] = max(clock[ERROR], stated)
 
 
 @hook
@@ -247,7 +277,7 @@ def has_switched(work, row):
     return closed != work.candidates[row, CLOSED]
 
 
-def doubtful_time(work, row, step, doubt):
+def doubtful_time(work, row, step, doubt, resolved):
     """For how much of a step it is in doubt whether a pair touched [s].
 
     How finely its touch was located says nothing of that later on: a contact that rests in a hair's
@@ -257,7 +287,7 @@ def doubtful_time(work, row, step, doubt):
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)))
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)) * resolved)
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -267,6 +297,17 @@ def pressed_stiffness(scene, view, overlap):
         return 0.0
     force, _ = contact_force(scene, pressed_view(view, overlap, 0.0))
     return force / overlap
+
+
+def unresolved(scene, work, clock, step, row):
+    """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
+    its vibration out, so that the load decides whether it is there."""
+    view = contact_view(scene, work, NOW, row)
+    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+    if not stiffness > 0.0:
+        return 0.0
+    turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
+    return min(1.0, turns * turns)
 
 
 def signed_time(work, row, step, depth, doubt):
@@ -282,14 +323,53 @@ def signed_time(work, row, step, depth, doubt):
     return step if -max(depth, doubt, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
 
 
+def lifted_load(scene, work, row, tangential):
+    """The load [N] that a tangential force lifts, and which presses where that is not there."""
+    return tangential * coupling(scene, work, row) / normal_mobility(scene, work, row)
+
+
+def doubted(scene, work, row, tangential):
+    """What the carried error is to know of a tangential force [N] that may not have been there, its
+    load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
+    it enlarges the error. What different contacts and times have lost must not cancel."""
+    normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
+    apart = along_normal(work, row, CARRIED, X)
+    apart += memory * along_normal(work, row, CARRIED, VELOCITY)
+    along = slip_error(work, row, X) + memory * slip_error(work, row, VELOCITY)
+    share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
+    return share * normal, share * tangential
+
+
+def doubt_tangential(scene, work, row, step):
+    """Count as an error all that the tangential force of a pair that grazes has done in a step: by
+    the law the pair loses it whenever it parts, and is pressed by what it has lifted instead."""
+    force = grazing_force(work, NOW, row)
+    impulse = step * length_of(lifted_load(scene, work, row, force), force)
+    impulse *= OF_LOST / OF_SWITCHES
+    add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, SWITCH_SPEED)
+    add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, SWITCH_SPEED)
+
+
+def forget_offsets(work):
+    """Of pairs that are open, or slide, no displacement knows of the error that there is already:
+    ξ counts from where they will stick. By the law one that grazes has lost it."""
+    for row in range(work.tally[CANDIDATES]):
+        if work.candidates[row, SLIDING] != 0 or not is_closed(work, row):
+            grazes = work.candidates[row, CLOSED] == GRAZES
+            lost = OF_BOUNDS * work.slip[NOW, row] if grazes else 0.0
+            work.slip[SLIP_OFFSET, row] = lost - slip_error(work, row, X)
+
+
 def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == GRAZES:
+            doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        late = doubtful_time(work, row, step, doubt)
+        resolved = 1.0 - unresolved(scene, work, clock, clock[STAGED_STEP], row)
+        late = doubtful_time(work, row, step, doubt, resolved)
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))

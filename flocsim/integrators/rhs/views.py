@@ -19,6 +19,7 @@ from flocsim.arrays import (
     KICK_X,
     LONG_AXIS,
     MASS,
+    MEMORY,
     NORMAL_X,
     NORMAL_Y,
     NOW,
@@ -108,6 +109,12 @@ def tangential_rate(work, state, row):
         + motion[state, a, SPIN] * g[state, row, VERTEX_ARM_T]
         - motion[state, b, SPIN] * g[state, row, EDGE_ARM_T]
     )
+
+
+def memory_of(work, row):
+    """How long a velocity of either body of a pair is remembered [s]."""
+    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
 
 
 def contact_view(scene, work, state, row):

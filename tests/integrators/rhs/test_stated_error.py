@@ -6,27 +6,37 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.arrays import (
+    CANDIDATES,
     CARRIED,
     CLOSED,
     DAMPING,
     DEVIATION,
     DOUBT_PLACE,
     DOUBT_SPEED,
+    ERROR,
     ERROR_PLACE,
     ERROR_SPEED,
+    FORCING,
+    GRAZES,
+    GRAZING_FORCE,
+    INERTIA,
     MASS,
     NOW,
     OPEN,
     STAGED_STEP,
+    STATED,
+    STEP_PLACE,
     SWITCH_PLACE,
     SWITCH_SPEED,
+    TOUCHES,
+    VERTEX_ARM_N,
+    VERTEX_BODY,
     VX,
     work_of,
 )
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import forget_offsets
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.events.modes import set_modes
@@ -35,6 +45,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.integrators.rhs.stated_error import forget_offsets
 from tests.helpers.fast_scene import flagged
 
 RATE = 2e3
@@ -197,6 +208,85 @@ def test_a_doubt_counts_for_its_own_body_alone():
     work.bodies[:, ERROR_PLACE] = 0.0, 1e-10
     work.cluster[:] = 0
     assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
+
+
+def test_the_load_tells_whether_a_contact_is_there_that_a_long_step_only_holds():
+    """What a step estimates for places is no doubt of a contact whose vibration it leaves out; that
+    its stages' overlaps lie on no line is (radau/overlap_error.py)."""
+    bodies = [Body(Sphere(5e-6), (x, 0.0), surface_density=2.0) for x in (0.0, 1e-5 - 1e-13)]
+    scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
+    clock = Implicit(1e-9).fresh_clock()
+    work.motion[DEVIATION, 0, 0] = 1e-12
+    clock[STAGED_STEP] = 1e-2
+    stated_error.add_switch_errors(scene, work, clock, 1e-2, 1e-14)
+    assert not work.bodies[:, DOUBT_SPEED].any()
+    clock[STAGED_STEP] = 1e-6
+    stated_error.add_switch_errors(scene, work, clock, 1e-6, 1e-14)
+    assert (work.bodies[:, DOUBT_SPEED] > 0.0).all()
+
+
+def corner_on_slab(force):
+    """(scene, work, row) of a rod that stands aslant on a fixed slab with its lower end, of which a
+    tangential force acts on the contact [N]."""
+    slab = SpheroPolygon([(-2e-5, 0.0), (-2e-5, -5e-6), (2e-5, -5e-6), (2e-5, 0.0)], 1e-6)
+    rod = SpheroPolygon([(-4e-6, -4e-6), (4e-6, 4e-6)], 1e-6)
+    bodies = [
+        Body(slab, (0.0, -2.5e-6), surface_density=2.0, fixed=True),
+        Body(rod, (0.0, 6e-6 - 1e-12), surface_density=2.0),
+    ]
+    scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
+    (row,) = np.flatnonzero(work.candidates[: work.tally[CANDIDATES], CLOSED] == TOUCHES)
+    assert work.candidates[row, VERTEX_BODY] == 1
+    work.slip[NOW, row] = -force / 2.0  # k_t is 2 N/m
+    return scene, work, row
+
+
+def test_what_a_pair_that_grazes_has_lost_counts_as_an_error():
+    """By the law it parts again and again, and its tangential force is lost each time."""
+    force, step = 1e-11, 1e-4
+    scene, work, row = corner_on_slab(force)
+    clock = Implicit(1e-9).fresh_clock()
+    work.candidates[row, CLOSED] = GRAZES
+    work.slip[GRAZING_FORCE, row] = force
+    stated_error.add_switch_errors(scene, work, clock, step, 1e-12)
+    least = force * step / scene.bodies[1, MASS]
+    assert least < work.bodies[1, SWITCH_SPEED] < 40.0 * least
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_grazing_force_that_may_be_lost_moves_the_error_along_the_gap_and_enlarges_it(side):
+    force = 1e-11
+    scene, work, row = corner_on_slab(force)
+    work.candidates[row, CLOSED] = GRAZES
+    work.slip[GRAZING_FORCE, row] = force
+    work.motion[CARRIED, 1, VX] = side * 1e-6
+    assemble_jacobian(scene, work, 0.0, 1.0)
+    pushed = work.motion[FORCING, 1, 3:]
+    assert pushed[0] * side > 0.0
+    assert abs(pushed[0]) == pytest.approx(stated_error.OF_BOUNDS * force, rel=1e-6)
+    # What presses instead of it keeps the gap as it is.
+    arm = work.geometry[NOW, row, VERTEX_ARM_N]
+    opening = pushed[1] / scene.bodies[1, MASS] + arm * pushed[2] / scene.bodies[1, INERTIA]
+    assert abs(opening) < 1e-6 * abs(pushed[0]) / scene.bodies[1, MASS]
+
+
+def test_every_body_states_an_error_of_its_own(monkeypatch):
+    """Within its island's sums, by its own vector."""
+    monkeypatch.setattr(stated_error, "carry_vector", carry_error)
+    bodies = [Body(Sphere(5e-6), (x, 0.0), surface_density=2.0) for x in (0.0, 2e-5, 4e-5)]
+    system = System(bodies, [StokesDrag()], Implicit(1e-9))
+    scene = system.scene(jit=False)
+    work = work_of(scene, *system.motion())
+    assemble_jacobian(scene, work, 0.0, 1.0)
+    clock = stepped(scene, work, 1e-9)
+    work.bodies[:, ERROR_PLACE] = 1e-8, 1e-8, 2e-6
+    work.bodies[:, STEP_PLACE] = 1e-30
+    work.motion[CARRIED, :, 0] = 1e-9, 1e-9, 3e-7
+    stated_error.carry_errors(scene, work, clock, 1e-9)
+    own = stated_error.OF_VECTOR * 1e-9
+    sums = Implicit.estimate_share * 2e-6
+    assert work.bodies[:, STATED] == pytest.approx([own, own, sums])
+    assert clock[ERROR] == work.bodies[:, STATED].max()
 
 
 def head_on(damping):
