@@ -63,12 +63,11 @@ along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
 held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
 that was next to nothing, and 1 where it stays closed though it is apart (see events.grazes).  The
-overlap [m] that a pair's friction goes by while the end of a step across switches is looked for, the
-part of the step for which it is closed, and how fast that follows (contact_mean.follow); of an
-interior-point method that finds out which pairs close and slide: what is left of the gap [m], the
-share of what friction can hold, and how far the pair slides ahead and behind [m].
-Displacements, offsets, forces, gaps and flights that are set
-aside while the list is made anew."""
+overlap [m] and the part of the step that a pair's friction goes by while the end of a step across
+switches is looked for, and how fast that part follows (contact_mean.follow); of an interior-point
+method that finds out which pairs close and slide: what is left of the gap [m], the share of what
+friction can hold, and how far the pair slides ahead and behind [m].  Displacements, offsets,
+forces, gaps and flights that are set aside while the list is made anew."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,

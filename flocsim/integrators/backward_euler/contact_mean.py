@@ -12,7 +12,6 @@ as directions do not turn and friction does not slide. The cut is the return map
 """
 
 from flocsim.arrays import (
-    OVERLAP,
     CANDIDATES,
     CLOSED,
     DAMPING,
@@ -21,6 +20,7 @@ from flocsim.arrays import (
     GAP,
     NEW,
     NOW,
+    OVERLAP,
     PAIR,
     PART,
     RADIUS,
@@ -71,8 +71,9 @@ def go_by(work, row, overlap, part):
 
 
 def follow(work, row):
-    """Let the friction of a pair go by how it is pressed now. A pair may open by its own friction and
-    close without it: where the part of the step turns back, it goes half as far from then on."""
+    """Let the friction of a pair go by how it is pressed now. A pair may open by its own friction
+    and close without it: where the part of the step turns back, it goes half as far from then on.
+    """
     part, gain = work.slip[PART, row], work.slip[GAIN, row]
     change = closed_share(work, row) - part
     if change * gain < 0.0:
@@ -143,7 +144,8 @@ def add_slopes(scene, work, row, normal, tangential):
     """Add to the system what the force of a contact falls by for a metre of the gap [N/m], and with
     the rate along the tangent [N s/m]."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    pair, along, across = work.candidates[row, PAIR], normal_rows(work, row), tangent_rows(work, row)
+    pair = work.candidates[row, PAIR]
+    along, across = normal_rows(work, row), tangent_rows(work, row)
     add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal)
     add_product(scene, work, DAMPING, pair, a, b, across, across, tangential)
 

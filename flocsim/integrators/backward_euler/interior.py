@@ -10,9 +10,10 @@ method, the stiffness of a pair being its part δ/(δ + s) that is at work. OVER
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
-So with friction, whose limit goes by the δ of the last iteration: what there is of it, f = φ L, what
-there would be if the pair stuck, e, and how far it slides ahead and behind, p and q, all over the
-normal stiffness [m], are e − f = p − q, p (L − f) = τ, q (L + f) = τ, and
+So with friction, whose limit L goes by the δ of the last iteration: what there is of it, f = φ L,
+what there would be if the pair stuck, e, and how far it slides ahead and behind, p and q, all over
+the normal stiffness [m], follow e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
+
 
     df = w (e − f − τ/(L − f) + τ/(L + f) + de),   1/w = 1 + p/(L − f) + q/(L + f)
 
@@ -72,17 +73,19 @@ from flocsim.integrators.rhs.views import (
 )
 from flocsim.laws import SLIP_LIMIT, contact_derivatives, has, slip_limit
 
-MOST_ITERATIONS = 30
+MOST_ITERATIONS = 45
 
 FAR_FROM_WALL = 0.99
 """What is to stay above 0 goes so far towards it at most in an iteration."""
 
 FALLING, STANDING, LEAST_WAY = 0.003, 0.1, 0.7
-"""τ is this share of the mean of all products: behind an iteration that went so far at least, or not."""
+"""τ is this share of the mean of all products: behind an iteration that went so far at least, or
+not."""
 
-FOUND, DOUBTS = 0.01, 0.01
+FOUND, DOUBTS, MOST_DOUBTS = 0.01, 0.01, 0.1
 """Of a pair that is found to be open or closed, the smaller one of δ and s is below this share of a
-usual δ; this share of the pairs may be left to Newton's method."""
+usual δ; this share of the pairs may be left to Newton's method, and this one behind all iterations.
+"""
 
 
 def in_play(work, row):
@@ -101,8 +104,8 @@ def usual_force(scene, work, step):
 
 
 def friction_of(scene, work, row, step):
-    """Of a pair's friction, over its normal stiffness: by how much it grows with v_t [s], what there
-    would be if it stuck, and the most that there can be [m]; 0 where nothing limits it."""
+    """Of a pair's friction, over its normal stiffness: by how much it grows with v_t [s], what it
+    would be if the pair stuck, and at most [m]; 0 where nothing limits it."""
     if not has(scene, SLIP_LIMIT):
         return 0.0, 0.0, 0.0
     overlap, rate = work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
@@ -179,9 +182,9 @@ def pull(work, row, target):
 def drag(work, row, stuck, limit, target):
     """(w, by how much a pair's friction f is to change where v_t stays [m])."""
     force = work.slip[RUBBING, row] * limit
-    weight = 1.0 + work.slip[AHEAD, row] / (limit - force) + work.slip[BEHIND, row] / (limit + force)
-    off = stuck - force - target / (limit - force) + target / (limit + force)
-    return 1.0 / weight, off / weight
+    above, below = limit - force, limit + force
+    weight = 1.0 / (1.0 + work.slip[AHEAD, row] / above + work.slip[BEHIND, row] / below)
+    return weight, weight * (stuck - force - target / above + target / below)
 
 
 @apart
@@ -213,14 +216,9 @@ def room(share, size, change):
     return min(share, -FAR_FROM_WALL * size / change) if change < 0.0 else share
 
 
-def change_pair(scene, work, row, step, target, share, go):
-    """The share of all changes that keeps those of a pair within their bounds, not above the one
-    that is given; if it is to ``go``, it goes that far."""
+def change_friction(scene, work, row, step, target, share):
+    """Change a pair's f, p and q by a share, or less where one would come to 0."""
     known = work.slip
-    overlap, left = known[OVERLAP, row], known[LEFT, row]
-    opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
-    closing = (pull(work, row, target) - overlap * opening) / (overlap + left)
-    leaving = opening + closing - (left - work.geometry[NOW, row, GAP] - overlap)
     slope, stuck, limit = friction_of(scene, work, row, step)
     if limit > 0.0:
         weight, change = drag(work, row, stuck, limit, target)
@@ -229,15 +227,28 @@ def change_pair(scene, work, row, step, target, share, go):
         above, below = limit - force, limit + force
         more = (target + ahead * change) / above - ahead
         less = (target - behind * change) / below - behind
-        if go:
-            known[RUBBING, row] += share * change / limit
-            known[AHEAD, row] += share * more
-            known[BEHIND, row] += share * less
         share = room(room(share, ahead, more), behind, less)
         share = room(room(share, above, -change), below, change)
+        known[RUBBING, row] += share * change / limit
+        known[AHEAD, row] += share * more
+        known[BEHIND, row] += share * less
+
+
+def change_pair(scene, work, row, step, target, share, go):
+    """The share of the changes of δ and s that keeps them above 0, not above the one that is given;
+    if they are to ``go``, they go that far, and friction with them."""
+    known = work.slip
+    overlap, left = known[OVERLAP, row], known[LEFT, row]
+    opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
+    closing = (pull(work, row, target) - overlap * opening) / (overlap + left)
+    leaving = opening + closing - (left - work.geometry[NOW, row, GAP] - overlap)
     if go:
+        change_friction(scene, work, row, step, target, share)
         known[OVERLAP, row] += share * closing
         known[LEFT, row] += share * leaving
+        # The limit of friction goes with δ, and p and q the other way, as their products stay.
+        known[AHEAD, row] *= overlap / known[OVERLAP, row]
+        known[BEHIND, row] *= overlap / known[OVERLAP, row]
     return room(room(share, overlap, closing), left, leaving)
 
 
@@ -252,8 +263,8 @@ def change_pairs(scene, work, step, target, share, go):
 
 
 def in_doubt(scene, work, step, usual):
-    """How many pairs have neither δ nor s, or neither how far they slide nor what is left until they
-    do, far below a usual overlap."""
+    """How many pairs have neither δ nor s, or neither how far they slide nor what is left until
+    they do, far below a usual overlap."""
     count = 0
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
@@ -268,7 +279,7 @@ def in_doubt(scene, work, step, usual):
 
 @apart
 def find_closed(scene, work, clock, step):
-    """Bring the velocities near those of the step's end; False where no system can be solved."""
+    """Bring the velocities near those of the step's end; False where that fails."""
     time = clock[TIME]
     evaluate_others(scene, work, time, step)
     flag_close(scene, work)
@@ -292,4 +303,4 @@ def find_closed(scene, work, clock, step):
         evaluate_others(scene, work, time, step)
         if share > LEAST_WAY and in_doubt(scene, work, step, usual) <= DOUBTS * count:
             return True
-    return True
+    return in_doubt(scene, work, step, usual) <= MOST_DOUBTS * count

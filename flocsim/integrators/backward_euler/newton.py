@@ -76,9 +76,9 @@ NEWTON_SHARE = 1e-3
 GOOD_PACE = 0.1
 """Factors are used again while the sets are the same and changes shrink by so much at least."""
 
-FULL_STEPS, MOST_OVERSHOT, OVERSHOT = 3, 10.0, 0.5
-"""A change is cut where the forces are so many times as far from balance along it behind as
-before, the other way: in the first iterations and later."""
+OVERSHOT = 0.5
+"""A change is cut where the forces are so many times as far from balance along it behind as before,
+the other way."""
 
 CUT_TO = 0.5
 """It is cut to where they are but so many times as far from balance."""
@@ -307,18 +307,17 @@ def solve_end(scene, work, clock, step, most):
     note_modes(work)
     for row in range(work.tally[CANDIDATES]):
         work.slip[GAIN, row] = 1.0
-    before, fresh, renewed = math.inf, False, False
-    for iteration in range(most):
-        if not fresh and not refresh(scene, work, clock, step, renewed):
+    before, fresh, renewed, couple = math.inf, False, False, True
+    for _ in range(most):
+        coupled = renewed and couple
+        if not fresh and not refresh(scene, work, clock, step, coupled):
             return False
         change = solve_change(scene, work, step)
         if not change < math.inf:
             return False
         goal = max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
-        overshot = MOST_OVERSHOT if iteration < FULL_STEPS else OVERSHOT
-        if renewed or change <= goal:
-            # Friction has no potential, and rounding may well have the last word on the balance.
-            overshot = math.inf
+        # Coupled friction has no potential, and rounding may have the last word on the balance.
+        overshot = math.inf if coupled or change <= goal else OVERSHOT
         share = search(scene, work, time, step, overshot)
         if share < 0.0:
             return False
@@ -327,11 +326,12 @@ def solve_end(scene, work, clock, step, most):
         if small and renewed:
             return True
         same = not note_modes(work) and share == 1.0
+        couple = couple and (same or not coupled)
         fresh, before = same and pace < GOOD_PACE, change if same else math.inf
-        was, renewed = renewed, (same or small) and renew_friction(scene, work, step)
+        renewed = (same or small) and renew_friction(scene, work, step)
         if small and not renewed:
             return True
-        fresh = fresh and was == renewed
+        fresh = fresh and coupled == (renewed and couple)
         if renewed and not evaluate_end(scene, work, time, step):
             return False
     return False
