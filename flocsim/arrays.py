@@ -56,19 +56,21 @@ SLIP_RATES = STATES
 
 (
     SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
-    OVERLAP, LEFT, OVERLAP_CHANGE, LEFT_CHANGE,
+    OVERLAP, PART, GAIN, LEFT, RUBBING, AHEAD, BEHIND,
     KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
     CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, FLOWN_AT, SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 22)  # fmt: skip
+) = range(2 * STATES, 2 * STATES + 25)  # fmt: skip
 """Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
 along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
 begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
 held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing (see events.grazes).  The overlap of a pair, what is left of its gap and
-the changes of both, while an interior-point method finds out which pairs close [m].
-Displacements, offsets, forces, gaps and flights that are set aside while the list is made anew.
-Displacements and gaps at the ends of the last cycle of switches and of the one before [m]; when the
-pair last touched again behind a flight that was next to nothing [s]."""
+that was next to nothing (see events.grazes).  The overlap [m] and the part of the step that a
+pair's friction goes by while the end of a step across switches is looked for, and how fast that
+part follows (contact_mean.follow); of an interior-point method that finds out which pairs close and
+slide: what is left of the gap [m], the share of what friction can hold, and how far the pair slides
+ahead and behind [m].  Displacements, offsets, forces, gaps and flights that are set aside while the
+list is made anew.  Displacements and gaps at the ends of the last cycle of switches and of the one
+before [m]; when the pair last touched again behind a flight that was next to nothing [s]."""
 
 (
     LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
@@ -100,14 +102,13 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 
 (
     VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING, PAIR,
-    DOES, STUCK, CANDIDATE_COLUMNS,
-) = range(12)  # fmt: skip
+    DOES, CANDIDATE_COLUMNS,
+) = range(11)  # fmt: skip
 """Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
 point of the edge; how the pair touches in this step, see OPEN; 1 where it may have a share of a
 surface force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of
 the two bodies in ``Work.pairs``; in an iteration of backward Euler, what the pair does (see
-contact_mean.mode_of), and 1 where it is taken to stick whatever it can hold, for one change,
-because it slid one way, then the other."""
+contact_mean.mode_of)."""
 
 OPEN, TOUCHES, GRAZES = range(3)
 """What ``CLOSED`` says: the pair is apart; it touches, with the whole contact law; it grazes, borne
@@ -329,7 +330,7 @@ class Work(NamedTuple):
 
     ``motion`` (18, n, 6): places and velocities in the states, then see START.
     ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (39, capacity): tangential displacements in the states, their rates there, then see
+    ``slip`` (42, capacity): tangential displacements in the states, their rates there, then see
     SLIP_OFFSET.
     ``bodies`` (n, 45): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
     directly or through others.
@@ -337,7 +338,7 @@ class Work(NamedTuple):
     ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.
     ``system`` (2, 3 n, 3 n), complex: few bodies' factorised systems, and ``pivots`` (2, 3 n),
     which rows have changed places; ``elimination``: those of many.
-    ``candidates`` (capacity, 11): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
+    ``candidates`` (capacity, 10): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
     ``kept`` (capacity, 5): the pairs whose displacements are set aside.
     ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
     (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),

@@ -138,7 +138,7 @@ class Implicit(Integrator):
         if grazes:
             if not factorise_systems(scene, work, step):
                 return -1.0
-            if hold_gaps(scene, work):
+            if hold_gaps(scene, work, clock):
                 evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
             assemble_jacobian(scene, work, time, remaining)
         if not factorise_systems(scene, work, step):

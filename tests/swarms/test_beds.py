@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.rest_of_piles import pile_of
 from benchmarks.speed.swarms import bulk_fraction
 from flocsim import Body, Sphere, Swarm, floor
 from flocsim.forces import Contact, Gravity, StokesDrag
@@ -123,3 +124,20 @@ def test_friction_keeps_a_heap_from_flattening():
         ends[friction] = run.position[-1, 1:, 1].max()
     assert ends["none"] > 4.0 * R
     assert ends[0.0] < 1.01 * R
+
+
+def test_polygons_with_friction_pile_up_as_cheaply_as_those_that_stick():
+    """Pairs that nothing attracts slide one way and the other within a step."""
+    steps = {}
+    for attraction in (True, False):
+        run = pile_of(10, 0.4, attraction, 1e-9).run(3.0, max_steps=20_000)
+        assert run.status == Status.FINISHED
+        assert np.abs(run.velocity[-1, :, :2]).max() < 1e-9
+        steps[attraction] = run.effort.steps
+    assert steps[False] <= 3.0 * steps[True]
+
+
+def test_sticking_polygons_settle_though_some_part_by_their_tangential_force():
+    """One parts here so fast that its own force, which hardly lifts it, cannot hold its gap."""
+    run = pile_of(50, "none", True, 1e-9).run(0.2, max_steps=20_000)
+    assert run.status == Status.FINISHED

@@ -55,7 +55,14 @@ from flocsim.forces import (
 from flocsim.forces.base import Force
 from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.integrators import DormandPrince54, Implicit, Integrator, Overdamped, VelocityVerlet
+from flocsim.integrators import (
+    BackwardEuler,
+    DormandPrince54,
+    Implicit,
+    Integrator,
+    Overdamped,
+    VelocityVerlet,
+)
 
 LARGEST_LENGTH = 0.01
 """[m] Upper limit of sizes: a larger one is a length in µm whose unit was forgotten."""
@@ -606,6 +613,7 @@ METHODS: dict[str, type] = {
     "dormand_prince54": DormandPrince54,
     "overdamped": Overdamped,
     "velocity_verlet": VelocityVerlet,
+    "backward_euler": BackwardEuler,
 }
 """Name of an integrator in a config → class; each takes those keys of [integrator] that it has."""
 

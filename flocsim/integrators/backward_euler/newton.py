@@ -24,6 +24,7 @@ from flocsim.arrays import (
     EDGE_BODY,
     FORCE,
     FREE,
+    GAIN,
     GAP,
     GEOMETRY_COLUMNS,
     LEADER_FORCE,
@@ -36,7 +37,6 @@ from flocsim.arrays import (
     RADIUS,
     SOLVES,
     START,
-    STUCK,
     TIME,
     TOLERANCE,
     TOUCHES,
@@ -48,10 +48,15 @@ from flocsim.compiler.composer import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.backward_euler.contact_mean import (
-    SLIDES_BOTH_WAYS,
+    acts,
     add_all_derivatives,
     add_mean_forces,
+    closed_share,
+    end_overlap,
     flag_close,
+    follow,
+    friction_force,
+    go_by,
     mode_of,
     takes_part,
 )
@@ -71,9 +76,9 @@ NEWTON_SHARE = 1e-3
 GOOD_PACE = 0.1
 """Factors are used again while the sets are the same and changes shrink by so much at least."""
 
-FULL_STEPS, MOST_OVERSHOT, OVERSHOT = 3, 10.0, 0.5
-"""A change is cut where the forces are so many times as far from balance along it behind as
-before, the other way: in the first iterations and later."""
+OVERSHOT = 0.5
+"""A change is cut where the forces are so many times as far from balance along it behind as before,
+the other way."""
 
 CUT_TO = 0.5
 """It is cut to where they are but so many times as far from balance."""
@@ -91,7 +96,7 @@ def begin_step(work):
         for column in range(GEOMETRY_COLUMNS):
             work.geometry[TRIAL, row, column] = work.geometry[NOW, row, column]
         work.candidates[row, CLOSED] = OPEN
-        work.candidates[row, STUCK] = 0
+        go_by(work, row, end_overlap(work, row), closed_share(work, row))
 
 
 def put_back(work):
@@ -202,13 +207,14 @@ def assemble_rest(scene, work, clock, step):
     assemble_others(scene, work, clock[TIME] + step, remaining)
 
 
-def refresh(scene, work, clock, step):
-    """Factorise anew at the iterate; False where that fails."""
+def refresh(scene, work, clock, step, coupled):
+    """Factorise anew at the iterate, by ``coupled`` also with how friction goes by the gaps; False
+    where that fails."""
     flag_close(scene, work)
     gather_clusters(scene, work)
     assemble_rest(scene, work, clock, step)
     if has(scene, CONTACT_FORCE):
-        add_all_derivatives(scene, work, step)
+        add_all_derivatives(scene, work, step, coupled)
     return factorise_euler(scene, work, step)
 
 
@@ -271,18 +277,24 @@ def search(scene, work, time, step, overshot):
 
 @apart
 def note_modes(work):
-    """Write down what all pairs do now; (how many do another thing than before, whether any is
-    taken to stick from now on, or no more)."""
-    changed, held, pairs = 0, False, work.candidates
+    """Write down what all pairs do now; whether any does another thing than before."""
+    changed, pairs = False, work.candidates
     for row in range(work.tally[CANDIDATES]):
-        mode, before, stuck = mode_of(work, row), pairs[row, DOES], pairs[row, STUCK] == 1
-        turns = not stuck and mode + before == SLIDES_BOTH_WAYS and mode != before
-        pairs[row, STUCK] = 1 if turns else 0
-        held = held or turns or stuck
-        if before != mode or turns or stuck:
-            changed += 1
-            pairs[row, DOES] = mode
-    return changed, held
+        mode = mode_of(work, row)
+        changed = changed or pairs[row, DOES] != mode
+        pairs[row, DOES] = mode
+    return changed
+
+
+def renew_friction(scene, work, step):
+    """Let the friction of all pairs go by how they are pressed now; whether that changes any."""
+    changed = False
+    for row in range(work.tally[CANDIDATES]):
+        if acts(work, row):
+            before = friction_force(scene, work, row, step)
+            follow(work, row)
+            changed = friction_force(scene, work, row, step) != before or changed
+    return changed
 
 
 @apart
@@ -294,34 +306,32 @@ def solve_end(scene, work, clock, step, most):
         return False
     note_modes(work)
     for row in range(work.tally[CANDIDATES]):
-        work.candidates[row, STUCK] = 0
-    before, fresh = math.inf, False
-    for iteration in range(most):
-        if not fresh:
-            if not refresh(scene, work, clock, step):
-                return False
-            fresh = True
+        work.slip[GAIN, row] = 1.0
+    before, fresh, renewed, couple = math.inf, False, False, True
+    for _ in range(most):
+        coupled = renewed and couple
+        if not fresh and not refresh(scene, work, clock, step, coupled):
+            return False
         change = solve_change(scene, work, step)
         if not change < math.inf:
             return False
         goal = max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
-        overshot = MOST_OVERSHOT if iteration < FULL_STEPS else OVERSHOT
-        if change <= goal:
-            # Rounding may well have the last word on the balance along it.
-            overshot = math.inf
+        # Coupled friction has no potential, and rounding may have the last word on the balance.
+        overshot = math.inf if coupled or change <= goal else OVERSHOT
         share = search(scene, work, time, step, overshot)
         if share < 0.0:
             return False
         pace = change / before if before < math.inf else 0.5
-        changed, held = note_modes(work)
-        if held and not evaluate_end(scene, work, time, step):
+        small = share == 1.0 and pace < 1.0 and change * pace <= goal * (1.0 - pace)
+        if small and renewed:
+            return True
+        same = not note_modes(work) and share == 1.0
+        couple = couple and (same or not coupled)
+        fresh, before = same and pace < GOOD_PACE, change if same else math.inf
+        renewed = (same or small) and renew_friction(scene, work, step)
+        if small and not renewed:
+            return True
+        fresh = fresh and coupled == (renewed and couple)
+        if renewed and not evaluate_end(scene, work, time, step):
             return False
-        same = changed == 0
-        if same and share == 1.0:
-            if pace < 1.0 and change * pace <= goal * (1.0 - pace):
-                return True
-            fresh = before == math.inf or pace < GOOD_PACE
-            before = change
-        else:
-            fresh, before = False, math.inf
     return False

@@ -45,7 +45,7 @@ from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, memory_of
 
-QUICK, MOST_ITERATIONS = 5, 16
+QUICK, MOST_ITERATIONS = 5, 24
 """Iterations of Newton's method from the start of the step, and from where the interior-point
 method has come, before a step is given up and made smaller."""
 

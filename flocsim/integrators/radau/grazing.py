@@ -15,16 +15,23 @@ from flocsim.arrays import (
     GRAZING_RESISTANCE,
     NOW,
     OPEN,
+    TOLERANCE,
     VERTEX_BODY,
 )
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.grazing import STIFFER
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
+from flocsim.integrators.rhs.views import memory_of, normal_rate
 
 LEAST_RESPONSE = 1e-3
 """A tangential force lifts nothing that moves the gap by less than this share of what it moves its
 bodies along each other."""
+
+
+SHARE_OF_START = 0.1
+"""What taking the speed away with which it parted moves the bodies of a pair along each other may
+be this share of the tolerance, or it does not begin to graze."""
 
 
 def any_grazes(work):
@@ -60,7 +67,16 @@ def response(scene, work, row):
     return opening, sliding
 
 
-def hold_gaps(scene, work):
+def can_begin(work, clock, row, found, sliding):
+    """Whether the force of a pair that has just parted, with those responses to a newton, lifts it,
+    and can take its speed away without moving the bodies much."""
+    if found * work.slip[GRAZING_FORCE, row] <= 0.0:
+        return False
+    way = abs(sliding * normal_rate(work, NOW, row)) * memory_of(work, row)
+    return way <= SHARE_OF_START * clock[TOLERANCE] * abs(found)
+
+
+def hold_gaps(scene, work, clock):
     """Say how stiffly the gaps of pairs that graze are held, by the system without that; let those
     go that their own force does not lift. Whether any has been let go."""
     opened = False
@@ -69,7 +85,7 @@ def hold_gaps(scene, work):
             found, sliding = response(scene, work, row)
             weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
             fresh = work.slip[FRESH, row] != 0.0
-            if weak or (fresh and found * work.slip[GRAZING_FORCE, row] <= 0.0):
+            if weak or (fresh and not can_begin(work, clock, row, found, sliding)):
                 work.candidates[row, CLOSED], opened = OPEN, True
                 work.slip[NOW, row] = 0.0
             else:

@@ -79,7 +79,7 @@ WRONG = {
     "[zone]\ndistance = -1e-9": "must be a finite number at least 0 [m], found -1e-09",
     "[integrator]\nmax_steps = 1e6": "integrator.max_steps must be an integer",
     "[integrator]\nname = 3": "integrator.name must be 'implicit', 'dormand_prince54', "
-    "'overdamped' or 'velocity_verlet', found 3",
+    "'overdamped', 'velocity_verlet' or 'backward_euler', found 3",
     "[output]\nfile = '''a\nb'''": r"output.file must be a string that is not blank, found 'a\nb'",
     "[output]\n'a\\nb \" c' = 3": "output.'a",
 }

@@ -14,7 +14,7 @@ from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError
-from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
+from flocsim.integrators import BackwardEuler, DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from tests.helpers.small_study import load_text, problem_lines
 
 OWN_MODULE = """\
@@ -286,6 +286,7 @@ def test_an_integrator_of_ones_own(tmp_path, own_module):
         ("dormand_prince54", DormandPrince54(1e-8)),
         ("overdamped", Overdamped(1e-8)),
         ("velocity_verlet", VelocityVerlet(1e-7)),
+        ("backward_euler", BackwardEuler(1e-8)),
     ],
 )
 def test_a_name_makes_flocsims_own_integrator(name, made):
