@@ -38,9 +38,6 @@ def test_it_says_the_replicate_and_the_error_at_each_tolerance(table):
     assert float(rows_of(table)["Implicit", "1e-08"][0]) < 1e-7
 
 
-@pytest.mark.xfail(
-    strict=True, reason="at 1e-10 m it comes to rest with another stress: 5e-8 m off, stated 1e-8"
-)
 def test_errors_fall_with_the_tolerance(table):
     assert float(rows_of(table)["Implicit", "1e-10"][0]) < 1e-9
 

@@ -74,13 +74,14 @@ def test_velocity_verlet_over_two_thousand_contacts():
 
 @by_adaptive
 def test_adaptive_methods_lose_less_energy_at_a_finer_tolerance(integrator):
-    settings = [attrs.evolve(integrator, tolerance=tolerance) for tolerance in (1e-10, 1e-12)]
+    # Over three decades: what is lost at one tolerance may be next to nothing by chance.
+    settings = [attrs.evolve(integrator, tolerance=tolerance) for tolerance in (1e-9, 1e-12)]
     coarse, fine = (drift(setting, 1.5e-3) for setting in settings)
     assert min(coarse[0], fine[0]) >= 25
     # How much is chance: other last digits, as of another processor, lead to other collisions.
     assert abs(fine[1]) < 1e-4
-    assert abs(fine[1]) < 0.1 * abs(coarse[1])
-    assert max(coarse[2], fine[2]) < 1e-5
+    assert abs(fine[1]) < 0.02 * abs(coarse[1])
+    assert coarse[2] < 1e-4 and fine[2] < 1e-6
 
 
 def pressed_combs(teeth):
