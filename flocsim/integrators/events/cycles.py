@@ -52,6 +52,7 @@ from flocsim.arrays import (
     STATED,
     SWITCH_PLACE,
     TIME,
+    TOLERANCE,
     TRIAL,
     VX,
     VY,
@@ -78,7 +79,7 @@ PACE = 0.1
 """… so may the motion of the pair as a whole, …"""
 
 MOST_TURN = 0.05
-"""… which may turn by so much [rad]."""
+"""… which may turn by so much [rad]; what is wrong of it has to stay below the tolerance."""
 
 RETURNS = 2
 """So often the modes in which a cycle begins come again until it ends: what changes to and fro from
@@ -87,10 +88,14 @@ one time to the next has done so once, then."""
 BASE, MODULUS = 31, 2147483647
 """Of the numbers by which modes of contacts, and series of them, are told apart."""
 
-WHOLE = 9
-"""Coordinates from here on say where the pair as a whole is: angle, place (x, y)."""
+TURNED, WHOLE = 2, 9
+"""The coordinate that is the angle of one body against the other; from WHOLE on they say where the
+pair as a whole is: angle, place (x, y)."""
 
 COORDINATES = 12
+
+TINY = 1e-300
+"""Keeps a quotient finite."""
 
 
 def share_of_second(scene):
@@ -223,14 +228,32 @@ def change_of(scene, work, which):
     return now - last, now - 2.0 * last + before
 
 
-def cycles_of_motion(scene, work, clock, until):
-    """How many cycles leave the motion of the pair as a whole about as it is."""
+def way_of(scene, work, first):
+    """(Largest change over the last cycle in three coordinates from ``first`` on, of which the
+    angle counts in the place of an outline, by how much it differed from the one before) [m]."""
     size = scene.bodies[0, BOUNDING_RADIUS] + scene.bodies[1, BOUNDING_RADIUS]
     way = bend = 0.0
-    for which in range(WHOLE, COORDINATES):
-        lever = size if which == WHOLE else 1.0
+    for which in range(first, first + 3):
+        lever = size if which in (TURNED, WHOLE) else 1.0
         change, more = change_of(scene, work, which)
         way, bend = max(way, lever * abs(change)), max(bend, lever * abs(more))
+    return way, bend
+
+
+def error_of(scene, work, many):
+    """What the place of a body is wrong by where so many cycles are left out [m]: the next term of
+    the line that its place against the other one is carried on along, and of the parabola of
+    both."""
+    _, creep = way_of(scene, work, 0)
+    way, bend = way_of(scene, work, WHOLE)
+    beyond = many * bend / max(way, TINY) / 3.0
+    return 0.5 * many * many * (creep + beyond * bend)
+
+
+def cycles_of_motion(scene, work, clock, until):
+    """How many cycles leave the motion of the pair as a whole about as it is, and its error below
+    the tolerance."""
+    way, bend = way_of(scene, work, WHOLE)
     turn, _ = change_of(scene, work, WHOLE)
     most = MOST_AT_ONCE
     if bend * most > PACE * way:
@@ -241,6 +264,10 @@ def cycles_of_motion(scene, work, clock, until):
     longer = period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE]
     if abs(longer) * most > PACE * period:
         most = PACE * period / abs(longer)
+    error = error_of(scene, work, most)
+    if error > clock[TOLERANCE]:
+        # It goes with the square of their number at least.
+        most *= math.sqrt(clock[TOLERANCE] / error)
     return min(most, 0.5 * (until - clock[TIME]) / period)
 
 
@@ -276,11 +303,11 @@ def restore_gaps(work):
             work.geometry[NOW, row, GAP] = work.slip[CYCLE_GAP, row]
 
 
-def carry_on_errors(work, clock, many):
-    """Let what is stated of errors grow on as it has in the last cycle."""
-    grown = clock[ERROR] - clock[CYCLE_ERROR]
+def carry_on_errors(work, clock, many, more):
+    """Let what is stated of errors grow on as it has in the last cycle, and by ``more`` [m]."""
+    grown = many * max(clock[ERROR] - clock[CYCLE_ERROR], 0.0) + more
     if grown > 0.0:
-        factor = 1.0 + many * grown / clock[ERROR]
+        factor = 1.0 + grown / max(clock[ERROR], TINY)
         for body in range(2):
             for column in (ERROR_PLACE, SWITCH_PLACE, DOUBT_PLACE, STATED):
                 work.bodies[body, column] *= factor
@@ -311,9 +338,10 @@ def leave_out_cycles(scene, work, clock, counts, until):
             return
         many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
     if many >= FEWEST:
+        error = error_of(scene, work, many)
         leave_out(scene, work, clock, many)
         restore_gaps(work)
-        carry_on_errors(work, clock, many)
+        carry_on_errors(work, clock, many, error)
         set_modes(scene, work)
         begin_at(counts, modes_of(work))
     end_cycle(work, clock, counts)
