@@ -60,6 +60,7 @@ from flocsim.arrays import (
     Y,
 )
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.grazes import hums
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.events.resolution import above_rounding
 
@@ -161,6 +162,15 @@ def modes_of(work):
 def takes_part(work, row):
     """Whether a pair touches, or has done so a moment ago."""
     return work.candidates[row, CLOSED] != OPEN or work.slip[FLIGHTS, row] > 0.0
+
+
+def any_hums(work):
+    """Whether a pair hums: where none does, the cycles are bounces, which somebody may want to
+    see."""
+    for row in range(work.tally[CANDIDATES]):  # noqa: SIM110
+        if hums(work, row):
+            return True
+    return False
 
 
 def begin_at(counts, modes):
@@ -319,7 +329,8 @@ def carry_on_errors(work, clock, many, more):
 def leave_out_cycles(scene, work, clock, counts, until):
     """Look at a switch of two bodies that has just been, and leave out the cycles that it ends, if
     they have been alike."""
-    if work.bodies.shape[0] != 2:
+    if work.bodies.shape[0] != 2 or not any_hums(work):
+        counts[CYCLE_MODES] = 0
         return
     modes = modes_of(work)
     counts[CYCLE_CODE] = (counts[CYCLE_CODE] * BASE + modes) % MODULUS

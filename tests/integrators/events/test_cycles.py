@@ -18,14 +18,16 @@ from flocsim.arrays import (
     CYCLE_MODES,
     CYCLE_SLIP,
     CYCLE_SLIP_BEFORE,
+    FLIGHTS,
     GAP,
     NOW,
     TIME,
     TRIAL,
 )
-from flocsim.forces import Contact
-from flocsim.integrators import Implicit
+from flocsim.forces import Contact, Gravity
+from flocsim.integrators import Implicit, Status
 from flocsim.integrators.events import cycles
+from flocsim.integrators.events.grazes import MANY
 from tests.helpers.fast_scene import flagged
 
 TURN, PERIOD = 1e-4, 1e-6
@@ -121,9 +123,23 @@ def test_rounding_is_no_change():
 def test_a_cycle_begins_with_any_switch_and_ends_where_its_modes_are_back():
     scene, work = flagged(doublet())
     clock, counts = Implicit().fresh_clock(), Implicit().fresh_counts(10)
+    work.slip[FLIGHTS] = MANY
     for touches in (1, 0, 1, 0, 1):
         work.candidates[0, CLOSED] = touches
         clock[TIME] += PERIOD
         cycles.leave_out_cycles(scene, work, clock, counts, math.inf)
     assert counts[CYCLE_MODES] == cycles.modes_of(work)
     assert clock[CYCLE_AT] == pytest.approx(5.0 * PERIOD)
+
+
+def test_no_bounce_is_left_out():
+    """A disc that bounces for ever, and gives nothing away: every bounce is in the record."""
+    floor = Body(SpheroPolygon([(-2e-5, 0.0), (2e-5, 0.0)], 1e-6), fixed=True, density=1e3)
+    disc = Body(Sphere(4e-6), (0.0, 1.5e-5), density=2650.0)
+    contact = Contact(k_n=20.0, k_t=0.0, damping_n=0.0, damping_t=0.0)
+    run = System([floor, disc], [Gravity(), contact], Implicit()).run(0.06, jit=False)
+    rises = np.diff(np.sign(run.velocity[:, 1, 1])) > 0
+    fall = math.sqrt(2.0 * 1e-5 / 9.81)
+    assert run.status == Status.FINISHED
+    assert abs(rises.sum() - round(0.5 * (0.06 / fall + 1.0))) <= 1
+    assert run.position[:, 1, 1].max() == pytest.approx(1.5e-5, abs=2e-8)
