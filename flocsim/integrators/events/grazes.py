@@ -52,15 +52,15 @@ so before, …"""
 SHARE_OF_FIRST = 1e-3
 """… and by this one where it has not, …"""
 
+SHARE_OF_SLIP = 1.0
+"""… and the displacement that is lost with its tangential spring be this share of it at most."""
+
 FIRST_KICK = 30.0
 """The speed that a tangential spring lets go of where a contact parts displaces bodies by so many
 tolerances at most, or it has to have hummed before."""
 
 MANY = 5
-"""So often a pair has parted by no more than that and touched again that it hums."""
-
-SHARE_OF_SLIP = 1.0
-"""… and the displacement that is lost with its tangential spring be this share of it."""
+"""So often a pair has parted by no more than SHARE_OF_FLIGHT and touched again that it hums."""
 
 LEAST_COUPLING = 0.1
 """A tangential force is taken to accelerate the gap by this share of what a normal one does, at
