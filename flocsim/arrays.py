@@ -4,7 +4,7 @@ Few arrays with named places, because every array that a compiled function is ha
 time in all of its callers.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -284,10 +284,10 @@ class Scene(NamedTuple):
     are drawn by, see flocsim.integrators.loop.kicks.
     """
 
-    bodies: np.ndarray
+    bodies: Annotated[np.ndarray, ("n", 10)]
     first: np.ndarray
     vertices: np.ndarray
-    tree: np.ndarray
+    tree: Annotated[np.ndarray, ("nodes", 3)]
     parameters: np.ndarray
     laws: Any
     surface_reach: float
@@ -316,9 +316,9 @@ class Elimination(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     column: np.ndarray
-    blocks: np.ndarray
-    pivot: np.ndarray
-    row: np.ndarray
+    blocks: Annotated[np.ndarray, ("room", 3, 3, 3)]
+    pivot: Annotated[np.ndarray, ("n", 3, 3, 3)]
+    row: Annotated[np.ndarray, ("n", 3, 3, 3)]
     pairs: np.ndarray
     graph: np.ndarray
     nodes: np.ndarray
@@ -346,22 +346,22 @@ class Work(NamedTuple):
     ``tally``: counts, see CANDIDATES.
     """
 
-    motion: np.ndarray
-    rates: np.ndarray
+    motion: Annotated[np.ndarray, ("rows", "n", MOTION_COLUMNS)]
+    rates: Annotated[np.ndarray, ("states", "n", MOTION_COLUMNS)]
     slip: np.ndarray
-    bodies: np.ndarray
+    bodies: Annotated[np.ndarray, ("n", BODY_COLUMNS)]
     cluster: np.ndarray
-    jacobian: np.ndarray
+    jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]
     loads: np.ndarray
     system: np.ndarray
     pivots: np.ndarray
     elimination: Elimination
-    candidates: np.ndarray
-    geometry: np.ndarray
-    kept: np.ndarray
-    pairs: np.ndarray
+    candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]
+    geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]
+    kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]
+    pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]
     budget: np.ndarray
-    discs: np.ndarray
+    discs: Annotated[np.ndarray, ("n", 8)]
     order: np.ndarray
     starts: np.ndarray
     tally: np.ndarray

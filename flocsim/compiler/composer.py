@@ -17,6 +17,7 @@ numba's symbol table, where two of them can collide and silently return each oth
 import builtins
 import functools
 import hashlib
+import itertools
 import re
 import sys
 import types
@@ -24,13 +25,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from flocsim.compiler.by_pointer import argument_at, table_of, type_of, words_in
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.compiler.reads import is_users_module, module_reads, reached, refuse_closure
 from flocsim.errors import KernelError
 
-INLINED_SIZE = 1200
-"""Functions of less bytecode [bytes] are always inlined: a call hands over some hundred numbers."""
+INLINED_SIZE = 400
+"""Functions of less bytecode [bytes] are always inlined; of the others LLVM decides."""
 
 
 def apart(function: Callable) -> Callable:
@@ -100,23 +102,27 @@ class Linker:
         return copy
 
 
-def entry_source(entry):
-    """The text of the module that numba caches: one function that calls the driver."""
+def entry_source(entry, given="{}"):
+    """The text of a module with one function that calls the driver: ``run``, of the same arguments,
+    or of the address of a table in which they lie (by_pointer), ``given`` "argument_{}(address)".
+    """
     code = entry.__code__
-    arguments = ", ".join(code.co_varnames[: code.co_argcount])
+    names = code.co_varnames[: code.co_argcount]
+    handed = ", ".join(map(given.format, names))
+    taken = ", ".join(names) if given == "{}" else "address"
     return (
         f'"""Made by flocsim from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
-        f"def run({arguments}):\n    return driver({arguments})\n"
+        f"def run({taken}):\n    return driver({handed})\n"
     )
 
 
 def linked_module(entry, fillings, name, options):
-    """The module ``name``, whose ``run`` calls the linked entry."""
+    """The module ``name``, whose ``driver`` is the linked entry."""
     import numba
 
-    from flocsim.compiler.numba_internals import inner_compiler, typed_once
+    from flocsim.compiler.numba_internals import compilers, typed_once
 
-    inner = {**options, **UNWRAPPED, **inner_compiler()}
+    inner = {**options, **UNWRAPPED, **compilers()[0]}
 
     def transform(clone):
         clone.__module__ = name
@@ -127,8 +133,15 @@ def linked_module(entry, fillings, name, options):
     module = types.ModuleType(name)
     sys.modules[name] = module  # where numba looks for it when it loads compiled code
     module.driver = Linker(fillings, transform).link(entry)
-    exec(compile(entry_source(entry), f"<{name}>", "exec"), module.__dict__)
     return module
+
+
+def run_of(module, entry, **arguments):
+    """The function of a linked module that numba compiles, and keeps."""
+    source = entry_source(entry, "argument_{}(address)" if arguments else "{}")
+    names = vars(module) | {f"argument_{name}": each for name, each in arguments.items()}
+    exec(compile(source, f"<{module.__name__}>", "exec"), names)
+    return names["run"]
 
 
 def options_of(allocates):
@@ -145,27 +158,49 @@ def options_of(allocates):
     return {"nogil": True, "error_model": "numpy", **({} if allocates else NO_COUNTING)}
 
 
-def compiled(entry, fillings, name, allocates):
-    """The entry compiled as module ``name`` at its first call, from the disk where it is there."""
-    import numba
+class Compiled:
+    """An entry compiled as module ``name`` at its first call, from the disk where it is there; once
+    more for arguments of other types."""
 
-    from flocsim.compiler.numba_internals import compiler_error, kept_on_disk, quick_typing
+    def __init__(self, entry, fillings, name, allocates):
+        self.entry, self.allocates = entry, allocates
+        self.options = options_of(allocates)
+        self.module = linked_module(entry, fillings, name, self.options)
+        self.made = {}
 
-    options = options_of(allocates)
-    module = linked_module(entry, fillings, name, options)
-    dispatcher = kept_on_disk(numba.njit(module.run, **options), name)
+    def __call__(self, *arguments):
+        table, kinds = table_of(arguments)
+        if kinds not in self.made:
+            self.made[kinds] = self.made_for(arguments)
+        return self.made[kinds](table.__array_interface__["data"][0])
 
-    def call(*arguments):
+    def made_for(self, arguments):
+        """The machine code for arguments of such types."""
+        import numba
+
+        from flocsim.compiler.numba_internals import (
+            compiler_error,
+            compilers,
+            kept_on_disk,
+            quick_typing,
+        )
+
+        types = [type_of(each, arrays=self.allocates) for each in arguments]
+        places = itertools.accumulate(map(words_in, types), initial=0)
+        readers = map(argument_at, types, places)
+        names = self.entry.__code__.co_varnames
+        run = run_of(self.module, self.entry, **dict(zip(names, readers, strict=False)))
+        name = self.module.__name__
+        dispatcher = kept_on_disk(
+            numba.njit(run, **self.options, **compilers()[1]), name, repr(types)
+        )
         try:
-            # Not `signatures`, which hashes the types of all arguments at every call.
-            if not dispatcher.overloads:
-                with quick_typing():
-                    dispatcher.compile(tuple(map(numba.typeof, arguments)))
-            return dispatcher(*arguments)
+            with quick_typing():
+                dispatcher.typingctx.refresh()  # has to hear of new intrinsics
+                dispatcher.compile((numba.int64,))
         except compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
-
-    return call
+        return dispatcher
 
 
 def compiler_complaint(text):
@@ -201,7 +236,7 @@ def compose(
     if key not in _composed:
         name = f"flocsim_scene_{key[0]}"
         if jit:
-            _composed[key] = compiled(entry, fillings, name, allocates)
+            _composed[key] = Compiled(entry, fillings, name, allocates)
         else:
             _composed[key] = Linker(fillings, lambda clone: clone).link(entry)
     return _composed[key]
@@ -218,6 +253,7 @@ def compile_law(law: Callable, signature: Any) -> int:
     from flocsim.compiler.numba_internals import (
         address_of,
         compiler_error,
+        compilers,
         kept_on_disk,
         quick_typing,
     )
@@ -227,8 +263,8 @@ def compile_law(law: Callable, signature: Any) -> int:
     if key not in _composed:
         name = f"flocsim_law_{key[0]}"
         module = linked_module(law, {}, name, options_of(False))
-        options = {**options_of(False), **UNWRAPPED}
-        dispatcher = kept_on_disk(numba.njit(module.run, **options), name)
+        options = {**options_of(False), **UNWRAPPED, **compilers()[1]}
+        dispatcher = kept_on_disk(numba.njit(run_of(module, law), **options), name)
         try:
             with quick_typing():
                 dispatcher.compile(signature)

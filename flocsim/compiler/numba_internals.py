@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import disk_cache
+from flocsim.compiler.by_pointer import address_of_data, is_array
 from flocsim.compiler.reads import is_in_library, names_in, where
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.limits import COMPILING, lacking
@@ -75,9 +76,7 @@ def call_by_address(signature: Any) -> Callable:
 
     def generate(context, builder, typed, values):
         values = [
-            context.make_array(given)(context, builder, value).data
-            if isinstance(given, types.Array)
-            else value
+            address_of_data(context, builder, given, value)
             for given, value in zip(typed.args, values, strict=True)
         ]
         convention = context.call_conv
@@ -91,8 +90,7 @@ def call_by_address(signature: Any) -> Callable:
         return result
 
     def as_handed(given):
-        is_plain = isinstance(given, types.Array) and given.layout == "C"
-        return types.CPointer(given.dtype) if is_plain else given
+        return types.CPointer(given.dtype) if is_array(given) else given
 
     def typed_call(address, given):
         if tuple(map(as_handed, given)) != signature.args:
@@ -135,7 +133,7 @@ def type_text(kind: Any) -> str:
     return str(kind)
 
 
-def kept_on_disk(dispatcher: Any, name: str) -> Any:
+def kept_on_disk(dispatcher: Any, name: str, arguments: str = "") -> Any:
     """The function, loaded from flocsim.compiler.disk_cache where it is there, and put there else.
 
     ``name`` is one that only functions which do the same have.
@@ -152,7 +150,7 @@ def kept_on_disk(dispatcher: Any, name: str) -> Any:
         def key(self, signature, codegen):
             """What compiled code depends on beside its name: types, processor, versions."""
             versions = sys.version, numba.__version__, llvmlite.__version__
-            return repr((type_text(signature), codegen.magic_tuple(), versions))
+            return repr((type_text(signature), arguments, codegen.magic_tuple(), versions))
 
         def load_overload(self, sig, target_context):
             """The compiled function for a signature; None where there is none to be relied upon."""
@@ -189,21 +187,25 @@ class NoEnvironment:
         """Nothing: what Python objects a function needs, its caller in machine code has."""
 
 
-def linked_library(base):
-    """A kind of numba library whose code is linked into others but is not run by itself."""
+def libraries():
+    """(LinkedLibrary, WholeLibrary): numba libraries of functions that are only linked into others,
+    and of one that is run, with all that it reaches."""
+    from numba.core.codegen import JITCodeLibrary
 
-    class LinkedLibrary(base):
-        """Code as it was lowered: neither optimised nor made machine code of."""
+    class LinkedLibrary(JITCodeLibrary):
+        """Code as it was lowered: neither optimised, linked nor made machine code of."""
 
         @property
         def codegen(self):
             return NoEnvironment(self._codegen)
 
-        def _optimize_final_module(self):
+        def _optimize_functions(self, module):
             """Left to the library that this one is linked into."""
+            module.data_layout = self._codegen._data_layout
 
-        def _finalize_final_module(self):
+        def finalize(self):
             """Only what linking needs."""
+            self._raise_if_finalized()
             self._finalize_dynamic_globals()
             self._finalized = True
 
@@ -211,7 +213,47 @@ def linked_library(base):
             """None: there is no machine code."""
             return 0
 
-    return LinkedLibrary
+    def reached(library, found):
+        """All libraries that one is linked to, through others, too."""
+        for each in library._linking_libraries:
+            if each not in found:
+                found[each] = None
+                reached(each, found)
+        return found
+
+    class WholeLibrary(JITCodeLibrary):
+        """Everything that a function reaches, linked and optimised once."""
+
+        def finalize(self):
+            """Link and optimise."""
+            self._linking_libraries = list(reached(self, {}))
+            self.own = {each.name for each in self._final_module.functions}
+            super().finalize()
+
+        def _optimize_final_module(self):
+            """Nothing but its own functions is called from outside: LLVM may then do what it likes
+            with the others, as with a C program of one file."""
+            module = self._final_module
+            if "internal" not in WITHOUT:
+                for each in module.functions:
+                    if not (each.is_declaration or each.name in self.own):
+                        each.linkage = "internal"
+            passes, builder = self._codegen._module_pass_manager(
+                loop_vectorize=False, slp_vectorize=False
+            )
+            passes.run(module, builder)
+
+    return LinkedLibrary, WholeLibrary
+
+
+NEEDLESS_PASSES = "InlineClosureLikes", "NopythonRewrites", "InlineOverloads"
+"""Passes of numba's that find nothing in functions on scalars that define no others inside."""
+
+
+def is_plain(state: Any) -> bool:
+    """Whether a function that numba compiles allocates no arrays and defines no other inside."""
+    code = state.func_id.code
+    return not state.flags.nrt and not any(hasattr(each, "co_code") for each in code.co_consts)
 
 
 def calls_python(library: Any) -> bool:
@@ -220,48 +262,54 @@ def calls_python(library: Any) -> bool:
 
 
 @functools.cache
-def inner_compiler() -> dict[str, Any]:
-    """{option: value} of numba.njit for functions that are only linked into others."""
+def compilers() -> tuple[dict[str, Any], dict[str, Any]]:
+    """{option: value} of numba.njit for functions that are only linked into others, and for one
+    that is run."""
     if "inner_compiler" in WITHOUT:
-        return {}
-    from numba.core.codegen import JITCodeLibrary
+        return {}, {}
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
     from numba.core.errors import UnsupportedError
     from numba.core.typed_passes import NativeLowering
 
-    library_class = linked_library(JITCodeLibrary)
+    linked, whole = libraries()
 
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class LinkedLowering(NativeLowering):
-        """numba's last pass, into a library that is linked only."""
+    def lowering(library_class):
+        @register_pass(mutates_CFG=True, analysis_only=False)
+        class Lowering(NativeLowering):
+            """numba's last pass, into a library of ours."""
 
-        _name = "flocsim_linked_lowering"
+            _name = f"flocsim_{library_class.__name__}"
 
-        def run_pass(self, state):
-            name = state.func_id.func_qualname
-            state.library = library_class(state.targetctx.codegen(), name)
-            changed = super().run_pass(state)
-            if calls_python(state.library):
-                raise UnsupportedError(
-                    "it calls Python while it runs, or raises an exception with numbers in it",
-                    state.func_ir.loc,
-                )
-            return changed
+            def run_pass(self, state):
+                name = state.func_id.func_qualname
+                state.library = library_class(state.targetctx.codegen(), name)
+                if library_class is whole:
+                    state.library.enable_object_caching()
+                changed = super().run_pass(state)
+                if library_class is linked and calls_python(state.library):
+                    raise UnsupportedError(
+                        "it calls Python while it runs, or raises an exception with numbers in it",
+                        state.func_ir.loc,
+                    )
+                return changed
 
-    class InnerCompiler(CompilerBase):
-        """numba's usual passes with another last one."""
+        class Compiler(CompilerBase):
+            """numba's usual passes with another last one."""
 
-        def define_pipelines(self):
-            passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-            passes.passes = [
-                (LinkedLowering if each is NativeLowering else each, what)
-                for each, what in passes.passes
-            ]
-            passes.finalize()
-            return [passes]
+            def define_pipelines(self):
+                passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+                passes.passes = [
+                    (Lowering if each is NativeLowering else each, what)
+                    for each, what in passes.passes
+                    if not (each.__name__ in NEEDLESS_PASSES and is_plain(self.state))
+                ]
+                passes.finalize()
+                return [passes]
 
-    return {"pipeline_class": InnerCompiler}
+        return {"pipeline_class": Compiler}
+
+    return lowering(linked), lowering(whole)
 
 
 def typed_once(dispatcher: Any) -> Any:

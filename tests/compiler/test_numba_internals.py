@@ -18,7 +18,7 @@ from flocsim.compiler.numba_internals import (
     NO_COUNTING,
     address_of,
     call_by_address,
-    inner_compiler,
+    compilers,
     kept_on_disk,
     quick_typing,
     remembering,
@@ -46,16 +46,16 @@ def fresh(monkeypatch, tmp_path):
     """Nothing compiled before is at hand."""
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
     monkeypatch.setattr(composer, "_composed", {})
-    inner_compiler.cache_clear()
+    compilers.cache_clear()
     yield monkeypatch
-    inner_compiler.cache_clear()
+    compilers.cache_clear()
 
 
 def test_no_other_file_names_a_private_part_of_numba():
     package = Path(flocsim.__file__).parent
     private = re.compile(r"numba\.(core|experimental|np|cpython|typed|misc)\b|_nrt\b|fndesc")
     found = {path.name for path in package.rglob("*.py") if private.search(path.read_text("utf-8"))}
-    assert found == {"numba_internals.py"}
+    assert found == {"numba_internals.py", "by_pointer.py"}
 
 
 def test_kernels_without_counting_compile_and_compute_the_same():
@@ -103,18 +103,19 @@ def test_arguments_of_other_types_are_refused_when_compiled():
 
 
 def test_inner_functions_are_linked_and_have_no_machine_code(fresh):
-    made = []
-    real = numba_internals.linked_library
+    linked, _ = numba_internals.libraries()
+    asked = []
+    fresh.setattr(linked, "finalize", lambda self: asked.append(self.name))
+    assert linked.get_pointer_to_function(None, "inner") == 0
 
-    def noting(base):
-        kind = real(base)
-        made.append(kind)
-        return kind
 
-    fresh.setattr(numba_internals, "linked_library", noting)
-    assert compose(root, {})(2.0) == root(2.0)
-    assert len(made) == 1
-    assert made[0].get_pointer_to_function(None, "inner") == 0
+def test_of_a_whole_program_only_the_entry_can_be_called_from_outside(fresh):
+    compiled = compose(root, {})
+    assert compiled(2.0) == root(2.0)
+    (dispatcher,) = compiled.made.values()
+    (result,) = dispatcher.overloads.values()
+    own = [each.name for each in result.library.get_defined_functions()]
+    assert all("run" in each or "cpython" in each for each in own if "linkonce" not in each)
 
 
 @pytest.mark.parametrize("name", ["inner_compiler", "typed_once", "quick_typing"])
