@@ -4,5 +4,6 @@
 ``interpreter_calls``: what of Python compiled code cannot call.
 ``disk_cache``: compiled code on disk, and what of it is to be trusted.
 ``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
-``by_pointer``: how arguments are handed over.  ``numba_internals``: all else that leans on numba's private parts.  Imports errors only.
+``by_pointer``: how arguments are handed over.
+``numba_internals``: all else that leans on numba's private parts.  Imports errors only.
 """

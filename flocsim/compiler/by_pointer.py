@@ -17,6 +17,7 @@ import functools
 import operator
 import struct
 from collections.abc import Sequence
+from hashlib import blake2b
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -99,7 +100,9 @@ def kinds_of_types():
                 self.places[each] = place
                 place += words_in(kind)
             self.words = place
-            super().__init__(f"{name}({', '.join(f'{n}: {kind}' for n, kind in fields)})")
+            # A hash, because the name of a type is in the name of every function that is given one.
+            told = blake2b(repr(fields).encode(), digest_size=6)
+            super().__init__(f"{name}_{told.hexdigest()}")
 
     class Elements(types.Type):
         """An array of numbers."""
@@ -108,7 +111,7 @@ def kinds_of_types():
             self.dtype, self.ndim, self.sizes = dtype, ndim, sizes
             self.words = 1 + ndim
             self.array = types.Array(dtype, ndim, "C")
-            super().__init__(f"elements({dtype}, {sizes})")
+            super().__init__(f"elements_{dtype}_{'_'.join(map(str, sizes))}")
 
     @register_default(Table)
     @register_default(Elements)
