@@ -31,25 +31,28 @@ LAYOUTS: dict[tuple[Any, ...], str] = {}
 def flatten(value, words, kinds):
     """Append an argument to the words of a table, and what it is to ``kinds``."""
     if isinstance(value, np.ndarray):
-        if not value.flags.c_contiguous:
-            raise KernelError(f"an array (shape {value.shape}) does not lie in C order")
         words.append(value.__array_interface__["data"][0])
         words.extend(value.shape)
-        kinds.append((value.dtype.char, value.ndim))
+        if value.flags.c_contiguous:
+            kinds.append((value.dtype.char, value.ndim))
+        else:
+            words.extend(value.strides)
+            kinds.append((value.dtype.char, value.ndim, "A"))
     elif isinstance(value, tuple):
         kinds.append((type(value), len(value)))
         for each in value:
             flatten(each, words, kinds)
+    elif value is None or callable(value):
+        # A law of a scene that runs uncompiled: nothing that compiled code could use.
+        words.append(0)
+        kinds.append(None)
     else:
         words.append(value)
         kinds.append("d" if isinstance(value, float) else "q")
 
 
 def table_of(arguments: Sequence[Any]) -> tuple[np.ndarray, tuple[Any, ...]]:
-    """The arguments as a table (words,) for ``argument_at``, and what they are, to compile for.
-
-    Raises KernelError for an array that does not lie in C order.
-    """
+    """The arguments as a table (words,) for ``argument_at``, and what they are, to compile for."""
     words: list[Any] = []
     found: list[Any] = []
     for each in arguments:
@@ -65,7 +68,7 @@ def words_in(kind):
     from numba import types
 
     if isinstance(kind, types.Array):
-        return 1 + kind.ndim  # the address and the sizes
+        return 1 + (1 if kind.layout == "C" else 2) * kind.ndim  # the address, sizes and strides
     if isinstance(kind, types.BaseTuple):
         return sum(map(words_in, kind.types))
     return kind.words if hasattr(kind, "words") else 1
@@ -136,14 +139,17 @@ def kinds_of_types():
             return builder.gep(table, [word(place)], inbounds=True)
         if isinstance(kind, types.Array):
             pointer = builder.gep(table, [word(place)], inbounds=True)
-            elements = Elements(kind.dtype, kind.ndim, (0,) * kind.ndim)
-            return whole(context, builder, elements, pointer)
+            return whole(
+                context, builder, Elements(kind.dtype, kind.ndim, (0,) * kind.ndim), pointer, kind
+            )
         if isinstance(kind, types.BaseTuple):
             values = []
             for each in kind.types:
                 values.append(value_at(context, builder, each, table, place))
                 place += words_in(each)
             return context.make_tuple(builder, kind, values)
+        if kind == types.none:
+            return context.get_dummy_value()
         found = read_word(builder, table, place)
         if kind == types.float64:
             return builder.bitcast(found, ir.DoubleType())
@@ -160,13 +166,17 @@ def kinds_of_types():
         element = context.get_data_type(kind.dtype).as_pointer()
         return builder.inttoptr(read_word(builder, value, 0), element)
 
-    def whole(context, builder, kind, value):
+    def whole(context, builder, kind, value, array):
         """The array as numba has them."""
-        found = make_array(kind.array)(context, builder)
+        found = make_array(array)(context, builder)
         itemsize = context.get_abi_sizeof(context.get_data_type(kind.dtype))
         lengths, strides = sizes(builder, kind, value), [word(itemsize)]
-        for length in lengths[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], length))
+        if array.layout == "C":
+            for length in lengths[:0:-1]:
+                strides.insert(0, builder.mul(strides[0], length))
+        else:
+            first = 1 + kind.ndim
+            strides = [read_word(builder, value, first + axis) for axis in range(kind.ndim)]
         populate_array(
             found, data(context, builder, kind, value), lengths, strides, word(itemsize), None
         )
@@ -257,7 +267,7 @@ def kinds_of_types():
             return context.unpack_value(builder, kind.dtype, pointer)
         inner = signature(sig.return_type, kind.array, index)
         call = context.get_function(operator.getitem, inner)
-        return call(builder, (whole(context, builder, kind, value), place))
+        return call(builder, (whole(context, builder, kind, value, kind.array), place))
 
     @infer_global(operator.setitem)
     class SetItem(AbstractTemplate):
@@ -283,7 +293,7 @@ def kinds_of_types():
             return context.get_dummy_value()
         inner = signature(types.none, kind.array, index, given)
         call = context.get_function(operator.setitem, inner)
-        return call(builder, (whole(context, builder, kind, value), place, number))
+        return call(builder, (whole(context, builder, kind, value, kind.array), place, number))
 
     return Table, Elements, value_at, data
 
@@ -318,14 +328,19 @@ def sizes_of(named: Any) -> dict[str, tuple[int, ...]]:
 
 def type_of(value: Any, *, arrays: bool, sizes: tuple[int, ...] = ()) -> Any:
     """The numba type of an argument; ``arrays``: whether arrays are such as numba has them;
-    ``sizes``: those that an array always has."""
+    ``sizes``: those that an array always has.
+
+    Raises KernelError for an array of another order than C, but where they are numba's.
+    """
     from numba import from_dtype, types
 
     table, elements, _, _ = kinds_of_types()
     if isinstance(value, np.ndarray):
         dtype = from_dtype(value.dtype)
         if arrays:
-            return types.Array(dtype, value.ndim, "C")
+            return types.Array(dtype, value.ndim, "C" if value.flags.c_contiguous else "A")
+        if not value.flags.c_contiguous:
+            raise KernelError(f"an array (shape {value.shape}) does not lie in C order")
         return elements(dtype, value.ndim, sizes or (0,) * value.ndim)
     if hasattr(value, "_fields"):
         known = sizes_of(type(value))  # type: ignore[arg-type]
@@ -338,6 +353,8 @@ def type_of(value: Any, *, arrays: bool, sizes: tuple[int, ...] = ()) -> Any:
         return table(type(value).__name__, tuple(zip(value._fields, kinds, strict=True)))
     if isinstance(value, tuple):
         return types.Tuple.from_types([type_of(each, arrays=arrays) for each in value])
+    if value is None or callable(value):
+        return types.none
     if isinstance(value, bool | np.bool_):
         return types.boolean
     return types.float64 if isinstance(value, float) else types.int64

@@ -107,6 +107,6 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
             touches[body, each] = free and reaches_wall(
                 swarm, body, walls[each], span, reach, width, height
             )
-    for wall in walls:
-        labels[wall] = -1
+    for each in range(walls.shape[0]):
+        labels[walls[each]] = -1
     return total
