@@ -1,8 +1,4 @@
-"""The tuples of scalars and of arrays that kernels and drivers see, and where things lie in them.
-
-Few arrays with named places, because every array that a compiled function is handed costs compile
-time in all of its callers.
-"""
+"""The tuples of scalars and of arrays that kernels and drivers see, and where things lie in them."""
 
 from typing import Annotated, Any, NamedTuple
 

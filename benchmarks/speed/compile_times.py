@@ -1,11 +1,12 @@
 """How long a scene takes to start: cold, warm, and after an edit of a force.
 
-    python -m benchmarks.speed.compile_times [--quick] [--markdown] [--private]
+    python -m benchmarks.speed.compile_times [--quick] [--markdown] [--private] [--against COMMIT]
 
 Each figure is of a process of its own that imports flocsim, makes two bodies with forces and takes
 its first steps; cold ones start with an empty cache folder, all others with what the ones before
 have compiled. ``--private`` also tells what a cold start costs without each private part of numba
-that flocsim leans on (flocsim.compiler.numba_internals).
+that flocsim leans on (flocsim.compiler.numba_internals); ``--against`` starts the flocsim of
+another commit beside this one, each scene twice and in both orders: the smaller CPU time counts.
 """
 
 import os
@@ -14,8 +15,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import ROOT, Table, parse_arguments, print_heading
+from benchmarks.speed.against_commit import other_tree
 
 SCRIPT = """
 import attrs
@@ -38,10 +41,30 @@ method = integrators.{method}
 assert System(bodies, laws, method).run(until=1e-6).status.name == "FINISHED"
 """
 
+STARTS = {
+    "two spheres": SCRIPT.format(
+        spheres=True, edit=None, method="Implicit()",
+        forces="forces.Gravity(), forces.StokesDrag(), forces.Contact()",
+    ),
+    "two polygons": SCRIPT.format(
+        spheres=False, edit=None, method="Implicit()",
+        forces="forces.Gravity(), forces.StokesDrag(), forces.Contact()",
+    ),
+    "a swarm of polygons": """
+import numpy as np
+from flocsim import Body, SpheroPolygon, Swarm, forces
+outline = SpheroPolygon(1e-5 * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), 1e-6)
+bodies = [Body(outline, (k * 2e-5, 0.0), density=2650.0) for k in range(4)]
+laws = [forces.Gravity(), forces.StokesDrag(), forces.Contact()]
+assert Swarm(bodies, laws).run(1e-4).status.name == "FINISHED"
+""",
+}  # fmt: skip
+"""What is started beside another commit."""
+
 METHODS = ("Implicit()", "Overdamped()", "DormandPrince54()", "VelocityVerlet(1e-8)")
 ALL = ("Gravity()", "StokesDrag()", "Contact()", "VanDerWaals()", "DoubleLayer()")
 OTHERS = ("Gravity()", "Contact(friction=0.3)", "VanDerWaals(gap='surface')")
-PRIVATE = ("inner_compiler", "typed_once", "quick_typing")
+PRIVATE = ("compilers", "typed_once", "quick_typing")
 
 
 def start(cache, spheres=False, method=METHODS[0], names=ALL, edit=None, without=""):
@@ -89,11 +112,45 @@ def private_parts():
     return table
 
 
+def started(tree, code):
+    """(CPU time [s], memory at most [MB]) of a process that starts a scene with the flocsim of a
+    folder, with nothing compiled before."""
+    told = "\nimport resource\nfound = resource.getrusage(resource.RUSAGE_SELF)\n"
+    told += "print(found.ru_utime + found.ru_stime, found.ru_maxrss / 1024)"
+    with tempfile.TemporaryDirectory() as cache:
+        script = Path(cache) / "start.py"
+        script.write_text(code + told)
+        environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": cache}
+        found = subprocess.run(
+            [sys.executable, script], check=True, env=environment, cwd=cache,
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+    return tuple(map(float, found.stdout.split()))
+
+
+def beside(commit):
+    """The table of cold starts here and at another commit."""
+    heads = ("scene", "CPU there [s]", "here [s]", "ratio", "memory there [MB]", "here [MB]")
+    table = Table(f"Cold starts beside {commit}", heads)
+    with tempfile.TemporaryDirectory() as folder:
+        there = other_tree(commit, Path(folder))
+        for name, code in STARTS.items():
+            order = (there, ROOT, ROOT, there)
+            found = [started(tree, code) for tree in order]
+            (old, old_memory), (new, new_memory) = min(found[::3]), min(found[1:3])
+            table.add(name, old, new, new / old, old_memory, new_memory)
+    return table
+
+
 def main():
     """Print the tables."""
     more = {"action": "store_true", "help": "tell what each private part of numba saves, too"}
-    arguments = parse_arguments(__doc__, private=more)
+    other = {"metavar": "COMMIT", "help": "start the flocsim of another commit beside this one"}
+    arguments = parse_arguments(__doc__, private=more, against=other)
     print_heading()
+    if arguments.against:
+        beside(arguments.against).print(arguments.markdown)
+        return
     starts(arguments.quick).print(arguments.markdown)
     if arguments.private:
         private_parts().print(arguments.markdown)

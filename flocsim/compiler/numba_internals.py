@@ -5,9 +5,8 @@
 2. ``call_by_address``: one compiled function calls another by its address, as numba's own code
    does. numba's first-class functions do the same, but every one that is handed to a compiled
    function costs 70 µs there; a run would be handed ten, and a replicate takes 2 ms.
-3. ``inner_compiler``: of an engine's two hundred functions Python calls one. The others are kept as
-   they are lowered, to be optimised once, where they end up, instead of each by itself as if Python
-   were to call it: that halves the time of compiling.
+3. ``compilers``: of an engine's five hundred functions Python calls one. The others are kept as
+   they are lowered, and are linked and optimised once, with it, as a program of one file is.
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
    says about an error is without colours.
@@ -265,7 +264,7 @@ def calls_python(library: Any) -> bool:
 def compilers() -> tuple[dict[str, Any], dict[str, Any]]:
     """{option: value} of numba.njit for functions that are only linked into others, and for one
     that is run."""
-    if "inner_compiler" in WITHOUT:
+    if "compilers" in WITHOUT:
         return {}, {}
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass

@@ -118,7 +118,7 @@ def test_of_a_whole_program_only_the_entry_can_be_called_from_outside(fresh):
     assert all("run" in each or "cpython" in each for each in own if "linkonce" not in each)
 
 
-@pytest.mark.parametrize("name", ["inner_compiler", "typed_once", "quick_typing"])
+@pytest.mark.parametrize("name", ["compilers", "typed_once", "quick_typing"])
 def test_each_part_can_be_left_out_and_the_same_is_computed(fresh, name):
     fresh.setattr(numba_internals, "WITHOUT", [name])
     assert compose(root, {})(2.0) == root(2.0)
