@@ -1,4 +1,4 @@
-"""The tuples of scalars and of arrays that kernels and drivers see, and where things lie in them."""
+"""The tuples of numbers and arrays that kernels and drivers see, and where things lie in them."""
 
 from typing import Annotated, Any, NamedTuple
 

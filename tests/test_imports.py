@@ -42,7 +42,7 @@ INNER_ROWS = {
         ["composer"],
         ["fingerprint", "interpreter_calls"],
         ["constants", "numba_internals"],
-        ["by_pointer", "disk_cache", "reads"],
+        ["by_pointer", "disk_cache", "processor", "reads"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "swarms": [

@@ -2,7 +2,8 @@
 
 ``composer``: engines and laws compiled and kept.  ``fingerprint``: what a function does, as a hash.
 ``interpreter_calls``: what of Python compiled code cannot call.
-``disk_cache``: compiled code on disk, and what of it is to be trusted.
+``disk_cache``: what is kept on disk, and what of it is to be trusted.
+``processor``: what of the machine decides the last digits.
 ``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
 ``by_pointer``: how arguments are handed over.
 ``numba_internals``: all else that leans on numba's private parts.  Imports errors only.

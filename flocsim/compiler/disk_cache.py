@@ -14,7 +14,7 @@ import secrets
 import stat
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 MARK = b"flocsim compiled code 1\n"
@@ -185,6 +185,18 @@ def write(name: str, key: str, data: bytes) -> None:
             )
         return None
     return None
+
+
+def kept(name: str, key: str, make: Callable[[], bytes]) -> bytes:
+    """What is kept under a name and a key; made, and kept, where there is nothing.
+
+    The key has to tell everything that what is made follows from.
+    """
+    data = read(name, key)
+    if data is None:
+        data = make()
+        write(name, key, data)
+    return data
 
 
 def make_folder(folder):

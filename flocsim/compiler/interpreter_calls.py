@@ -8,13 +8,17 @@ the process hangs with all of its threads, deaf to signals.
 import builtins
 import dis
 import functools
+import os
 import sys
 import types
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from flocsim.compiler.reads import reached, where
 from flocsim.errors import KernelError
+
+PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 OBJECT_MODE = "objmode"
 """numba's name for a way back into Python."""
@@ -62,6 +66,8 @@ def refuse_interpreter(entry: Any, fillings: Mapping[Callable, Callable] | None 
             continue
         seen.add(function)
         pending += [each for each in reached(function).values() if callable(each)]
+        if function.__code__.co_filename.startswith(PACKAGE):
+            continue  # flocsim's own do not, and are many
         if (found := interpreter_call(function)) is not None:
             name, line = found
             raise KernelError(

@@ -14,6 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.pairings import class_facts, class_words
@@ -45,7 +46,7 @@ from flocsim.ensembles.pilot.choice import (
 )
 from flocsim.ensembles.pilot.ladder import Job, trial
 from flocsim.ensembles.storage import first_rows
-from flocsim.ensembles.storage.cpu_kind import cpu_kind, distinct, mixture_warnings
+from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
 from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices

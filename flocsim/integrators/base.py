@@ -66,8 +66,8 @@ REASONS = {
 class Integrator(ABC):
     """A way to take one step; lists, error control, events and recording exist once, around it.
 
-    A subclass gives ``attempt``, a plain function that numba can compile, on arrays of which it uses
-    elements, ``shape``, ``len``, rows and slices:
+    A subclass gives ``attempt``, a plain function that numba can compile, on arrays of which it
+    uses elements, ``shape``, ``len``, rows and slices:
 
     ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.motion[NOW]``
     (n, 6: x, y, angle, vx, vy, spin), the time ``clock[TIME]`` and the step [s] to be tried. It

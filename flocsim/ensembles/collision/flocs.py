@@ -1,24 +1,34 @@
 """The flocs of a study: grown by flocsim, read from a shape library, or of a class of the user's
 own; resized to the scene, or as they were measured."""
 
+import hashlib
+import json
 import math
+import sys
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cache, cached_property, partial
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
+from flocsim.compiler.disk_cache import kept
+from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 
 SYNTHETIC_RATIO = 16.0
 """r_eq/r at which synthetic flocs are fitted: between the paper's small and large flocs."""
+
+GEOMETRY = Path(__file__).parents[2] / "geometry"
 
 
 @attrs.frozen(eq=False)
@@ -58,13 +68,37 @@ class Floc:
 
 
 def grow_floc(shapes, seed, index):
-    """One synthetic floc, fitted at all the numbers of vertices that the config asks for."""
-    mask = synthetic_floc((seed, index), shapes.primary_particles, shapes.fractal_dimension)
+    """One synthetic floc, fitted at all the numbers of vertices that the config asks for; each fit
+    is kept, for it takes a tenth of a second."""
     radius = EQUIVALENT_PIXELS / SYNTHETIC_RATIO
-    fits = {n: fit_mask(mask, vertices=n, radius=radius) for n in shapes.vertices if n > 1}
-    errors = {n: fit.relative_error for n, fit in fits.items()}
-    shapes_of_fits = {n: fit.shape for n, fit in fits.items()}
-    return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, shapes_of_fits, errors)
+    grown = (seed, index), shapes.primary_particles, shapes.fractal_dimension
+
+    @cache
+    def mask():
+        return synthetic_floc(*grown)
+
+    def fitted(vertices):
+        fit = fit_mask(mask(), vertices=vertices, radius=radius)
+        return json.dumps([fit.shape.core.tolist(), fit.relative_error]).encode()
+
+    found = {}
+    for n in shapes.vertices:
+        if n > 1:
+            told = f"{grown} {radius} {n} {growth_facts()}"
+            found[n] = json.loads(kept("flocsim_floc", told, partial(fitted, n)))
+    fits = {n: SpheroPolygon(core, radius) for n, (core, _) in found.items()}
+    errors = {n: error for n, (_, error) in found.items()}
+    return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, fits, errors)
+
+
+@cache
+def growth_facts() -> str:
+    """What a grown and fitted floc follows from beside its numbers: code, versions, processor."""
+    found = hashlib.blake2b(digest_size=16)
+    for path in sorted(GEOMETRY.rglob("*.py")):
+        found.update(path.read_bytes())
+    libraries = [version(name) for name in ("numpy", "scipy", "numba", "shapely", "scikit-image")]
+    return f"{found.hexdigest()} {sys.version} {libraries} {cpu_kind()}"
 
 
 def read_flocs(shapes: ShapesConfig) -> list[Floc]:

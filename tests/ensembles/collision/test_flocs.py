@@ -1,11 +1,14 @@
 """The flocs of a study: grown or read, chosen by size, resized exactly."""
 
+import attrs
 import numpy as np
 import pytest
 
 from flocsim import Sphere, SpheroPolygon
+from flocsim.ensembles.collision import flocs as flocs_module
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio
 from flocsim.ensembles.config.schema import ShapesConfig
+from flocsim.ensembles.storage.identity import shape_numbers
 from flocsim.errors import ConfigError, FileError
 from flocsim.io.shapes.library import read_library
 from tests.helpers.small_study import grown, write_star_library
@@ -170,3 +173,20 @@ def test_pairs_alike_in_their_error_may_have_any_fit_of_the_library(library):
 def test_what_cannot_be_read_so_is_refused(words, why):
     with pytest.raises(ConfigError, match=why):
         ShapesConfig(**words)
+
+
+def test_a_floc_that_is_kept_is_the_one_that_was_grown_bit_by_bit(tmp_path, monkeypatch):
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
+    tmp_path.chmod(0o700)
+    shapes = ShapesConfig(vertices=(1, 4, 9), pool=2)
+    grown = load_flocs(shapes, 3)
+    assert len(list(tmp_path.glob("flocsim_floc-*"))) == 4
+    monkeypatch.setattr(flocs_module, "fit_mask", None)  # nothing is fitted
+    for before, now in zip(grown, load_flocs(shapes, 3), strict=True):
+        assert before.errors == now.errors
+        for vertices in (4, 9):
+            np.testing.assert_array_equal(
+                shape_numbers(before.shapes[vertices]), shape_numbers(now.shapes[vertices])
+            )
+    with pytest.raises(TypeError):
+        load_flocs(attrs.evolve(shapes, fractal_dimension=1.5), 3)

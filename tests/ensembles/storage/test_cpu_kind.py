@@ -7,11 +7,11 @@ import sys
 
 import pytest
 
+from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles import runner
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.cpu_kind import (
-    cpu_kind,
     describe_kind,
     distinct,
     mixture_warnings,
@@ -40,7 +40,7 @@ SPHERES = {"shapes": {"vertices": [1]}, "scene": {"types": ["I"], "delta": [0.0]
     ],
 )
 def test_another_kind_is_seen_by_what_makes_it_one(name, value, differing):
-    code = "import json; from flocsim.ensembles.storage.cpu_kind import cpu_kind as k; "
+    code = "import json; from flocsim.compiler.processor import cpu_kind as k; "
     command = [sys.executable, "-c", code + "print(json.dumps(k()))"]
     env = {key: text for key, text in os.environ.items() if key != name}
     here, there = (
@@ -55,7 +55,7 @@ def test_what_numpy_does_not_use_makes_another_kind():
     found = cpu_kind()["numpy"]
     if "X86_V4" not in found:
         pytest.skip("numpy uses no AVX-512 here")
-    code = "from flocsim.ensembles.storage.cpu_kind import cpu_kind; print(cpu_kind()['numpy'])"
+    code = "from flocsim.compiler.processor import cpu_kind; print(cpu_kind()['numpy'])"
     env = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4"}
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True)
     assert "X86_V4" not in done.stdout
