@@ -4,31 +4,58 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+# Columns of ``Scene.bodies``: what does not change of a body.
 (
-    MASS, BUOYANT_MASS, INERTIA, FREE, EQUIVALENT_RADIUS, BOUNDING_RADIUS, RADIUS,
-    ELONGATION, LONG_AXIS, IDENTITY,
-) = range(10)  # fmt: skip
-"""Columns of ``Scene.bodies``; FREE is 1 for a body that moves, 0 for a fixed one; then a shape's
-elongation and the angle of its long axis [rad]; the number that a body's random forces go by."""
+    MASS,  # [kg]
+    BUOYANT_MASS,  # what gravity pulls at [kg]
+    INERTIA,  # about the centroid [kg m²]
+    FREE,  # 1 for a body that moves, 0 for a fixed one
+    EQUIVALENT_RADIUS,  # of the disc of its area [m]
+    BOUNDING_RADIUS,  # of the circle around the centroid that holds it [m]
+    RADIUS,  # the spheroradius [m]
+    ELONGATION,  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area
+    LONG_AXIS,  # the angle of its long axis [rad]
+    IDENTITY,  # the number that its random forces go by
+    SCENE_BODY_COLUMNS,
+) = range(11)
 
-X, Y, ANGLE, VX, VY, SPIN, MOTION_COLUMNS = range(7)
-"""Columns of ``Work.motion``: place [m], counter-clockwise angle [rad] and their rates."""
-
-RECORD_TIME, RECORD_MOTION = range(2)
-"""First columns of a record: time, then the motion of one body after another."""
+# Columns of ``Work.motion``; in ``Work.rates`` the velocity stands in the first three.
+(
+    X,  # of the centroid [m]
+    Y,  # [m]
+    ANGLE,  # counter-clockwise [rad]
+    VX,  # [m/s]
+    VY,  # [m/s]
+    SPIN,  # [rad/s]
+    MOTION_COLUMNS,
+) = range(7)
 
 VELOCITY = VX
 """First column of the velocity in ``Work.motion``, for loops over axes."""
 
-FX, FY, TORQUE = range(3, 6)
-"""Columns of the force in ``Work.rates``, behind those of the velocity [N, N m]."""
+# Columns of ``Work.rates``, behind those of the velocity.
+(
+    FX,  # [N]
+    FY,  # [N]
+    TORQUE,  # [N m]
+) = range(3, 6)
 
 FORCE = FX
 """First column of the force in ``Work.rates``, for loops over axes."""
 
-NOW, NEW, TRIAL, FIRST_STAGE = range(4)
-"""States, rows of ``motion``, ``rates``, ``geometry`` and ``slip`` in Work: now, at the end of the
-step, wherever something is tried out in it, and the first of its stages."""
+# First columns of a record.
+(
+    RECORD_TIME,  # [s]
+    RECORD_MOTION,  # from here on, of one body after another
+) = range(2)
+
+# States: rows of ``motion``, ``rates``, ``geometry`` and ``slip`` in Work.
+(
+    NOW,  # as it is
+    NEW,  # at the end of the step
+    TRIAL,  # wherever something is tried out in it
+    FIRST_STAGE,  # the first of its stages
+) = range(4)
 
 MOST_STAGES = 6
 """Most stages of an integrator that are neither NOW nor NEW."""
@@ -36,178 +63,242 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
+# Rows of ``Work.motion`` alone.
 (
-    START, CHANGE, DEVIATION, CARRIED, FORCING, LAST_RATES, LOOKED, CYCLE_LAST, CYCLE_BEFORE,
+    START,  # where the step began whose stages are still there
+    CHANGE,  # of velocities, by an iteration of Newton's method [m/s, rad/s]
+    DEVIATION,  # by how much NEW is likely to be wrong
+    CARRIED,  # what all such errors, carried on with the motion, have become
+    FORCING,  # in the columns of velocities: by what it is carried beside its start [N, N, N m]
+    LAST_RATES,  # there: accelerations of the last step across switches [m/s², 1/s²]
+    LOOKED,  # there: the velocities when a method last looked how far it has come
+    CYCLE_LAST,  # at the end of the last cycle of switches
+    CYCLE_BEFORE,  # at the end of the one before
     MOTION_ROWS,
-) = range(STATES, STATES + 10)  # fmt: skip
-"""Rows of ``Work.motion`` alone: the state in which the step began whose stages are still there; a
-change of velocities that Newton's method makes; by how much NEW is likely to be wrong; what all
-such errors, carried on with the motion, have become; in the columns of velocities, forces by which
-it is carried otherwise than a change of the start [N, N, N m], the accelerations of the last step
-across switches [m/s², 1/s²], and the velocities when a method last looked how far it has come; the
-motion at the ends of the last cycle of switches and of the one before."""
+) = range(STATES, STATES + 10)
 
 SLIP_RATES = STATES
 """Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
+# Rows of ``Work.slip`` behind the displacements and their rates.
 (
-    SLIP_OFFSET, GRAZING_FORCE, FRESH, GRAZING_RESISTANCE, GAP_OFFSET, FLIGHT, FLIGHTS,
-    OVERLAP, PART, GAIN, LEFT, RUBBING, AHEAD, BEHIND,
-    KEPT_SLIP, KEPT_OFFSET, KEPT_FORCE, KEPT_GAP, KEPT_FLIGHTS,
-    CYCLE_SLIP, CYCLE_SLIP_BEFORE, CYCLE_GAP, CYCLE_GAP_BEFORE, FLOWN_AT, SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 25)  # fmt: skip
-"""Rows of ``Work.slip``: the error that a displacement is carried with, less that of the places
-along the tangent.  Of a pair that grazes: its tangential force now [N]; 1 where it has only just
-begun; by how much that force falls with the rate of the gap [N s/m]; the gap at which it has been
-held, which counts as none [m].  How far a pair has been apart since it last parted [m], how often
-that was next to nothing (see events.grazes).  The overlap [m] and the part of the step that a
-pair's friction goes by while the end of a step across switches is looked for, and how fast that
-part follows (contact_mean.follow); of an interior-point method that finds out which pairs close and
-slide: what is left of the gap [m], the share of what friction can hold, and how far the pair slides
-ahead and behind [m].  Displacements, offsets, forces, gaps and flights that are set aside while the
-list is made anew.  Displacements and gaps at the ends of the last cycle of switches and of the one
-before [m]; when the pair last touched again behind a flight that was next to nothing [s]."""
-
-(
-    LISTED, COSINE, SINE, MEMORY, SHIFT_SUM, MASS_SUM,
-    RELAXATION, STEP_PLACE, STEP_SPEED, ERROR_PLACE, ERROR_SPEED, SWITCH_PLACE, SWITCH_SPEED,
-    DOUBT_PLACE, DOUBT_SPEED, SHORTENED, LEADER_FORCE, LEADER_RATE, KICK_AT, KICK_SPAN, KICK_X,
-    KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE, MOST_PLACE, STATED, FRAMES,
-) = (
-    0, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 21, 23, 24, 25, 28, 29, 30, 31, 32,
-    33,
-)  # fmt: skip
-"""First columns in ``Work.bodies``: where a body was (x, y, angle) at the last listing; cosine and
-sine of its angle; how long it remembers a velocity; sums over its cluster, of mass times shift (x,
-y) and of mass; how long drag lets a velocity last [s]; the last step's errors of place [m] and of
-velocity [m/s]; what all steps' errors, those of switches, and contacts that may have opened have
-led to; of the first body of a cluster: the share to which the carried
-error is shortened, the sums of forces, and of masses times accelerations (x, y); of body 0, where
-the present kick begins and how long it is, in the shortest kicks; the noise in it (x, y, angle); an
-angle, and its cosine and sine, as they are remembered; of the first body of a cluster, by how much
-the place of one of its bodies may be wrong [m]; the stated error of a body [m]; its frames at an
-implicit step's stages."""
-
-TURN_COSINE, TURN_SINE, SHIFT_X, SHIFT_Y, FRAME_COLUMNS = range(5)
-"""Columns of a frame: cosine and sine of the turn, and both entries of the shift."""
+    SLIP_OFFSET,  # the error that ξ is carried with, less that of places along the tangent [m]
+    GRAZING_FORCE,  # the tangential force of a pair that grazes, now [N]
+    FRESH,  # 1 where it has only just begun to graze
+    GRAZING_RESISTANCE,  # by how much that force falls with the rate of the gap [N s/m]
+    GAP_OFFSET,  # the gap at which it has been held, which counts as none [m]
+    FLIGHT,  # how far a pair has been apart since it last parted [m]
+    FLIGHTS,  # how often that was next to nothing (events.grazes)
+    OVERLAP,  # by which friction goes while a step's end is looked for [m]
+    PART,  # the part of the step by which it goes then
+    GAIN,  # how fast that part follows (contact_mean.follow)
+    LEFT,  # of an interior-point method: what is left of the gap [m]
+    RUBBING,  # the share of what friction can hold
+    AHEAD,  # how far the pair slides ahead [m]
+    BEHIND,  # and behind [m]
+    KEPT_SLIP,  # displacements, set aside while the list is made anew [m]
+    KEPT_OFFSET,  # SLIP_OFFSET, set aside [m]
+    KEPT_FORCE,  # GRAZING_FORCE, set aside [N]
+    KEPT_GAP,  # GAP_OFFSET, set aside [m]
+    KEPT_FLIGHTS,  # FLIGHTS, set aside
+    CYCLE_SLIP,  # displacements at the end of the last cycle of switches [m]
+    CYCLE_SLIP_BEFORE,  # of the one before [m]
+    CYCLE_GAP,  # gaps at the end of the last cycle [m]
+    CYCLE_GAP_BEFORE,  # of the one before [m]
+    FLOWN_AT,  # when the pair last touched again behind a flight next to nothing [s]
+    SLIP_ROWS,
+) = range(2 * STATES, 2 * STATES + 25)
 
 MOST_FRAMES = 3
 """Stages for which a body keeps a frame."""
 
+# Columns of a frame: how a body's contacts follow it through an implicit step.
+(
+    TURN_COSINE,
+    TURN_SINE,
+    SHIFT_X,  # [m]
+    SHIFT_Y,  # [m]
+    FRAME_COLUMNS,
+) = range(5)
+
+# Columns of ``Work.bodies``: what changes of a body beside its motion. A cluster are bodies that
+# act on each other; what is of a cluster stands with its first body, its leader.
+(
+    LISTED,  # x [m] …
+    LISTED_Y,  # … y [m] …
+    LISTED_ANGLE,  # … and angle [rad] at the last listing
+    COSINE,  # of its angle
+    SINE,
+    MEMORY,  # how long it remembers a velocity [s]
+    SHIFT_SUM,  # of a cluster: mass times shift along x [kg m] …
+    SHIFT_SUM_Y,  # … and y
+    MASS_SUM,  # of a cluster [kg]
+    RELAXATION,  # how long drag lets a velocity last [s]
+    STEP_PLACE,  # the last step's error of place [m]
+    STEP_SPEED,  # and of velocity [m/s]
+    ERROR_PLACE,  # what all steps' errors have led to [m]
+    ERROR_SPEED,  # [m/s]
+    SWITCH_PLACE,  # what those of switches have led to [m]
+    SWITCH_SPEED,  # [m/s]
+    DOUBT_PLACE,  # what contacts that may have opened have led to [m]
+    DOUBT_SPEED,  # [m/s]
+    SHORTENED,  # of a cluster: the share to which the carried error is shortened
+    LEADER_FORCE,  # of a cluster: the sum of forces along x [N] …
+    LEADER_FORCE_Y,  # … and y
+    LEADER_RATE,  # of a cluster: masses times accelerations along x [N] …
+    LEADER_RATE_Y,  # … and y
+    KICK_AT,  # of body 0: where the present kick begins, in the shortest kicks
+    KICK_SPAN,  # and how long it is
+    KICK_X,  # the noise in it along x [1/√s] …
+    KICK_Y,  # … y …
+    KICK_TURN,  # … and the angle
+    KNOWN_ANGLE,  # an angle whose cosine and sine are remembered [rad]
+    KNOWN_COSINE,
+    KNOWN_SINE,
+    MOST_PLACE,  # of a cluster: by how much a place in it may be wrong [m]
+    STATED,  # the body's stated error [m]
+    FRAMES,  # from here on: its frames at an implicit step's stages
+) = range(34)
+
 BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
+"""How many columns ``Work.bodies`` has."""
 
+# Columns of ``Work.candidates``: a vertex of one body and an edge of another, that may touch.
 (
-    VERTEX_BODY, VERTEX, EDGE_BODY, EDGE_START, EDGE_END, CLOSED, NEAR, SLIDING, PAIR,
-    DOES, CANDIDATE_COLUMNS,
-) = range(11)  # fmt: skip
-"""Columns of ``Work.candidates``: body and core point of the vertex; body, first and last core
-point of the edge; how the pair touches in this step, see OPEN; 1 where it may have a share of a
-surface force in it; ±1 where it slides in it, in the direction of ξ, 0 where it sticks; the row of
-the two bodies in ``Work.pairs``; in an iteration of backward Euler, what the pair does (see
-contact_mean.mode_of)."""
+    VERTEX_BODY,
+    VERTEX,  # its core point
+    EDGE_BODY,
+    EDGE_START,  # first core point of the edge
+    EDGE_END,  # its last
+    CLOSED,  # how the pair touches in this step, see OPEN
+    NEAR,  # 1 where it may have a share of a surface force in it
+    SLIDING,  # ±1 where it slides in it, in the direction of ξ, 0 where it sticks
+    PAIR,  # the row of the two bodies in ``Work.pairs``
+    DOES,  # in an iteration of backward Euler: what it does (contact_mean.mode_of)
+    CANDIDATE_COLUMNS,
+) = range(11)
 
-OPEN, TOUCHES, GRAZES = range(3)
-"""What ``CLOSED`` says: the pair is apart; it touches, with the whole contact law; it grazes, borne
-by a share of it (flocsim.integrators.rhs.grazing)."""
-
-LATER, EARLIER, ACTING, PAIR_COLUMNS = range(4)
-"""Columns of ``Work.pairs``: two bodies, the later one first; 1 where they act on each other in
-this step."""
-
+# What CLOSED says.
 (
-    NORMAL_X,
+    OPEN,  # the pair is apart
+    TOUCHES,  # it touches, with the whole contact law
+    GRAZES,  # borne by a share of it (flocsim.integrators.rhs.grazing)
+) = range(3)
+
+# Columns of ``Work.pairs``: two bodies that may come near each other.
+(
+    LATER,  # the body of the larger number
+    EARLIER,
+    ACTING,  # 1 where they act on each other in this step
+    PAIR_COLUMNS,
+) = range(4)
+
+# Columns of ``Work.geometry``: where a vertex is beside an edge, flocsim.geometry.contact.points.
+(
+    NORMAL_X,  # unit normal from the foot on the edge to the vertex
     NORMAL_Y,
-    GAP,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    EDGE_ARM_N,
+    GAP,  # [m]
+    VERTEX_ARM_N,  # the moment about the vertex's body of a unit force along n, at the middle …
+    VERTEX_ARM_T,  # … of the overlap, and along t [m]
+    EDGE_ARM_N,  # the same about the edge's body [m]
     EDGE_ARM_T,
-    TURNING,
-    FOOT,
-    SIDE,
-    SHARE,
+    TURNING,  # the angle by which n turns for every metre of the vertex along t [1/m]
+    FOOT,  # how far along the edge the foot lies [m]
+    SIDE,  # ±1 where t goes along the edge or against it
+    SHARE,  # of a surface force, that acts through it
     GEOMETRY_COLUMNS,
 ) = range(12)
-"""Columns of ``Work.geometry``: unit normal from the foot on the edge to the vertex; gap [m]; arms
-[m], which are the moments of unit forces along n and t, applied at the middle of the overlap, about
-the centroid of the vertex's body and about that of the edge's; the angle by which the normal turns
-for every metre of the vertex along t [1/m]; how far along the edge the foot
-lies [m], and ±1 where t goes along the edge or against it; the share of a surface force that acts
-through it.  See flocsim.geometry.contact.points."""
 
-KEPT_LATER, KEPT_EARLIER, KEPT_VERTEX, KEPT_EDGE, KEPT_MODE, KEPT_COLUMNS = range(6)
-"""Columns of ``Work.kept``: the two bodies, the later one first; core point of the vertex, first
-core point of the edge; how the pair touched."""
-
-DAMPING, STIFFNESS = range(2)
-"""Matrices in ``Work.jacobian``: minus the derivatives of the forces by velocity and by place."""
-
-CANDIDATES, PAIRS, EVALUATIONS, REBUILDS, SOLVES, KEPT, FULL, TALLY_SIZE = range(8)
-"""Places in ``Work.tally``: pairs of features and pairs of bodies listed; forces evaluated, lists
-made, systems solved so far; one more than the displacements set aside for a list that found no room
-(0: none are); what has found no room."""
-
-NOTHING_FULL, CANDIDATES_FULL, PAIRS_FULL, BLOCKS_FULL = range(4)
-"""What ``FULL`` says."""
-
+# Columns of ``Work.kept``: pairs whose displacements are set aside.
 (
-    TIME,
-    UNTIL,
-    STEP,
-    TOLERANCE,
-    ERROR,
-    LARGEST_STEP,
-    PREVIOUS_STEP,
-    PREVIOUS_RATIO,
-    PACE,
-    STAGED_STEP,
-    STAGED_AT,
-    BEARABLE_STEP,
-    STEP_ERROR,
-    REJECTED_STEP,
-    REJECTED_RATIO,
-    SETTLING,
-    SETTLED_STEP,
-    ESTIMATE_SHARE,
-    HORIZON,
-    SEEN_PACE,
-    SEEN_STEP,
-    ACROSS,
-    RATES_KNOWN,
-    BUSY,
-    SWITCHES,
-    LOOKED_AT,
-    CYCLE_AT,
-    CYCLE_AT_BEFORE,
-    CYCLE_ERROR,
+    KEPT_LATER,  # the body of the larger number
+    KEPT_EARLIER,
+    KEPT_VERTEX,  # core point of the vertex
+    KEPT_EDGE,  # first core point of the edge
+    KEPT_MODE,  # how the pair touched, see OPEN
+    KEPT_COLUMNS,
+) = range(6)
+
+# Matrices in ``Work.jacobian``: minus the derivatives of the forces …
+(
+    DAMPING,  # … by velocity
+    STIFFNESS,  # … by place
+) = range(2)
+
+# Places in ``Work.tally``.
+(
+    CANDIDATES,  # pairs of features listed
+    PAIRS,  # pairs of bodies listed
+    EVALUATIONS,  # forces summed so far
+    REBUILDS,  # lists made so far
+    SOLVES,  # systems solved so far
+    KEPT,  # one more than displacements set aside for a list that found no room; 0: none are
+    FULL,  # what has found no room, see NOTHING_FULL
+    TALLY_SIZE,
+) = range(8)
+
+# What FULL says.
+(
+    NOTHING_FULL,
+    CANDIDATES_FULL,
+    PAIRS_FULL,
+    BLOCKS_FULL,
+) = range(4)
+
+# Places in the ``clock`` of a run.
+(
+    TIME,  # [s]
+    UNTIL,  # the end, or a stop on the way [s]
+    STEP,  # the next step [s]
+    TOLERANCE,  # [m]; inf: steps are fixed
+    ERROR,  # the stated error [m]
+    LARGEST_STEP,  # [s]
+    PREVIOUS_STEP,  # size of the step before [s]; inf: there was none, 0: it was rejected
+    PREVIOUS_RATIO,  # its error over the tolerance
+    PACE,  # by how much each of Newton's iterations shrinks the last change
+    STAGED_STEP,  # size of the step whose stages are still there [s]; 0: none are
+    STAGED_AT,  # the time at which it began [s]
+    BEARABLE_STEP,  # the largest that is expected to work at all [s]
+    STEP_ERROR,  # error of the step just taken [m]
+    REJECTED_STEP,  # size of the trial that was just rejected [s]; 0: none was
+    REJECTED_RATIO,  # its error over the tolerance
+    SETTLING,  # steps in a row that ended at a switch, until one has been taken that does not
+    SETTLED_STEP,  # size of the last such step [s]
+    ESTIMATE_SHARE,  # share of what the method estimates that counts in the stated error
+    HORIZON,  # until when the run goes on, where UNTIL is a stop on the way; 0: it is not [s]
+    SEEN_PACE,  # pace of the last second iteration that was made; 0: it is not known
+    SEEN_STEP,  # size of its step [s]
+    ACROSS,  # 1 where steps go on across switches, 0 where they end there
+    RATES_KNOWN,  # of steps across them: 1 where LAST_RATES are known
+    BUSY,  # 1 where so many contacts switch in a step that Newton's method alone is slow
+    SWITCHES,  # how many there were since a method last looked how far it has come
+    LOOKED_AT,  # when that was [s]; inf: it is to do so anew
+    CYCLE_AT,  # the end of the last cycle of switches [s]
+    CYCLE_AT_BEFORE,  # of the one before [s]
+    CYCLE_ERROR,  # the stated error at the last [m]
     CLOCK_SIZE,
 ) = range(30)
-"""The ``clock`` of a run: time and end [s], next step [s], tolerance [m] (inf: fixed steps), stated
-error [m], largest step [s]; size of the step before (inf: none, 0: it was rejected) and its
-error over the tolerance; by how much each of Newton's iterations shrinks the last change; size of
-the step whose stages are still there (0: none are) and the time at which it began; the largest
-step that is expected to work at all; the error of the step just taken [m]; size and error over
-tolerance of the trial that was just rejected (0: none was); steps in a row that ended at a switch,
-until one has been taken that does not; the size of the last such step; the share of what the method
-estimates for its steps that counts in the stated error; until when the run goes on, where UNTIL is
-but a stop on the way (0: it is not) [s]; the pace of the last second iteration that was made (0: it
-is not known), and the size of its step; 1 where steps go on across switches, 0 where they end
-there; of steps across them: 1 where LAST_RATES are known, 1 where so many contacts switch in a step
-that Newton's method alone is slow, and the switches since a method last looked how far it has come;
-when that was (inf: it is to do so anew) [s]; the ends of the last cycle of switches and of the one
-before [s], and the stated error at the last [m]."""
 
+# Places in the ``counts`` of a run.
 (
-    STEPS, REJECTED, MAX_STEPS, RECORDED, PAUSE_AT, CODE, LOCATED, STILL, LOOK_AT, LOOKED_TRIED,
-    CYCLE_MODES, CYCLE_CODE, CYCLE_CODE_BEFORE, CYCLE_SWITCHES, CYCLES_SEEN, CYCLE_RETURNS,
+    STEPS,  # taken
+    REJECTED,  # tried in vain
+    MAX_STEPS,  # budget of all that are tried
+    RECORDED,  # rows in the record
+    PAUSE_AT,  # steps after which to pause
+    CODE,  # the observer's last
+    LOCATED,  # events located
+    STILL,  # steps in a row by which no time has gone by
+    LOOK_AT,  # steps after which a method looks how far it has come
+    LOOKED_TRIED,  # how many had been tried when it last did
+    CYCLE_MODES,  # of cycles of switches (events.cycles): in which modes one begins; 0: none has
+    CYCLE_CODE,  # a number for what has switched since
+    CYCLE_CODE_BEFORE,  # and for the cycle before
+    CYCLE_SWITCHES,  # how many switches there were
+    CYCLES_SEEN,  # how many cycles have ended
+    CYCLE_RETURNS,  # how often those modes have come again
     COUNTS_SIZE,
-) = range(17)  # fmt: skip
-"""The ``counts`` of a run: steps taken and rejected, their budget, rows recorded, steps after
-which to pause, the observer's last code, events located, steps in a row by which no time has
-gone by; steps after which a method looks how far it has come, and how many had been tried when it
-last did; of cycles of switches (see events.cycles): the modes in which one begins (0: none has),
-a number for what has switched since and one for the cycle before, how many switches there were, how
-many cycles have ended, and how often those modes have come again."""
+) = range(17)
 
 
 class BodyView(NamedTuple):
@@ -270,97 +361,62 @@ class ContactView(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """What does not change in a run: n bodies, all their core points, the forces' numbers.
+    """What does not change in a run: n bodies, all their core points, the forces' numbers."""
 
-    ``bodies`` (n, 10): see flocsim.arrays; ``first``, ``vertices`` and ``tree``: see
-    flocsim.geometry.contact.circle_tree.Outlines; ``laws``: see flocsim.laws; ``surface_reach``
-    and ``centre_reach``: the gaps up to which such forces act [m], −1 where there are none;
-    ``smoothing``: see flocsim.forces.smoothing; ``box``: periods along x and y [m], inf where
-    nothing repeats; ``kicks`` and ``key``: how long random forces stay the same, and what they
-    are drawn by, see flocsim.integrators.loop.kicks.
-    """
-
-    bodies: Annotated[np.ndarray, ("n", 10)]
-    first: np.ndarray
-    vertices: np.ndarray
-    tree: Annotated[np.ndarray, ("nodes", 3)]
-    parameters: np.ndarray
-    laws: Any
-    surface_reach: float
-    centre_reach: float
-    smoothing: tuple[float, float, float]
-    events: int
-    box: tuple[float, float]
-    kicks: tuple[float, float, float, float]
-    key: tuple[int, int]
+    bodies: Annotated[np.ndarray, ("n", SCENE_BODY_COLUMNS)]  # see MASS
+    first: np.ndarray  # (n + 1,): where a body's core points begin
+    vertices: np.ndarray  # (points, 2 or more): geometry.contact.circle_tree.Outlines
+    tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
+    parameters: np.ndarray  # what the laws read of the forces
+    laws: Any  # see flocsim.laws
+    surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
+    centre_reach: float  # the same of centre forces [m]
+    smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
+    events: int  # how many the contact forces have
+    box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
+    kicks: tuple[float, float, float, float]  # how long random forces stay: integrators.loop.kicks
+    key: tuple[int, int]  # what they are drawn by
 
 
 class Elimination(NamedTuple):
-    """The sparse systems of a step of many bodies: flocsim.integrators.radau.elimination.
+    """The sparse systems of a step of many bodies: flocsim.integrators.radau.elimination."""
 
-    ``place`` (n,): where a body comes in the order of elimination, −1 for a fixed one; ``body``:
-    the body at a place.  ``lower`` (n + 1,) and ``upper`` (n,): where the blocks of a row left and
-    right of the diagonal begin in ``column`` (room,), which holds their places, and in ``blocks``
-    (room, 3, 3, 3): the parts of a block (see sparse REAL_PART), rows, columns.  ``pivot``
-    (n, 3, 3, 3): the inverses of the diagonal blocks; ``row``: the row that is worked on.
-    ``pairs`` (pairs,): 1 where a pair of bodies is in the pattern.  ``graph`` (room,) and
-    ``nodes`` (8, n + 1): scratch of the ordering.  ``found``: see elimination.PATTERN.
-    """
-
-    place: np.ndarray
-    body: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    column: np.ndarray
-    blocks: Annotated[np.ndarray, ("room", 3, 3, 3)]
-    pivot: Annotated[np.ndarray, ("n", 3, 3, 3)]
-    row: Annotated[np.ndarray, ("n", 3, 3, 3)]
-    pairs: np.ndarray
-    graph: np.ndarray
-    nodes: np.ndarray
-    found: np.ndarray
+    place: np.ndarray  # (n,): where a body comes in the order; −1 for a fixed one
+    body: np.ndarray  # (n,): the body at a place
+    lower: np.ndarray  # (n + 1,): where a row's blocks left of the diagonal begin in ``column``
+    upper: np.ndarray  # (n,): where those right of it begin
+    column: np.ndarray  # (room,): places of the blocks
+    blocks: Annotated[np.ndarray, ("room", 3, 3, 3)]  # parts (REAL_PART …), rows, columns
+    pivot: Annotated[np.ndarray, ("n", 3, 3, 3)]  # inverses of the diagonal blocks
+    row: Annotated[np.ndarray, ("n", 3, 3, 3)]  # the row that is worked on
+    pairs: np.ndarray  # (pairs,): 1 where a pair of bodies is in the pattern
+    graph: np.ndarray  # (room,): scratch of the ordering
+    nodes: np.ndarray  # (8, n + 1): scratch of the ordering
+    found: np.ndarray  # (3,): see elimination.PATTERN
 
 
 class Work(NamedTuple):
-    """What changes in a run, and the scratch space of the drivers; all arrays are reused.
+    """What changes in a run, and the scratch space of the drivers; all arrays are reused."""
 
-    ``motion`` (18, n, 6): places and velocities in the states, then see START.
-    ``rates`` (9, n, 6): velocity and force (with torque) in the states.
-    ``slip`` (42, capacity): tangential displacements in the states, their rates there, then see
-    SLIP_OFFSET.
-    ``bodies`` (n, 45): see LISTED.  ``cluster`` (n,): first of the bodies that one acts on,
-    directly or through others.
-    ``jacobian`` (2, 2 n + 2 pairs, 3, 3): blocks of DAMPING and STIFFNESS, see rhs.blocks.
-    ``loads`` (2, 3 n), complex: right-hand sides of the linear systems, then their solutions.
-    ``system`` (2, 3 n, 3 n), complex: few bodies' factorised systems, and ``pivots`` (2, 3 n),
-    which rows have changed places; ``elimination``: those of many.
-    ``candidates`` (capacity, 10): see VERTEX_BODY.  ``geometry`` (9, capacity, 11): see NORMAL_X.
-    ``kept`` (capacity, 5): the pairs whose displacements are set aside.
-    ``pairs`` (pairs, 3): the pairs of bodies that may come near each other, see LATER; ``budget``
-    (pairs,): how far two bodies may move until the list must be made anew; ``discs`` (n, 8),
-    ``order`` (n,) and ``starts`` (n + 1,): what the sweep for them works on.
-    ``tally``: counts, see CANDIDATES.
-    """
-
-    motion: Annotated[np.ndarray, ("rows", "n", MOTION_COLUMNS)]
-    rates: Annotated[np.ndarray, ("states", "n", MOTION_COLUMNS)]
-    slip: np.ndarray
-    bodies: Annotated[np.ndarray, ("n", BODY_COLUMNS)]
-    cluster: np.ndarray
-    jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]
-    loads: np.ndarray
-    system: np.ndarray
-    pivots: np.ndarray
-    elimination: Elimination
-    candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]
-    geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]
-    kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]
-    pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]
-    budget: np.ndarray
-    discs: Annotated[np.ndarray, ("n", 8)]
-    order: np.ndarray
-    starts: np.ndarray
-    tally: np.ndarray
+    motion: Annotated[np.ndarray, ("rows", "n", MOTION_COLUMNS)]  # by states, then see START
+    rates: Annotated[np.ndarray, ("states", "n", MOTION_COLUMNS)]  # velocity, then see FX
+    slip: np.ndarray  # (SLIP_ROWS, capacity): ξ in the states [m], SLIP_RATES, then see SLIP_OFFSET
+    bodies: Annotated[np.ndarray, ("n", BODY_COLUMNS)]  # see LISTED
+    cluster: np.ndarray  # (n,): first of the bodies that one acts on, through others, too
+    jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # see DAMPING and rhs.blocks
+    loads: np.ndarray  # (2, 3 n), complex: right-hand sides, then solutions
+    system: np.ndarray  # (2, 3 n, 3 n), complex: few bodies' systems, factorised
+    pivots: np.ndarray  # (2, 3 n): which rows have changed places
+    elimination: Elimination  # systems of many bodies
+    candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]  # see VERTEX_BODY
+    geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]  # see NORMAL_X
+    kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
+    pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
+    budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
+    discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
+    order: np.ndarray  # (n,): the same
+    starts: np.ndarray  # (n + 1,): the same
+    tally: np.ndarray  # see CANDIDATES
 
 
 ALL_PAIRS = 12

@@ -1,7 +1,7 @@
 """The arrays of a swarm: what is known of every body between two common times."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -11,68 +11,82 @@ from flocsim.geometry.contact.sweep import DISC_COLUMNS
 ERROR_COLUMNS = 6
 """Columns of ``errors``: from ERROR_PLACE to DOUBT_SPEED of a run."""
 
-BEGIN, END, HORIZON_AT, TIME_COUNT = range(4)
-"""Places in ``times``: when the window begins and ends, and when the run does [s]."""
-
-LATER_BODY, EARLIER_BODY, AT_VERTEX, AT_EDGE, MODE, LINK_COLUMNS = range(6)
-"""Columns of ``links``: the bodies of a contact of which more is known than where they are, the
-later one first; core point of the vertex and first one of the edge, of all bodies'; how it touched
-(KEPT_MODE)."""
-
-SLIP, OFFSET, HELD_FORCE, HELD_GAP, MICRO_FLIGHTS, SLIP_COLUMNS = range(6)
-"""Columns of ``slips``: the displacement [m] and the error that it is carried with; the tangential
-force with which it grazes [N], the gap that counts as none [m], and how often it was apart by next
-to nothing (events.grazes)."""
-
-STEPS_TAKEN, STEPS_REJECTED, FORCES_SUMMED, COST_COLUMNS = range(4)
-"""Columns of ``costs``, of every island."""
-
+# Places in ``times``.
 (
-    START_X, START_Y, PATH_VX, PATH_VY, SINCE, FURTHEST, HALT, TRACK_COLUMNS,
-) = range(8)  # fmt: skip
-"""Columns of what an island's observer sees, of every body: the straight path that it is expected
-to go, and from when; how far it has strayed from it [m]; of the first one, 1 where the island is
-to stop at once, which another thread says."""
+    BEGIN,  # of the window [s]
+    END,  # of the window [s]
+    HORIZON_AT,  # when the run ends [s]
+    TIME_COUNT,
+) = range(4)
+
+# Columns of ``links``: contacts of which more is known than where the bodies are.
+(
+    LATER_BODY,  # the body of the larger number
+    EARLIER_BODY,
+    AT_VERTEX,  # core point of the vertex, of all bodies'
+    AT_EDGE,  # first core point of the edge, of all bodies'
+    MODE,  # how it touched (KEPT_MODE)
+    LINK_COLUMNS,
+) = range(6)
+
+# Columns of ``slips``, of the same contacts.
+(
+    SLIP,  # the displacement [m]
+    OFFSET,  # the error that it is carried with [m]
+    HELD_FORCE,  # the tangential force with which it grazes [N]
+    HELD_GAP,  # the gap that counts as none [m]
+    MICRO_FLIGHTS,  # how often it was apart by next to nothing (events.grazes)
+    SLIP_COLUMNS,
+) = range(6)
+
+# Columns of ``costs``, of every island.
+(
+    STEPS_TAKEN,
+    STEPS_REJECTED,
+    FORCES_SUMMED,
+    COST_COLUMNS,
+) = range(4)
+
+# Columns of what an island's observer sees, of every body.
+(
+    START_X,  # where the straight path begins that it is expected to go [m]
+    START_Y,  # [m]
+    PATH_VX,  # [m/s]
+    PATH_VY,  # [m/s]
+    SINCE,  # from when [s]
+    FURTHEST,  # how far it has strayed from it [m]
+    HALT,  # of the first body: 1 where another thread wants the island to stop at once
+    TRACK_COLUMNS,
+) = range(8)
 
 
 class Swarm(NamedTuple):
-    """n bodies at a common time.
+    """n bodies at a common time, and at the window's end."""
 
-    ``bodies`` (n, 10), ``first``, ``vertices`` and ``tree``: as in a Scene.  ``motion`` and
-    ``carried`` (n, 6), ``errors`` (n, 6), ``steps`` (n,): the state, the vector of its error, what
-    the errors of steps and switches have led to, the size of the next step [s].  ``methods`` (n,):
-    1 where the steps of its island went on across switches, as ACROSS in a clock.  ``wander``
-    (n,): how far a body may stray from a straight path in a window [m].  ``first_link`` (n + 1,),
-    ``links`` (k, 5), ``slips`` (k, 5): contacts and what they go by, those of later body b from
-    ``first_link[b]`` on.  ``new_motion`` … ``strayed``: the same at the window's end, the stated
-    error of every body [m], and how far it strayed.
-    ``discs``, ``order``, ``starts``: what the sweep for neighbours works on.  ``times``: see BEGIN.
-    """
-
-    bodies: np.ndarray
+    bodies: np.ndarray  # this and the next three as in a Scene
     first: np.ndarray
     vertices: np.ndarray
     tree: np.ndarray
-    motion: np.ndarray
-    carried: np.ndarray
-    errors: np.ndarray
-    steps: np.ndarray
-    methods: np.ndarray
-    wander: np.ndarray
-    first_link: np.ndarray
-    links: np.ndarray
-    slips: np.ndarray
-    new_motion: np.ndarray
-    new_carried: np.ndarray
-    new_errors: np.ndarray
+    motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
+    carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
+    errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
+    steps: np.ndarray  # (n,): size of the next step [s]
+    methods: np.ndarray  # (n,): 1 where steps of its island went on across switches, as ACROSS
+    wander: np.ndarray  # (n,): how far a body may stray from a straight path in a window [m]
+    first_link: np.ndarray  # (n + 1,): where the contacts of a later body begin
+    links: Annotated[np.ndarray, ("k", LINK_COLUMNS)]
+    slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
+    new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
+    new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
+    new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
     new_steps: np.ndarray
     new_methods: np.ndarray
-    stated: np.ndarray
-    strayed: np.ndarray
-    discs: np.ndarray
-    order: np.ndarray
-    starts: np.ndarray
-    times: np.ndarray
+    stated: np.ndarray  # (n,): the stated error of every body [m]
+    strayed: np.ndarray  # (n,): how far it strayed [m]
+    discs: Annotated[np.ndarray, ("n", DISC_COLUMNS)]  # what the sweep for neighbours works on
+    order: np.ndarray  # (n,): the same
+    starts: np.ndarray  # (n + 1,): the same
+    times: np.ndarray  # see BEGIN
 
 
 def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np.ndarray) -> Swarm:
