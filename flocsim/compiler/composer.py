@@ -102,46 +102,68 @@ class Linker:
         return copy
 
 
-def entry_source(entry, given="{}"):
-    """The text of a module with one function that calls the driver: ``run``, of the same arguments,
-    or of the address of a table in which they lie (by_pointer), ``given`` "argument_{}(address)".
-    """
-    code = entry.__code__
-    names = code.co_varnames[: code.co_argcount]
-    handed = ", ".join(map(given.format, names))
-    taken = ", ".join(names) if given == "{}" else "address"
-    return (
+def run_of(module, entry, **readers):
+    """The function of a module that numba compiles, and keeps: ``run``, which calls the ``driver``
+    of its globals with the same arguments, or with those that ``readers`` find in a table by its
+    address (by_pointer)."""
+    names = entry.__code__.co_varnames[: entry.__code__.co_argcount]
+    taken = "address" if readers else ", ".join(names)
+    handed = ", ".join(f"read_{name}(address)" if readers else name for name in names)
+    source = (
         f'"""Made by flocsim from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
         f"def run({taken}):\n    return driver({handed})\n"
     )
+    known = vars(module) | {f"read_{name}": each for name, each in readers.items()}
+    exec(compile(source, f"<{module.__name__}>", "exec"), known)
+    return known["run"]
 
 
-def linked_module(entry, fillings, name, options):
-    """The module ``name``, whose ``driver`` is the linked entry."""
+def machine_code(entry, fillings, name, signature, options, readers=None, arguments=""):
+    """The entry as a function that numba has compiled for a signature, or loaded from the disk.
+
+    ``name``: of the module in which numba looks for it; ``readers``: see run_of; ``arguments``:
+    what the signature does not tell of these. KernelError where it cannot be compiled.
+    """
     import numba
 
-    from flocsim.compiler.numba_internals import compilers, typed_once
+    from flocsim.compiler.numba_internals import (
+        compiler_error,
+        compilers,
+        forget,
+        kept_on_disk,
+        quick_typing,
+        typed_once,
+    )
 
-    inner = {**options, **UNWRAPPED, **compilers()[0]}
+    for_inner, for_entry = compilers()
+    # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
+    inner = {**options, **UNWRAPPED, **for_inner}
+
+    parts = []
 
     def transform(clone):
         clone.__module__ = name
-        # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
         small = len(clone.__code__.co_code) < INLINED_SIZE and not hasattr(clone, "apart")
-        return typed_once(numba.njit(clone, **inner, forceinline=small))
+        parts.append(typed_once(numba.njit(clone, **inner, forceinline=small)))
+        return parts[-1]
+
+    def link():
+        run.__globals__["driver"] = Linker(fillings, transform).link(entry)
 
     module = types.ModuleType(name)
     sys.modules[name] = module  # where numba looks for it when it loads compiled code
-    module.driver = Linker(fillings, transform).link(entry)
-    return module
-
-
-def run_of(module, entry, **arguments):
-    """The function of a linked module that numba compiles, and keeps."""
-    source = entry_source(entry, "argument_{}(address)" if arguments else "{}")
-    names = vars(module) | {f"argument_{name}": each for name, each in arguments.items()}
-    exec(compile(source, f"<{module.__name__}>", "exec"), names)
-    return names["run"]
+    run = run_of(module, entry, **(readers or {}))
+    dispatcher = kept_on_disk(numba.njit(run, **options, **for_entry), name, link, arguments)
+    try:
+        with quick_typing():
+            dispatcher.typingctx.refresh()  # has to hear of new intrinsics
+            dispatcher.compile(signature)
+    except compiler_error() as error:
+        raise KernelError(compiler_complaint(str(error))) from None
+    finally:
+        run.__globals__.pop("driver", None)
+        forget(parts)
+    return dispatcher
 
 
 def options_of(allocates):
@@ -160,12 +182,13 @@ def options_of(allocates):
 
 class Compiled:
     """An entry compiled as module ``name`` at its first call, from the disk where it is there; once
-    more for arguments of other types."""
+    more for arguments of other types. What it reaches stays as it is now: it is cloned at once, and
+    for the compiler where that has to run."""
 
     def __init__(self, entry, fillings, name, allocates):
-        self.entry, self.allocates = entry, allocates
+        self.name, self.allocates = name, allocates
         self.options = options_of(allocates)
-        self.module = linked_module(entry, fillings, name, self.options)
+        self.entry = Linker(fillings, lambda clone: clone).link(entry)
         self.made = {}
 
     def __call__(self, *arguments):
@@ -176,31 +199,15 @@ class Compiled:
 
     def made_for(self, arguments):
         """The machine code for arguments of such types."""
-        import numba
+        from numba import int64
 
-        from flocsim.compiler.numba_internals import (
-            compiler_error,
-            compilers,
-            kept_on_disk,
-            quick_typing,
-        )
-
-        types = [type_of(each, arrays=self.allocates) for each in arguments]
-        places = itertools.accumulate(map(words_in, types), initial=0)
-        readers = map(argument_at, types, places)
+        kinds = [type_of(each, arrays=self.allocates) for each in arguments]
+        places = itertools.accumulate(map(words_in, kinds), initial=0)
         names = self.entry.__code__.co_varnames
-        run = run_of(self.module, self.entry, **dict(zip(names, readers, strict=False)))
-        name = self.module.__name__
-        dispatcher = kept_on_disk(
-            numba.njit(run, **self.options, **compilers()[1]), name, repr(types)
-        )
-        try:
-            with quick_typing():
-                dispatcher.typingctx.refresh()  # has to hear of new intrinsics
-                dispatcher.compile((numba.int64,))
-        except compiler_error() as error:
-            raise KernelError(compiler_complaint(str(error))) from None
-        return dispatcher
+        readers = dict(zip(names, map(argument_at, kinds, places), strict=False))
+        return machine_code(
+            self.entry, {}, self.name, (int64,), self.options, readers, repr(kinds)
+        )  # fmt: skip
 
 
 def compiler_complaint(text):
@@ -248,37 +255,22 @@ def compile_law(law: Callable, signature: Any) -> int:
     Raises KernelError for what captures variables, reads globals that may change, or cannot be
     compiled. The compiled function lives as long as the process.
     """
-    import numba
-
-    from flocsim.compiler.numba_internals import (
-        address_of,
-        compiler_error,
-        compilers,
-        kept_on_disk,
-        quick_typing,
-    )
+    from flocsim.compiler.numba_internals import address_of
 
     refuse_interpreter(law)
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
-        name = f"flocsim_law_{key[0]}"
-        module = linked_module(law, {}, name, options_of(False))
-        options = {**options_of(False), **UNWRAPPED, **compilers()[1]}
-        dispatcher = kept_on_disk(numba.njit(run_of(module, law), **options), name)
-        try:
-            with quick_typing():
-                dispatcher.compile(signature)
-        except compiler_error() as error:
-            raise KernelError(compiler_complaint(str(error))) from None
+        options = {**options_of(False), **UNWRAPPED}
+        dispatcher = machine_code(law, {}, f"flocsim_law_{key[0]}", signature, options)
         _composed[key] = dispatcher, address_of(dispatcher, signature)
     return _composed[key][1]
 
 
 @functools.cache
 def options_text(allocates):
-    """How functions are compiled, for the hash: options, and the code that calls laws."""
-    from flocsim.compiler import numba_internals
+    """How functions are compiled, for the hash: options, and the code that says how."""
+    from flocsim.compiler import by_pointer, numba_internals
 
-    source = Path(numba_internals.__file__).read_bytes()
+    source = b"".join(Path(each.__file__).read_bytes() for each in (by_pointer, numba_internals))
     digest = hashlib.blake2b(source, digest_size=8).hexdigest()
     return f"{INLINED_SIZE} {allocates} {digest}"

@@ -132,10 +132,13 @@ def type_text(kind: Any) -> str:
     return str(kind)
 
 
-def kept_on_disk(dispatcher: Any, name: str, arguments: str = "") -> Any:
+def kept_on_disk(
+    dispatcher: Any, name: str, link: Callable[[], None] = lambda: None, arguments: str = ""
+) -> Any:
     """The function, loaded from flocsim.compiler.disk_cache where it is there, and put there else.
 
-    ``name`` is one that only functions which do the same have.
+    ``name`` is one that only functions which do the same have; ``link`` is called before it is
+    compiled; ``arguments`` tells what the signature does not.
     """
     import llvmlite
     import numba
@@ -161,6 +164,7 @@ def kept_on_disk(dispatcher: Any, name: str, arguments: str = "") -> Any:
                     return CompileResult._rebuild(target_context, *pickle.loads(data))
             if text := lacking(COMPILING, "compiling"):
                 raise FlocsimError(text)  # LLVM ends the process where it gets no memory
+            link()
             return None
 
         def save_overload(self, sig, data):
@@ -168,6 +172,7 @@ def kept_on_disk(dispatcher: Any, name: str, arguments: str = "") -> Any:
             if not data.library.has_dynamic_globals:
                 key = self.key(sig, data.codegen)
                 disk_cache.write(name, key, dumps(data._reduce()))
+                data.library._shared_module = None  # made to be written
 
     dispatcher._cache = DiskCache()
     return dispatcher
@@ -228,6 +233,7 @@ def libraries():
             self._linking_libraries = list(reached(self, {}))
             self.own = {each.name for each in self._final_module.functions}
             super().finalize()
+            self._linking_libraries = []
 
         def _optimize_final_module(self):
             """Nothing but its own functions is called from outside: LLVM may then do what it likes
@@ -247,6 +253,9 @@ def libraries():
 
 NEEDLESS_PASSES = "InlineClosureLikes", "NopythonRewrites", "InlineOverloads"
 """Passes of numba's that find nothing in functions on scalars that define no others inside."""
+
+ANNOTATIONS = "AnnotateTypes"
+"""The pass that keeps all that numba thought of a function, to be looked at."""
 
 
 def is_plain(state: Any) -> bool:
@@ -301,7 +310,8 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any]]:
                 passes.passes = [
                     (Lowering if each is NativeLowering else each, what)
                     for each, what in passes.passes
-                    if not (each.__name__ in NEEDLESS_PASSES and is_plain(self.state))
+                    if each.__name__ != ANNOTATIONS
+                    and not (each.__name__ in NEEDLESS_PASSES and is_plain(self.state))
                 ]
                 passes.finalize()
                 return [passes]
@@ -325,6 +335,14 @@ def typed_once(dispatcher: Any) -> Any:
 
     dispatcher.get_call_template = without_literals
     return dispatcher
+
+
+def forget(dispatchers: Iterable[Any]) -> None:
+    """Give back what numba keeps of functions that have been linked into another one."""
+    for each in dispatchers:
+        for result in each.overloads.values():
+            each.targetctx.remove_user_function(result.entry_point)
+        each.overloads.clear()
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ import math
 import sys
 from collections.abc import Sequence
 from functools import cache, cached_property, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -94,10 +93,14 @@ def grow_floc(shapes, seed, index):
 @cache
 def growth_facts() -> str:
     """What a grown and fitted floc follows from beside its numbers: code, versions, processor."""
+    import numba
+    import scipy
+    import shapely
+
     found = hashlib.blake2b(digest_size=16)
     for path in sorted(GEOMETRY.rglob("*.py")):
         found.update(path.read_bytes())
-    libraries = [version(name) for name in ("numpy", "scipy", "numba", "shapely", "scikit-image")]
+    libraries = [each.__version__ for each in (np, scipy, numba, shapely)]
     return f"{found.hexdigest()} {sys.version} {libraries} {cpu_kind()}"
 
 
