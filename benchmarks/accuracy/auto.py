@@ -102,7 +102,7 @@ def make_ready(study):
     for kind in study.kinds:
         study.run(*kind, study.config.scene.delta[0], 0)
     for task in (task for tasks in sample_of(study.config) for task in tasks):
-        study.drawn(task.condition, task.vertices, task.replicate)
+        study.draw(*task)
 
 
 def judge(name, text, arguments, table):
@@ -153,8 +153,8 @@ def rates(arguments):
     study.compile(study.kinds)
     places, count = study.places, min(arguments.sample, config.replicates)
     for replicate in range(count):
-        for condition, vertices, _ in places:
-            study.drawn(condition, vertices, replicate)
+        for place in places:
+            study.draw(*place, replicate)
     began = time.process_time()
     for replicate in range(count):
         for place in places:

@@ -15,7 +15,6 @@ import numpy as np
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.arrays import EVALUATIONS
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.ladder import WEIGHTS
 from flocsim.ensembles.study import Study
@@ -35,13 +34,9 @@ def study():
 
 def spent(made, method, place, replicate):
     """(CPU time [s], evaluations) of a replicate."""
-    condition, vertices, share = place
-    numbers = draws(made.config.seed, replicate)
-    encounter = made.encounter(condition, vertices, numbers)
-    run = encounter.begin(
-        made.driver(encounter, method), orientations(numbers), share,
-        made.config.integrator.max_steps, integrator=method,
-    )  # fmt: skip
+    draw = made.draw(*place, replicate)
+    driver = made.driver(draw.encounter, method)
+    run = draw.begin(driver, made.config.integrator.max_steps, integrator=method)
     began = time.process_time()
     run.to_end()
     return time.process_time() - began, int(run.work.tally[EVALUATIONS])

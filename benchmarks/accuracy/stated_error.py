@@ -22,8 +22,6 @@ import numpy as np
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim import Body, Swarm, System, wall
 from flocsim.constants import STANDARD_GRAVITY
-from flocsim.ensembles.collision.encounter import replicate_system
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import PlausibilityWarning
@@ -71,10 +69,7 @@ def replicate(rng, number, preset, outcomes, longer=1.0, **contact):
     row = found.run(*place, number)
     if row["outcome"] not in outcomes:
         return None
-    numbers = draws(found.config.seed, number)
-    encounter = found.encounter(*place[:2], numbers)
-    system = replicate_system(encounter, orientations(numbers), place[2])
-    return system, longer * row["t_end"]
+    return found.draw(*place, number).system(), longer * row["t_end"]
 
 
 def departing(rng, number):

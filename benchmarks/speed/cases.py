@@ -6,6 +6,7 @@ import time
 import attrs
 import numpy as np
 
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter
 from flocsim.ensembles.collision.failures import outcome_of
 from flocsim.ensembles.collision.start import draws, orientations
@@ -60,11 +61,11 @@ def make_cases(study, condition, count):
 
 
 def run_case(case, encounter, driver, limits):
-    """(outcome, end [s]) of a replicate, as run_encounter does it, but within a CPU time.
+    """(outcome, end [s]) of a replicate, as Draw.run does it, but within a CPU time.
 
     ``limits``: most simulated time [s] and most CPU time [s]; beyond them it is undecided.
     """
-    run = encounter.begin(driver, case.angles, case.share, 10**12, limits[0])
+    run = Draw(encounter, case.angles, case.share).begin(driver, 10**12, limits[0])
     began = time.process_time()
     while (status := run.advance(CHUNK)) == Status.PAUSED:
         if time.process_time() - began > limits[1]:

@@ -14,7 +14,6 @@ from statistics import mean
 from typing import NamedTuple
 
 from flocsim.ensembles.collision.checking import count_checks
-from flocsim.ensembles.collision.encounter import run_encounter
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels.study import study_of
 
@@ -78,17 +77,16 @@ def measured(study, vertices, replicates):
     for place in places:
         for k in range(replicates // len(places)):
             known, began = len(study.encounters), time.process_time()
-            encounter, angles = study.drawn(place, vertices, k)
-            share = study.share_of(encounter, 1.0, k)
-            _ = encounter.scene, encounter.observed()
+            draw = study.draw(place, vertices, 1.0, k)
+            _ = draw.encounter.scene, draw.encounter.observed()
             if len(study.encounters) > known:
                 pair.append(time.process_time() - began)
-            driver, began = study.driver(encounter), time.process_time()
-            row = run_encounter(encounter, driver, angles, share, steps)
+            driver, began = study.driver(draw.encounter), time.process_time()
+            row = draw.run(driver, steps)
             first.append(time.process_time() - began)
             if k % EVERY == 0:
                 began = time.process_time()
-                again = study.run_again(encounter, angles, share, exact, None)
+                again = study.run_again(draw, exact)
                 second.append(time.process_time() - began)
                 flips += again["checked_outcome"] != row["outcome"]
     share = count_checks(config.seed, POINTS, "auto") / POINTS

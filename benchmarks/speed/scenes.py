@@ -11,8 +11,6 @@ import attrs
 import numpy as np
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
-from flocsim.ensembles.collision.encounter import replicate_system
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
@@ -100,9 +98,7 @@ def collision(kind, preset, vertices=64, replicate=0, share=0.5, start_gap=2e-7)
     """
     study = collision_study(preset, vertices, start_gap)
     condition = study.config.scene.names.index(kind)
-    numbers = draws(study.config.seed, replicate)
-    encounter = study.encounter(condition, vertices, numbers)
-    return replicate_system(encounter, orientations(numbers), share)
+    return study.draw(condition, vertices, share, replicate).system()
 
 
 def rolling(kind, preset, until):

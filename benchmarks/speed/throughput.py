@@ -14,8 +14,6 @@ import numpy as np
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from benchmarks.speed.evaluations import costs
 from benchmarks.speed.scenes import collisions
-from flocsim.ensembles.collision.encounter import run_encounter
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.ensembles.study import Study
 from flocsim.io.results.schema import OUTCOMES
 
@@ -42,12 +40,11 @@ def blank_runs(shape):
 def run_replicate(study, condition, vertices, share, replicate):
     """(row, CPU time of the run, CPU time of making its encounter)."""
     began = time.process_time()
-    numbers = draws(study.config.seed, replicate)
-    encounter = study.encounter(condition, vertices, numbers)
-    driver = study.driver(encounter)
+    draw = study.draw(condition, vertices, share, replicate)
+    driver = study.driver(draw.encounter)
     made = time.process_time()
     budget = study.config.integrator.max_steps
-    row = run_encounter(encounter, driver, orientations(numbers), share, budget)
+    row = draw.run(driver, budget)
     return row, time.process_time() - made, made - began
 
 

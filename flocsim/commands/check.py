@@ -17,7 +17,7 @@ import numpy as np
 
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision.checking import TIGHTER, exact_method
-from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILURES, replicate_row
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.loader import load_config
@@ -251,7 +251,7 @@ class Checker:
         """Run a Case and its reference at a tolerance [m], to the time at which both are there."""
         try:
             scene = Scene.of(self.study(case.stiffness), case)
-            kind = case.stiffness, scene.encounter.system.family, type(case.method)
+            kind = case.stiffness, scene.draw.encounter.system.family, type(case.method)
             if kind not in self.warm:  # compiled, or loaded, before it is timed
                 scene.run(case.method)
                 self.warm.add(kind)
@@ -271,34 +271,31 @@ class Scene:
 
     study: Study
     case: Case
-    encounter: Encounter
-    angles: tuple[float, float]
-    share: float
+    draw: Draw
 
     @classmethod
     def of(cls, study: Study, case: Case) -> "Scene":
-        drawn = study.drawn(case.condition, case.vertices, case.replicate)
-        share = study.share_of(drawn[0], case.delta, case.replicate)
-        return cls(study, case, *drawn, share)
+        draw = study.draw(case.condition, case.vertices, case.delta, case.replicate)
+        return cls(study, case, draw)
 
     def run(
         self, method: Integrator, more: int = 1, until: float = math.inf,
         moved: Callable[[Run], None] | None = None,
     ) -> tuple[Run, dict]:  # fmt: skip
         """(Run that has ended, its row); ``moved`` may change the start."""
-        made = self.encounter.begin(
-            self.study.driver(self.encounter, method), self.angles, self.share,
+        made = self.draw.begin(
+            self.study.driver(self.draw.encounter, method),
             more * self.study.config.integrator.max_steps, until, integrator=method,
         )  # fmt: skip
         if moved is not None:
             moved(made)
-        return made, replicate_row(made.to_end(), self.angles, made)
+        return made, replicate_row(made.to_end(), self.draw.angles, made)
 
 
 def judged(scene: Scene, exact: Integrator) -> Verdict:
     """The Verdict on a Scene's Case, against a run by the method ``exact``."""
     case = scene.case
-    _ = scene.encounter.scene
+    _ = scene.draw.encounter.scene
     began = time.process_time()
     found, row = scene.run(case.method)
     spent = time.process_time() - began
@@ -315,7 +312,7 @@ def judged(scene: Scene, exact: Integrator) -> Verdict:
         found, _ = scene.run(case.method, until=at)
     elif reference.time > at:
         reference, _ = scene.run(exact, MORE_STEPS, until=at)
-    error = end_distance(scene.encounter.system.bodies, place_of(found), place_of(reference))
+    error = end_distance(scene.draw.encounter.system.bodies, place_of(found), place_of(reference))
     stated = found.error if math.isfinite(case.method.tolerance) else math.nan
     if (row["outcome"], row["inside"]) != (other["outcome"], other["inside"]):
         most = max(allowed(scene), stated) + reference.error
@@ -352,7 +349,7 @@ def allowed(scene: Scene) -> float:
     none."""
     if math.isfinite(scene.case.method.tolerance):
         return scene.case.method.tolerance
-    return CLOSE * min(shape.equivalent_radius for shape in scene.encounter.shapes)
+    return CLOSE * min(shape.equivalent_radius for shape in scene.draw.encounter.shapes)
 
 
 def ending(row):
@@ -378,7 +375,7 @@ def remark(scene: Scene, reference: Run, exact: Integrator) -> str:
 def amplification(scene: Scene, reference: Run, exact: Integrator) -> float:
     """The distance of a nudged companion from the reference, over the nudge, where the first of
     both is decided."""
-    bodies = scene.encounter.system.bodies
+    bodies = scene.draw.encounter.system.bodies
     nudge = nudge_of(bodies)
     still = [attrs.evolve(body, position=(0.0, 0.0)) for body in bodies]
     shift = np.array([body.position for body in nudged(still, nudge)])

@@ -4,10 +4,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.draw import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.forces_between import forces_between
-from flocsim.ensembles.collision.snapshots import frames_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
@@ -19,6 +18,7 @@ from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, w
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.trajectory import centre_distance, write_trajectory
+from flocsim.trajectories.frames import frames_of
 
 ANIMATION_FRAMES = 60
 

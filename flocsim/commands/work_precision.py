@@ -11,7 +11,6 @@ import attrs
 
 from flocsim.commands.precision import ladder
 from flocsim.commands.trajectory import add_replicate, select
-from flocsim.ensembles.collision.encounter import replicate_system
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.studies.replicates import one_count_study
@@ -86,9 +85,7 @@ def replicate(config, place, number):
     """(System where the replicate starts, how long [s] until it is decided, its row)."""
     study = one_count_study(config, place[1])
     found = study.run(*place, number)
-    encounter, angles = study.drawn(*place[:2], number)
-    system = replicate_system(encounter, angles, study.share_of(encounter, place[2], number))
-    return system, float(found["t_end"]), found
+    return study.draw(*place, number).system(), float(found["t_end"]), found
 
 
 def run(args: Namespace) -> int:

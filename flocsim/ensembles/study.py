@@ -9,12 +9,8 @@ import numpy as np
 
 from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
-from flocsim.ensembles.collision.encounter import (
-    Encounter,
-    Record,
-    make_encounter,
-    run_encounter,
-)
+from flocsim.ensembles.collision.draw import Draw, Record
+from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
@@ -115,12 +111,11 @@ class Study:
         """{name: value} of what rows follow from besides the config."""
         return {}
 
-    def share_of(self, encounter: Encounter, share: float, replicate: int) -> float:
-        """The displacement of a replicate over δ_max in a condition of this ``share``; in a
-        brownian meeting the direction of j, over a full turn."""
-        if encounter.meeting == BROWNIAN:
-            return float(self.numbers(replicate)[4])
-        return share
+    def share_of(
+        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
+    ) -> float:
+        """The share of a Draw with these random numbers in a condition of this ``share``."""
+        return float(numbers[4]) if encounter.meeting == BROWNIAN else share
 
     def choose_flocs(
         self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
@@ -155,18 +150,15 @@ class Study:
         radii = (shape.equivalent_radius for shape in shapes)
         return zone_distance(self.config.zone, self.config.forces, *radii)
 
-    def drawn(
-        self, condition: int, vertices: int, replicate: int
-    ) -> tuple[Encounter, tuple[float, float]]:
-        """The Encounter and the two angles [rad] that a replicate's random numbers give."""
-        return self.met(condition, vertices, replicate, self.numbers(replicate))
-
-    def met(
-        self, condition: int, vertices: int, replicate: int, numbers: Sequence[float] | np.ndarray
-    ) -> tuple[Encounter, tuple[float, float]]:
-        """The same of numbers that are drawn already."""
+    def draw(self, condition: int, vertices: int, share: float, replicate: int) -> Draw:
+        """The Draw of a replicate: condition's place, N, share of δ_max, index."""
+        numbers = self.numbers(replicate)
         encounter = self.encounter(condition, vertices, numbers)
-        return encounter.keyed(self.config.seed, replicate), encounter.orientations(numbers)
+        return Draw(
+            encounter.keyed(self.config.seed, replicate), encounter.orientations(numbers),
+            self.share_of(encounter, share, numbers),
+            self.choose_flocs(condition, vertices, numbers),
+        )  # fmt: skip
 
     def driver(self, encounter: Encounter, method: Integrator | None = None) -> Callable:
         """The compiled driver of an encounter: one for spheres, one for polygons, of a method.
@@ -197,42 +189,35 @@ class Study:
         self, condition: int, vertices: int, share: float, replicate: int,
         record: Record | None = None, halted: Callable[[], bool] | None = None,
     ) -> dict | None:  # fmt: skip
-        """Run one replicate: condition's place, N, share of δ_max, index. The row as a dict.
+        """Run one replicate, as in `draw`. The row as a dict.
 
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
-        numbers = self.numbers(replicate)
-        encounter, angles = self.met(condition, vertices, replicate, numbers)
-        driver = self.driver(encounter)
-        share = self.share_of(encounter, share, replicate)
-        max_steps = self.config.integrator.max_steps
-        row = run_encounter(encounter, driver, angles, share, max_steps, record, halted)
+        draw = self.draw(condition, vertices, share, replicate)
+        driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
+        row = draw.run(driver, max_steps, record, halted)
         if row is None:
             return None
-        floc_i, floc_j = self.choose_flocs(condition, vertices, numbers)
-        row |= {"floc_i": floc_i, "floc_j": floc_j}
+        row |= dict(zip(("floc_i", "floc_j"), draw.flocs, strict=True))
         row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
         exact = self.exact[self.pairings[condition].name]
         checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
         if record is not None or exact is None or not checked:
             return row
-        found = self.run_again(encounter, angles, share, exact, halted)
+        found = self.run_again(draw, exact, halted)
         return None if found is None else row | found
 
     def run_again(
-        self, encounter: Encounter, angles: Sequence[float], share: float, exact: Integrator,
-        halted: Callable[[], bool] | None,
-    ) -> dict | None:  # fmt: skip
+        self, draw: Draw, exact: Integrator, halted: Callable[[], bool] | None = None
+    ) -> dict | None:
         """What a replicate's row holds of its second, more exact run; None where it was given up.
 
         An exception costs no more than this: the second run has failed, the first is as it was.
         """
         steps = MORE_STEPS * self.config.integrator.max_steps
-        driver = self.driver(encounter)
+        driver = self.driver(draw.encounter)
         try:
-            row = run_encounter(
-                encounter, driver, angles, share, steps, halted=halted, integrator=exact
-            )
+            row = draw.run(driver, steps, halted=halted, integrator=exact)
         except MemoryError:
             raise
         except Exception:

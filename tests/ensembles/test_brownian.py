@@ -137,7 +137,7 @@ def test_an_extension_and_settling_go_with_thermal_motion(tmp_path):
 def test_a_replicate_has_a_direction_of_its_own(tmp_path):
     study = Study(config_of(tmp_path))
     encounter = study.encounter(0, 1, study.numbers(0))
-    shares = [study.share_of(encounter, 0.0, k) for k in range(200)]
+    shares = [study.share_of(encounter, 0.0, study.numbers(k)) for k in range(200)]
     assert shares == [study.numbers(k)[4] for k in range(200)]
     low, high = wilson(sum(share < 0.5 for share in shares), 200, 0.999)
     assert low < 0.5 < high

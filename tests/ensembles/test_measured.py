@@ -148,7 +148,7 @@ def test_the_identity_knows_how_flocs_are_drawn(folder):
 
 def test_the_sphere_of_a_floc_has_its_size(folder):
     study = Study(load_text(folder, STUDY, SPHERES))
-    encounter, _ = study.drawn(0, 1, 0)
+    encounter = study.draw(0, 1, 0.0, 0).encounter
     assert all(isinstance(shape, Sphere) for shape in encounter.shapes)
     assert encounter.shapes[1].radius in [floc.size for floc in study.flocs]
 

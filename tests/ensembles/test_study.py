@@ -150,7 +150,7 @@ def test_flocs_with_holes_and_without_have_engines_of_their_own(tmp_path):
     study = Study(load_text(tmp_path, text))
     families, engines = set(), {}
     for replicate in range(12):
-        encounter, _ = study.drawn(0, 8, replicate)
+        encounter = study.draw(0, 8, 0.0, replicate).encounter
         holes = any(shape.is_compound for shape in encounter.shapes)
         family = encounter.system.family
         assert family == ("compounds" if holes else "polygons")

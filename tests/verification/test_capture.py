@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.collision.encounter import run_encounter
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.start import place_pair
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels.sampling import points_of, settling_interval
@@ -77,7 +77,7 @@ def capture_offset(folder, meeting, ratio, d_min):
     driver = study.driver(encounter)
 
     def is_caught(offset):
-        row = run_encounter(encounter, driver, (0.0, 0.0), offset, 200_000)
+        row = Draw(encounter, (0.0, 0.0), offset).run(driver, 200_000)
         assert OUTCOMES[row["outcome"]] in ("A", "C", "missed")
         return OUTCOMES[row["outcome"]] != "missed"
 

@@ -95,20 +95,16 @@ def part_of(config: Config, args: Namespace) -> Config:
 def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
     """(Trial whose cost is CPU time [µs], times, d_c and its rate) of a replicate; None for no
     motion."""
-    condition, vertices, share, replicate = job.task
-    encounter, angles = study.drawn(condition, vertices, replicate)
-    driver = study.driver(encounter, job.integrator)
-    share = study.share_of(encounter, share, replicate)
-    run = encounter.begin(
-        driver, angles, share, job.max_steps, record=True, integrator=job.integrator
-    )
+    draw = study.draw(*job.task)
+    driver = study.driver(draw.encounter, job.integrator)
+    run = draw.begin(driver, job.max_steps, record=True, integrator=job.integrator)
     began = time.process_time()
     try:
         status = run.to_end()
     except Exception:  # of a force of the user's own
         return Trial(FAILED, NOT_APPLICABLE, 0.0, 0.0), None
     cost = 1e6 * (time.process_time() - began)
-    row = replicate_row(status, angles, run)
+    row = replicate_row(status, draw.angles, run)
     times, position, velocity = run.motion()
     apart, speed = (each[:, 1, :2] - each[:, 0, :2] for each in (position, velocity))
     distance = np.hypot(*apart.T)

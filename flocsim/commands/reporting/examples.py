@@ -38,7 +38,7 @@ def example_of(opened: StudyResults, outcome: str, at: tuple[int, int, int, int]
         place = place_of(opened.config, name, vertices, delta)
         study = opened.study_with(vertices)
         trajectory = replicate_of(replicate, place, study)
-        zone = study.drawn(*place[:2], replicate)[0].zone_distance
+        zone = study.draw(*place, replicate).encounter.zone_distance
     except FlocsimError as error:
         return Example(outcome, title, reason=" ".join(str(error).split()))
     return Example(outcome, title, trajectory, float(zone))

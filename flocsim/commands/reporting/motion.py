@@ -11,7 +11,6 @@ import numpy as np
 
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import text
-from flocsim.ensembles.collision.snapshots import choose_instants
 from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
@@ -20,7 +19,7 @@ from flocsim.io.plots.collision import (
     time_unit,
 )
 from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS
-from flocsim.trajectories.frames import seen_from_first
+from flocsim.trajectories.frames import choose_instants, seen_from_first
 
 FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)

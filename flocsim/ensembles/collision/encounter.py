@@ -1,4 +1,4 @@
-"""The binary collision scene: one replicate from its random numbers to its outcome."""
+"""The binary collision scene: two shapes that meet, and where a replicate of them starts."""
 
 import copy
 import functools
@@ -9,13 +9,12 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import NOW, Scene, Work, work_of
+from flocsim.arrays import Scene, Work, work_of
 from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, WHY, replicate_row
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
 from flocsim.ensembles.collision.thermal import kicked
 from flocsim.ensembles.collision.thermal.cage import caged_between
@@ -24,7 +23,7 @@ from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, S
 from flocsim.errors import UsageError
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.integrators.base import Integrator, Status
+from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.plausibility.settling import (
     largest_mobility,
@@ -32,9 +31,7 @@ from flocsim.plausibility.settling import (
     terminal_motion,
     turn_time,
 )
-from flocsim.run import Run
 from flocsim.system import System
-from flocsim.trajectories.blame import UNABLE, force_to_blame
 
 OBSERVER: dict[Callable, Callable] = {
     hooks.awaits_touch: outcomes.has_not_touched,
@@ -311,20 +308,6 @@ class Encounter:
         velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
         return work_of(self.scene, place, velocity)
 
-    def begin(
-        self, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
-        until: float = math.inf, record: bool = False, integrator: Integrator | None = None,
-    ) -> Run:  # fmt: skip
-        """A Run of a replicate that has yet to take its first step, to a time [s] at most.
-
-        ``integrator``: the same method with another tolerance or step, where there is one.
-        """
-        return Run(
-            driver, self.scene, self.start(angles, share), integrator or self.system.integrator,
-            min(self.time_limit(share), until), max_steps=max_steps, observed=self.observed(),
-            record=record,
-        )  # fmt: skip
-
 
 def make_encounter(
     config: Config, shapes: Sequence[Shape], zone: float, integrator: Integrator | None = None,
@@ -343,53 +326,3 @@ def make_encounter(
     forces, fluid = meetings.circumstances(config.forces, config.fluid, meeting, config.scene.rate)
     system = System(bodies, forces, method, fluid=fluid)
     return Encounter(system, config.scene, zone, meeting)
-
-
-def replicate_system(
-    encounter: Encounter, angles: Sequence[float], share: float,
-    integrator: Integrator | None = None,
-) -> System:  # fmt: skip
-    """The plain System where a replicate starts, with another integrator if given."""
-    system, bodies = encounter.system, []
-    starts = encounter.start(angles, share).motion[NOW].tolist()
-    for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
-        place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
-        bodies.append(attrs.evolve(body, **place))
-    return attrs.evolve(system, bodies=bodies, integrator=integrator or system.integrator)
-
-
-class Record:
-    """Asks run_encounter to keep every step of a replicate."""
-
-    run: Run | None = None
-    status: Status | None = None
-
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
-        assert self.run is not None, "nothing has been run"
-        return self.run.motion()
-
-
-def run_encounter(
-    encounter: Encounter, driver: Callable, angles: Sequence[float], share: float, max_steps: int,
-    record: Record | None = None, halted: Callable[[], bool] | None = None,
-    integrator: Integrator | None = None,
-) -> dict | None:  # fmt: skip
-    """Run one replicate; the row of the table of replicates as a dict.
-
-    ``driver`` is the compiled driver of the encounter's scene; ``record``, optional, is a Record to
-    receive the motion. ``halted()``, optional, is asked every some thousand steps whether to give
-    up; the row is None then. ``integrator``, optional: see Encounter.begin.
-    """
-    run = encounter.begin(
-        driver, angles, share, max_steps, record=record is not None, integrator=integrator
-    )
-    status = run.to_end(halted)
-    if status == Status.PAUSED:
-        return None
-    if record is not None:
-        record.run, record.status = run, status
-    row = replicate_row(status, angles, run)
-    if status in UNABLE and (why := force_to_blame(encounter.system, run)):
-        row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
-    return row

@@ -51,11 +51,12 @@ class KernelStudy(Study):
         first = points_of(self.config.seed, self.scene.scrambles, 0, SAMPLE * self.scene.scrambles)
         return {"scene.points": [float(each) for each in first.sum(axis=0)]}
 
-    def share_of(self, encounter: Encounter, share: float, replicate: int) -> float:
+    def share_of(
+        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
+    ) -> float:
         """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
-        numbers = self.numbers(replicate)
         angles = np.array(encounter.orientations(numbers))[:, None]
-        offsets = offsets_of(encounter, angles[0], angles[1], numbers[4:])
+        offsets = offsets_of(encounter, angles[0], angles[1], np.array(numbers[4:]))
         return float(offsets[0]) / encounter.outer
 
 

@@ -16,7 +16,6 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.checking import count_checks
-from flocsim.ensembles.collision.encounter import Encounter, run_encounter
 from flocsim.ensembles.collision.failures import FAILED
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
@@ -109,14 +108,6 @@ def in_turn(config: Config, size: int = MOST) -> list[Task]:
     return [task for tasks in zip(*lists, strict=True) for task in tasks]
 
 
-def prepared(study: Study, task: Task) -> tuple[Encounter, Callable, tuple[float, float]]:
-    """(Encounter, driver, angles) of a replicate, ready to run."""
-    encounter, angles = study.drawn(task.condition, task.vertices, task.replicate)
-    driver = study.driver(encounter)
-    _ = encounter.scene  # made here, where it is timed
-    return encounter, driver, angles
-
-
 def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
     known, clock = len(study.encounters), time.process_time
@@ -124,19 +115,20 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
     flipped = False
     began = clock()
     try:
-        encounter, driver, angles = prepared(study, task)
+        draw = study.draw(*task)
+        driver = study.driver(draw.encounter)
+        _ = draw.encounter.scene  # made here, where it is timed
         if len(study.encounters) > known:
             setup = clock() - began
             began = clock()
         steps = study.config.integrator.max_steps
-        share = study.share_of(encounter, task.delta, task.replicate)
-        row = run_encounter(encounter, driver, angles, share, steps) or {}
+        row = draw.run(driver, steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])
         first = clock() - began
         exact = study.exact[study.config.scene.names[task.condition]]
         if again and exact is not None:
             began = clock()
-            found = study.run_again(encounter, angles, share, exact, None) or {}
+            found = study.run_again(draw, exact) or {}
             second = clock() - began
             flipped = (found["checked_outcome"], found["checked_inside"]) != (outcome, inside)
     except MemoryError:

@@ -83,15 +83,11 @@ def trial(study: Study, job: Job) -> Trial:
 
     An exception costs no more than this replicate, which has failed then.
     """
-    condition, vertices, share, replicate = job.task
     try:
-        encounter, angles = study.drawn(condition, vertices, replicate)
-        driver = study.driver(encounter, job.integrator)
-        share = study.share_of(encounter, share, replicate)
-        run = encounter.begin(
-            driver, angles, share, job.max_steps, integrator=job.integrator
-        )  # fmt: skip
-        row = replicate_row(run.to_end(), angles, run)
+        draw = study.draw(*job.task)
+        driver = study.driver(draw.encounter, job.integrator)
+        run = draw.begin(driver, job.max_steps, integrator=job.integrator)
+        row = replicate_row(run.to_end(), draw.angles, run)
     except MemoryError:
         raise
     except Exception:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import attrs
 
-from flocsim.ensembles.collision.encounter import Encounter, run_encounter
+from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.failures import FAILED
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
@@ -143,14 +143,19 @@ def tried_without(
         go_on()
         if count >= LEAST and (whole > seconds or changed >= ENOUGH):
             break
-        task = run.task
-        encounter, angles = study.drawn(task.condition, task.vertices, task.replicate)
-        if id(encounter) not in made:
+        draw = study.draw(*run.task)
+        encounter = draw.encounter
+        fresh = id(encounter) not in made
+        if fresh:
             bare = attrs.evolve(encounter, system=part.left_out(encounter.system))
             made[id(encounter)] = bare, encounter
-            compiled(study, bare, angles, drivers, run)
+        draw = attrs.evolve(draw, encounter=made[id(encounter)][0])
+        if fresh and (kind := draw.encounter.system.family) not in drivers:
+            # Compiled before it is timed.
+            drivers[kind] = study.driver(draw.encounter, draw.encounter.system.integrator)
+            one_without(study, draw, drivers)
         began = time.process_time()
-        taken, outcome, inside = one_without(study, made[id(encounter)][0], angles, drivers, run)
+        taken, outcome, inside = one_without(study, draw, drivers)
         count += 1
         changed += (outcome, inside) != (run.outcome, run.inside)
         spent, before = spent + taken, before + run.first
@@ -158,23 +163,13 @@ def tried_without(
     return Finding(part.name, changed, count, spent / max(before, 1e-12))
 
 
-def compiled(study, encounter, angles, drivers, run):
-    """Compile the driver of a scene where there is none yet: no part of what is timed."""
-    kind = encounter.system.family
-    if kind not in drivers:
-        drivers[kind] = study.driver(encounter, encounter.system.integrator)
-        one_without(study, encounter, angles, drivers, run)
-
-
-def one_without(study, encounter, angles, drivers, run):
+def one_without(study, draw, drivers):
     """(CPU time [s], outcome, inside) of a replicate in a scene without a part."""
     steps = study.config.integrator.max_steps
-    _ = encounter.scene
+    _ = draw.encounter.scene
     began = time.process_time()
     try:
-        driver = drivers[encounter.system.family]
-        share = study.share_of(encounter, run.task.delta, run.task.replicate)
-        row = run_encounter(encounter, driver, angles, share, steps) or {}
+        row = draw.run(drivers[draw.encounter.system.family], steps) or {}
         outcome, inside = int(row["outcome"]), int(row["inside"])
     except MemoryError:
         raise

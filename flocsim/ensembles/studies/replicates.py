@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 from flocsim.arrays import UNTIL
-from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.draw import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels.study import study_of
@@ -72,13 +72,12 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     began, record = time.perf_counter(), Record()
     row = study.run(*place, int(replicate), record)
     assert row is not None and record.run is not None and record.status is not None
-    encounter, angles = study.drawn(*place[:2], int(replicate))
-    driver, max_steps = study.driver(encounter), study.config.integrator.max_steps
-    share = study.share_of(encounter, place[2], int(replicate))
-    system, run = encounter.system, record.run
+    draw = study.draw(*place, int(replicate))
+    driver, max_steps = study.driver(draw.encounter), study.config.integrator.max_steps
+    system, run = draw.encounter.system, record.run
 
     def fresh() -> Run:
-        return encounter.begin(driver, angles, share, max_steps)
+        return draw.begin(driver, max_steps)
 
     legs = ((run.steps, float(run.clock[UNTIL])),)
     origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)

@@ -4,7 +4,6 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles import study as study_module
 from flocsim.ensembles.collision.checking import (
     checks_wanted,
     count_checks,
@@ -12,6 +11,7 @@ from flocsim.ensembles.collision.checking import (
     expected_checks,
     is_checked,
 )
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILED, run_safely
 from flocsim.ensembles.dry_run import checked_words
 from flocsim.ensembles.preflight import check_study
@@ -113,14 +113,14 @@ def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(
 
 def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
     study = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 1.0}})
-    whole, plain_run = study.run(*study.places[0], 0), study_module.run_encounter
+    whole, plain_run = study.run(*study.places[0], 0), Draw.run
 
     def broken(*args, integrator=None, **options):
         if integrator is not None:
             raise ValueError("no second run")
         return plain_run(*args, **options)
 
-    monkeypatch.setattr(study_module, "run_encounter", broken)
+    monkeypatch.setattr(Draw, "run", broken)
     row, note = run_safely(study, study.places[0], 0)
     assert note is None
     assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]

@@ -9,6 +9,7 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.departure import CLEARANCE, can_meet_again, left_over, turn_left
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.encounter import make_encounter
 from flocsim.ensembles.collision.outcomes import DEPARTED, MISSED, outline_gap, watch_pair
 from flocsim.ensembles.collision.start import draws, orientations
@@ -175,7 +176,7 @@ def test_a_pause_between_steps_changes_nothing(studies):
         row = study.run(0, 16, 1.02, replicate)
         drawn = draws(study.config.seed, replicate)
         encounter = study.encounter(0, 16, drawn)
-        run = encounter.begin(study.driver(encounter), orientations(drawn), 1.02, 10**6)
+        run = Draw(encounter, orientations(drawn), 1.02).begin(study.driver(encounter), 10**6)
         status = Status.PAUSED
         while status is Status.PAUSED:
             status = run.advance(1)

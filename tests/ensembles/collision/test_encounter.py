@@ -7,7 +7,8 @@ import pytest
 
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, Record, run_encounter
+from flocsim.ensembles.collision.draw import Draw, Record
+from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.rounding import to_rounding
@@ -128,7 +129,7 @@ def test_the_run_starts_anew_from_the_encounter_every_time(study):
     numbers = draws(1, 0)
     encounter = study.encounter(0, 16, numbers)
     rows = [
-        run_encounter(encounter, study.driver(encounter), orientations(numbers), 0.0, 10**5)
+        Draw(encounter, orientations(numbers), 0.0).run(study.driver(encounter), 10**5)
         for _ in range(2)
     ]
     assert same_row(*rows)

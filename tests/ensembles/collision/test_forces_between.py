@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.encounter import Record
+from flocsim.ensembles.collision.draw import Record
 from flocsim.ensembles.collision.forces_between import OUTLINES, SETTLING, forces_between
 from flocsim.ensembles.collision.start import draws
 from tests.helpers.small_study import small_study

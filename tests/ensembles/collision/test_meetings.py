@@ -8,7 +8,7 @@ import pytest
 
 from flocsim.body import Body, Fluid
 from flocsim.ensembles.collision import meetings
-from flocsim.ensembles.collision.encounter import run_encounter
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -150,7 +150,7 @@ def test_spheres_without_forces_touch_where_their_ways_meet(tmp_path, meeting):
     encounter = study.encounter(place, 1, np.zeros(5))
     driver = study.driver(encounter)
     for share, touches in ((0.9, True), (-0.99, True), (1.01, False), (-1.2, False)):
-        row = run_encounter(encounter, driver, (0.0, 0.0), share, 100_000)
+        row = Draw(encounter, (0.0, 0.0), share).run(driver, 100_000)
         assert OUTCOMES[row["outcome"]] in ("ABCD" if touches else ("missed",)), share
 
 

@@ -12,7 +12,8 @@ from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
 from flocsim.bonds.bond import NO_BOND, REST
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes, resting
-from flocsim.ensembles.collision.encounter import Encounter, make_encounter, run_encounter
+from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.encounter import make_encounter
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, outline_gap, watch_pair
 from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
@@ -114,7 +115,7 @@ def mirrored(shape):
 
 
 class Placed:
-    """An encounter that starts at given places, for `run_encounter`."""
+    """An encounter that starts at given places, for a Draw."""
 
     def __init__(self, encounter, places):
         """The places (2, 3) [m, m, rad] to start at."""
@@ -122,8 +123,6 @@ class Placed:
 
     def __getattr__(self, name):
         return getattr(self.encounter, name)
-
-    begin = Encounter.begin
 
     def start(self, angles, share):
         """Work arrays at the places, at terminal velocity."""
@@ -156,7 +155,7 @@ def test_the_same_scene_seen_otherwise_has_the_same_outcome(study, condition, im
             places = places * [-1.0, 1.0, -1.0]
         else:
             places = places + [0.0, 0.0, 2.0 * np.pi]
-        other = run_encounter(Placed(encounter, places), driver, angles, 0.5, 10**6)
+        other = Draw(Placed(encounter, places), angles, 0.5).run(driver, 10**6)
         assert outcome(other) == outcome(row)
         assert other["inside"] == row["inside"]
         assert other["d_c_collision"] == pytest.approx(row["d_c_collision"], abs=1e-10, nan_ok=True)

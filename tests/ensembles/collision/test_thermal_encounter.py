@@ -29,18 +29,18 @@ def study(tmp_path, monkeypatch):
 
 def end_of(study, replicate, share, until=0.0015):
     """Where the bodies of a replicate are after some kicks, uncompiled."""
-    encounter, angles = study.drawn(0, 1, replicate)
-    driver = encounter.system.compose(observer=encounter.observer, jit=False)
-    run = encounter.begin(driver, angles, share, 10**6, until)
+    draw = study.draw(0, 1, share, replicate)
+    driver = draw.encounter.system.compose(observer=draw.encounter.observer, jit=False)
+    run = draw.begin(driver, 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
     return run.work.motion[NOW].copy()
 
 
 def test_a_replicate_has_a_key_of_its_own_at_every_condition(study):
-    keys = [study.drawn(0, 1, replicate)[0].scene.key for replicate in (0, 1, 2, 0)]
+    keys = [study.draw(0, 1, 0.5, replicate).encounter.scene.key for replicate in (0, 1, 2, 0)]
     assert keys == [key_of(study.config.seed, replicate) for replicate in (0, 1, 2, 0)]
-    encounter, _ = study.drawn(0, 1, 2)
+    encounter = study.draw(0, 1, 0.5, 2).encounter
     assert encounter.system.scene().key == encounter.scene.key
     assert encounter.settling[0][0] is study.encounter(0, 1, [0.0] * 4).settling[0][0]
 
@@ -63,10 +63,11 @@ def test_kicks_move_a_pair_off_its_way(study):
     """The centre of both bodies diffuses away from where settling takes it."""
     warm = end_of(study, 0, 0.5)
     cold_forces = [force for force in study.config.forces if type(force).__name__ != "Thermal"]
-    encounter, angles = study.drawn(0, 1, 0)
-    cold = attrs.evolve(encounter, system=attrs.evolve(encounter.system, forces=cold_forces))
+    draw = study.draw(0, 1, 0.5, 0)
+    system = attrs.evolve(draw.encounter.system, forces=cold_forces)
+    cold = attrs.evolve(draw.encounter, system=system)
     driver = cold.system.compose(observer=cold.observer, jit=False)
-    run = cold.begin(driver, angles, 0.5, 10**6, 0.0015)
+    run = attrs.evolve(draw, encounter=cold).begin(driver, 10**6, 0.0015)
     run.to_end()
     moved = np.abs(warm[:, :2] - run.work.motion[NOW, :, :2]).max()
     assert 1e-10 < moved < 2e-6

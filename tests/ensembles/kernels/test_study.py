@@ -22,7 +22,7 @@ def test_the_scene_says_which_study_it_is(study, tmp_path):
 
 def test_a_replicate_has_an_offset_of_its_own(study):
     encounter = study.encounter(0, 1, study.numbers(0))
-    shares = [study.share_of(encounter, 1.0, k) for k in range(32)]
+    shares = [study.share_of(encounter, 1.0, study.numbers(k)) for k in range(32)]
     largest = 1.0 + encounter.reach / encounter.outer
     assert min(shares) < -0.8 * largest and max(shares) > 0.8 * largest
     assert np.abs(shares).max() <= largest
@@ -38,7 +38,7 @@ def test_the_points_are_part_of_what_rows_follow_from(study, tmp_path):
 def test_no_start_is_nearer_than_what_acts_there_is_small(study):
     encounter = study.encounter(0, 1, study.numbers(0))
     for k in range(8):
-        share = study.share_of(encounter, 1.0, k)
+        share = study.share_of(encounter, 1.0, study.numbers(k))
         place = encounter.start((0.0, 0.0), share).motion[0]
         apart = np.hypot(*(place[1, :2] - place[0, :2]))
         assert apart >= (3e-5 + encounter.start_gap) * (1.0 - 1e-6)

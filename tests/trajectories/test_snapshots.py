@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.ensembles.collision.encounter import Record
-from flocsim.ensembles.collision.snapshots import choose_instants, frames_of
+from flocsim.ensembles.collision.draw import Record
 from flocsim.ensembles.collision.start import draws
-from flocsim.trajectories.frames import travelled
+from flocsim.trajectories.frames import choose_instants, frames_of, travelled
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study
 
