@@ -29,8 +29,9 @@ from flocsim.ensembles.pilot.choice import (
     first_methods,
     sampling_error,
 )
-from flocsim.ensembles.pilot.ladder import DECADES, Job, at_rung, is_flip, scene_length, trial
+from flocsim.ensembles.pilot.ladder import DECADES, at_rung, scene_length
 from flocsim.ensembles.pilot.sample import sample_of
+from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from flocsim.io.confidence import wilson
@@ -65,7 +66,7 @@ def config_of(text, arguments):
 def timed(study, job):
     """(Trial, CPU time [s])."""
     began = time.process_time()
-    found = trial(study, job)
+    found = try_out(study, job)[0]
     return found, time.process_time() - began
 
 

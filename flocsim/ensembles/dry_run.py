@@ -1,6 +1,5 @@
 """What a study would do, without doing it: what it is made of, and what a pilot says it takes."""
 
-import math
 import time
 from collections import Counter
 from math import inf
@@ -140,7 +139,7 @@ def chosen_study(study, tasks):
     """(the Study by the methods that it will have, lines on how they were chosen, CPU time [s] of
     the choice in the run)."""
     config, types = study.config, len(study.config.scene.names)
-    first = [timed(study, task, False).first for task in tasks[: 2 * types]]
+    first = [timed(study, task, False).first.cpu for task in tasks[: 2 * types]]
     choosing = LADDER * pilot_size(config) * types * sum(first) / len(first)
     if choosing > MOST_CHOOSING:
         return study, [
@@ -189,10 +188,10 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
 
 def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float) -> list[str]:
     """A Forecast for people."""
-    ended = Counter(OUTCOMES[run.outcome] for run in found.runs)
+    ended = Counter(OUTCOMES[run.first.outcome] for run in found.runs)
     words = ", ".join(f"{ended[name]} {name}" for name in OUTCOMES if ended[name])
     conditions = len(config.scene.names) * len(config.shapes.vertices) * len(config.scene.delta)
-    again = [run for run in found.runs if math.isfinite(run.second)]
+    again = [run for run in found.runs if run.second is not None]
     flips = sum(run.flipped for run in again)
     hours, size = found.hours, found.size
     most = f" at {found.replicates} replicates" if found.replicates < config.replicates else ""

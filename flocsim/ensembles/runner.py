@@ -44,7 +44,7 @@ from flocsim.ensembles.pilot.choice import (
     first_methods,
     recorded_choice,
 )
-from flocsim.ensembles.pilot.ladder import Job, trial
+from flocsim.ensembles.pilot.trials import Job, try_out
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
@@ -226,7 +226,7 @@ def share_jobs(study: Study, comm: Communicator, jobs: Sequence[Job], leads: boo
     for job in jobs[comm.rank :: comm.size]:
         if comm.rank == 0 and stop_requested():
             raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
-        trials.append(trial(study, job))
+        trials.append(try_out(study, job)[0])
     shares = comm.gather(trials)
     if shares is None:
         return []

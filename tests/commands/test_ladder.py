@@ -6,8 +6,8 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.commands.precision import ladder
 from flocsim.ensembles.pilot.choice import first_methods
-from flocsim.ensembles.pilot.ladder import Job
-from flocsim.ensembles.pilot.sample import sample_of
+from flocsim.ensembles.pilot.sample import Task, sample_of
+from flocsim.ensembles.pilot.trials import Job
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from tests.helpers.small_study import small_config, small_study, write_small
@@ -66,7 +66,7 @@ def test_the_distance_between_two_steps_is_a_cubics():
 def test_what_is_measured_ends_as_in_the_study(tmp_path):
     study = small_study(tmp_path)
     row = study.run(1, 4, 0.0, 1)
-    task = (1, 4, 0.0, 1)
+    task = Task(1, 4, 0.0, 1)
     job = Job(task, study.config.integrator.method, study.config.integrator.max_steps)
     trial, motion = ladder.measured(study, job)
     assert (trial.outcome, trial.inside, trial.time) == (

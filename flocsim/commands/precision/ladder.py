@@ -5,7 +5,6 @@ rung of both methods and takes the time.
 """
 
 import math
-import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 
@@ -14,20 +13,13 @@ import numpy as np
 
 from flocsim.commands.trajectory import select
 from flocsim.ensembles.collision.checking import MORE_STEPS
-from flocsim.ensembles.collision.failures import FAILED, replicate_row
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels.study import study_of
-from flocsim.ensembles.pilot.choice import (
-    ALLOWED,
-    REFERENCE,
-    Ladder,
-    first_methods,
-    sampling_error,
-    settled,
-)
-from flocsim.ensembles.pilot.ladder import DECADES, Job, Trial, at_rung, scene_length
+from flocsim.ensembles.pilot.choice import ALLOWED, first_methods, sampling_error, settled
+from flocsim.ensembles.pilot.ladder import DECADES, REFERENCE, Ladder, at_rung, scene_length
 from flocsim.ensembles.pilot.sample import sample_of
+from flocsim.ensembles.pilot.trials import Job, Trial, try_out
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.studies.replicates import with_one_count
 from flocsim.ensembles.study import Study, flocs_of
@@ -37,7 +29,7 @@ from flocsim.io.confidence import wilson
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.plots.work_precision import Rung, draw_ladders
-from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import tell
 
 COUNT = 60
@@ -95,37 +87,25 @@ def part_of(config: Config, args: Namespace) -> Config:
 def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
     """(Trial whose cost is CPU time [µs], times, d_c and its rate) of a replicate; None for no
     motion."""
-    draw = study.draw(*job.task)
-    driver = study.driver(draw.encounter, job.integrator)
-    run = draw.begin(driver, job.max_steps, record=True, integrator=job.integrator)
-    began = time.process_time()
-    try:
-        status = run.to_end()
-    except Exception:  # of a force of the user's own
-        return Trial(FAILED, NOT_APPLICABLE, 0.0, 0.0), None
-    cost = 1e6 * (time.process_time() - began)
-    row = replicate_row(status, draw.angles, run)
+    trial, run = try_out(study, job, record=True)
+    trial = trial._replace(cost=1e6 * trial.cpu)
+    if run is None:
+        return trial, None
     times, position, velocity = run.motion()
     apart, speed = (each[:, 1, :2] - each[:, 0, :2] for each in (position, velocity))
     distance = np.hypot(*apart.T)
     rate = np.sum(apart * speed, axis=1) / np.maximum(distance, 1e-300)
-    return Trial(int(row["outcome"]), int(row["inside"]), cost, run.time), (times, distance, rate)
+    return trial, (times, distance, rate)
 
 
 def distance_at(motion: tuple, instant: float) -> float:
     """d_c [m] at a time of a motion (times, d_c, rates), by Hermite's cubic between two steps."""
-    times, values, rates = motion
-    last = int(np.clip(np.searchsorted(times, instant), 1, len(times) - 1))
-    h = times[last] - times[last - 1]
-    if h <= 0.0:
-        return float(values[last])
-    s = (instant - times[last - 1]) / h
-    return float(
-        (1.0 + 2.0 * s) * (1.0 - s) ** 2 * values[last - 1]
-        + s * (1.0 - s) ** 2 * h * rates[last - 1]
-        + s * s * (3.0 - 2.0 * s) * values[last]
-        + s * s * (s - 1.0) * h * rates[last]
-    )
+    from scipy.interpolate import CubicHermiteSpline
+
+    times, values, rates = (each[np.diff(motion[0], prepend=-1.0) > 0.0] for each in motion)
+    if len(times) < 2:
+        return float(values[-1])
+    return float(CubicHermiteSpline(times, values, rates)(instant))
 
 
 def climb(study: Study, condition: int, tasks: Sequence) -> Iterator[Measured]:

@@ -73,6 +73,10 @@ class Draw:
             return None
         if record is not None:
             record.run, record.status = run, status
+        return self.row(run, status)
+
+    def row(self, run: Run, status: Status) -> dict:
+        """The row of a Run that has ended so; failed where a force gives no number."""
         row = replicate_row(status, self.angles, run)
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):
             row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}

@@ -15,7 +15,6 @@ import contextlib
 import json
 import math
 from collections.abc import Callable, Iterable, Sequence
-from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -27,16 +26,14 @@ from flocsim.ensembles.pilot.ladder import (
     DECADES,
     REFERENCE,
     RUNGS,
-    WEIGHTS,
-    Job,
-    Trial,
+    Ladder,
     at_rung,
-    is_flip,
+    mean,
     scene_length,
-    trial,
 )
-from flocsim.ensembles.pilot.model import Belief, Seen, beliefs, sampling_half_width
-from flocsim.ensembles.pilot.sample import Task, expected_replicates, sample_of
+from flocsim.ensembles.pilot.model import Belief, beliefs, sampling_half_width
+from flocsim.ensembles.pilot.sample import expected_replicates, sample_of
+from flocsim.ensembles.pilot.trials import WEIGHTS, Job, Trial, try_out
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.study import Study, flocs_of
@@ -50,11 +47,6 @@ ALLOWED = 0.2
 
 CONFIDENCE = 0.75
 """With which the rate of flips of what is chosen stays below that."""
-
-USUAL = 0.6
-"""Cost of a good setting over that of the reference: where none is below, coarse steps are dear (a
-coarse step that is tried again and again, a pair that ends at the step budget), and finer ones are
-tried as well."""
 
 PROBE = 10
 """Replicates that show whether explicit steps are worth a try."""
@@ -74,16 +66,13 @@ SAVING = 0.3
 COMPILE = 2.0e7
 """What another engine costs to compile, in evaluations: some 25 s."""
 
-DEARER = 0.13
-"""Cost goes with this power of 1/tolerance where no two rungs say."""
-
 Share = Callable[[Study, Sequence[Job]], list[Trial]]
 """Runs Jobs, on one rank or on all: their Trials in the same order."""
 
 
 def run_alone(study: Study, jobs: Sequence[Job]) -> list[Trial]:
     """A Share of one process."""
-    return [trial(study, job) for job in jobs]
+    return [try_out(study, job)[0] for job in jobs]
 
 
 @attrs.frozen
@@ -100,58 +89,6 @@ class Choice:
 
     methods: dict[str, Integrator]
     record: dict[str, Any]
-
-
-@attrs.define
-class Ladder:
-    """A type's climb by one method: what its replicates came to at each rung."""
-
-    condition: int
-    method: Integrator
-    length: float
-    tasks: list[Task]
-    reference: float
-    exact: list[Trial]
-    tried: dict[float, list[Trial]] = attrs.Factory(dict)
-    max_steps: int = 0
-
-    def cost(self, rung: float) -> float:
-        """Evaluations of the mean replicate at a rung that was run."""
-        return mean([each.cost for each in self.tried[rung]])
-
-    def flips(self, rung: float) -> int:
-        return sum(map(is_flip, self.tried[rung], self.exact))
-
-    def seen(self) -> list[Seen]:
-        """For `model.beliefs`."""
-        count = len(self.tasks)
-        return [Seen(rung, self.reference, count, self.flips(rung)) for rung in self.tried]
-
-    def jobs(self, rung: float) -> list[Job]:
-        made = at_rung(self.method, rung * self.length)
-        return [Job(task, made, self.max_steps) for task in self.tasks]
-
-    def is_dear(self) -> bool:
-        """Whether even the cheapest rung that was run costs about as much as the reference."""
-        if not isinstance(self.method, Implicit):
-            return False
-        return min(map(self.cost, self.tried)) > USUAL * mean([each.cost for each in self.exact])
-
-    def mean_cost(self, rung: float) -> float:
-        """Evaluations of a replicate at a rung, from those that were run, by powers of it."""
-        known = sorted((each, max(self.cost(each), 1.0)) for each in self.tried)
-        if len(known) == 1:
-            [(at, cost)] = known
-            return float(cost * (at / rung) ** DEARER)
-        (a, cost_a), (b, cost_b) = next(
-            (pair for pair in pairwise(known) if rung <= pair[1][0]), known[-2:]
-        )
-        share = math.log(rung / a) / math.log(b / a)
-        return float(cost_a * (cost_b / cost_a) ** share)
-
-
-def mean(values):
-    return sum(values) / len(values)
 
 
 def adequate(belief: Belief, target: float) -> float | None:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.checking import count_checks
-from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.checking import MORE_STEPS, count_checks
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
+from flocsim.ensembles.pilot.trials import Job, Trial, is_flip, try_out
 from flocsim.ensembles.study import Study
 from flocsim.io.pieces import seal_size
 from flocsim.io.results.layout import frame_of
@@ -26,7 +26,6 @@ from flocsim.io.results.row_file import plan_of
 from flocsim.io.results.schema import (
     DIFFERENCES,
     EVENTS,
-    NOT_APPLICABLE,
     POOLED,
     TABLE,
     Results,
@@ -63,17 +62,17 @@ FLOC_BYTES = 300
 
 
 class Timed(NamedTuple):
-    """One replicate of a pilot: what came out, CPU times [s] of its run, of a second one (NaN:
-    none), and of what was made for its two flocs before (0: it was there); whether the second run
-    ended otherwise."""
+    """One replicate of a pilot: the Trial that the study would have of it, and that of a second,
+    more exact run, where there is one."""
 
     task: Task
-    outcome: int
-    inside: int
-    first: float
-    second: float
-    setup: float
-    flipped: bool = False
+    first: Trial
+    second: Trial | None = None
+
+    @property
+    def flipped(self) -> bool:
+        """Whether the second run ended otherwise."""
+        return self.second is not None and is_flip(self.second, self.first)
 
 
 class Estimate(NamedTuple):
@@ -110,32 +109,12 @@ def in_turn(config: Config, size: int = MOST) -> list[Task]:
 
 def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
-    known, clock = len(study.encounters), time.process_time
-    outcome, inside, second, setup = FAILED, NOT_APPLICABLE, math.nan, 0.0
-    flipped = False
-    began = clock()
-    try:
-        draw = study.draw(*task)
-        driver = study.driver(draw.encounter)
-        _ = draw.encounter.scene  # made here, where it is timed
-        if len(study.encounters) > known:
-            setup = clock() - began
-            began = clock()
-        steps = study.config.integrator.max_steps
-        row = draw.run(driver, steps) or {}
-        outcome, inside = int(row["outcome"]), int(row["inside"])
-        first = clock() - began
-        exact = study.exact[study.config.scene.names[task.condition]]
-        if again and exact is not None:
-            began = clock()
-            found = study.run_again(draw, exact) or {}
-            second = clock() - began
-            flipped = (found["checked_outcome"], found["checked_inside"]) != (outcome, inside)
-    except MemoryError:
-        raise
-    except Exception:  # of a force of the user's own: this replicate has failed
-        first = clock() - began
-    return Timed(task, outcome, inside, first, second, setup, flipped)
+    name, steps = study.config.scene.names[task.condition], study.config.integrator.max_steps
+    first, _ = try_out(study, Job(task, study.methods[name], steps))
+    exact = study.exact[name] if again else None
+    if exact is None:
+        return Timed(task, first)
+    return Timed(task, first, try_out(study, Job(task, exact, MORE_STEPS * steps))[0])
 
 
 def time_replicates(
@@ -176,7 +155,7 @@ def setting_up(study: Study, runs: Sequence[Timed], ranks: int) -> float:
     As seen, and the others as the later half of those that were: the first ones bring every floc
     to its size.
     """
-    seen = [run.setup for run in runs if run.setup > 0.0]
+    seen = [run.first.setup for run in runs if run.first.setup > 0.0]
     if not seen:
         return 0.0
     others = max(pairs_made(study, ranks) - len(seen), 0.0)
@@ -239,9 +218,8 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     groups = []
     for place in range(len(config.scene.names)):
         mine = [run for run in runs if run.task.condition == place]
-        groups.append(
-            Spent(*(np.array(part) for part in zip(*(run[3:5] for run in mine), strict=True)))
-        )
+        seconds = [run.second.cpu if run.second else math.nan for run in mine]
+        groups.append(Spent(np.array([run.first.cpu for run in mine]), np.array(seconds)))
     work, again = estimated(groups, cells * count, checks, fixed, config.seed)
     size = file_size(study, count)
     least = count if config.stop.half_width is None else min(config.stop.least, count)

@@ -1,4 +1,4 @@
-"""The settings that a pilot tries, and one replicate at one of them: what came out, at what cost.
+"""The settings that a pilot tries: the rungs of a ladder, and a collision type's climb.
 
 A tolerance has its meaning against the lengths of a scene: 1e-6 m is a spheroradius of `tang2014`,
 so the ladder begins at the smallest length of the outlines, rounded to a decade.
@@ -6,20 +6,19 @@ so the ladder begins at the smallest length of the outlines, rounded to a decade
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import pairwise
 
+import attrs
 import numpy as np
 
-from flocsim.arrays import EVALUATIONS
-from flocsim.ensembles.collision.failures import FAILED, replicate_row
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.pilot.model import Seen
 from flocsim.ensembles.pilot.sample import Task
+from flocsim.ensembles.pilot.trials import Job, Trial, is_flip
 from flocsim.ensembles.preflight import measured_flocs, pairings
-from flocsim.ensembles.study import Study
-from flocsim.integrators import DormandPrince54, Implicit
+from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
-from flocsim.io.results.schema import NOT_APPLICABLE
 
 RUNGS = tuple(
     float(f"{digit}e{-decade}") for decade in range(5) for digit in (1, 0.3)
@@ -35,27 +34,13 @@ REFERENCE = 1e-2
 CORE = 0.25
 """Smallest length of an equivalent sphere, which has no spheroradius, over r_eq."""
 
-WEIGHTS: dict[type, float] = {Implicit: 1.0, DormandPrince54: 0.5}
-"""CPU time of one evaluation of the forces, all that is done besides included, over that of
-Implicit: `python -m benchmarks.accuracy.pilot_weights`."""
+USUAL = 0.6
+"""Cost of a good setting over that of the reference: where none is below, coarse steps are dear (a
+coarse step that is tried again and again, a pair that ends at the step budget), and finer ones are
+tried as well."""
 
-
-class Job(NamedTuple):
-    """A Task by a method, within a step budget."""
-
-    task: Task
-    integrator: Integrator
-    max_steps: int
-
-
-class Trial(NamedTuple):
-    """What came of a Job: outcome and inside as in the results file, its cost [evaluations of
-    Implicit], and the time [s] that it simulated."""
-
-    outcome: int
-    inside: int
-    cost: float
-    time: float
+DEARER = 0.13
+"""Cost goes with this power of 1/tolerance where no two rungs say."""
 
 
 def scene_length(config: Config, condition: int, flocs: Sequence[Floc] | None = None) -> float:
@@ -78,24 +63,53 @@ def at_rung(integrator: Integrator, tolerance: float) -> Integrator:
     return type(integrator)(tolerance=float(f"{tolerance:.6g}"))  # type: ignore[call-arg]
 
 
-def trial(study: Study, job: Job) -> Trial:
-    """Run a replicate as the study would, once and by another method.
+@attrs.define
+class Ladder:
+    """A type's climb by one method: what its replicates came to at each rung."""
 
-    An exception costs no more than this replicate, which has failed then.
-    """
-    try:
-        draw = study.draw(*job.task)
-        driver = study.driver(draw.encounter, job.integrator)
-        run = draw.begin(driver, job.max_steps, integrator=job.integrator)
-        row = replicate_row(run.to_end(), draw.angles, run)
-    except MemoryError:
-        raise
-    except Exception:
-        return Trial(FAILED, NOT_APPLICABLE, 0.0, 0.0)
-    cost = WEIGHTS[type(job.integrator)] * int(run.work.tally[EVALUATIONS])
-    return Trial(int(row["outcome"]), int(row["inside"]), cost, run.time)
+    condition: int
+    method: Integrator
+    length: float
+    tasks: list[Task]
+    reference: float
+    exact: list[Trial]
+    tried: dict[float, list[Trial]] = attrs.Factory(dict)
+    max_steps: int = 0
+
+    def cost(self, rung: float) -> float:
+        """Evaluations of the mean replicate at a rung that was run."""
+        return mean([each.cost for each in self.tried[rung]])
+
+    def flips(self, rung: float) -> int:
+        return sum(map(is_flip, self.tried[rung], self.exact))
+
+    def seen(self) -> list[Seen]:
+        """For `model.beliefs`."""
+        count = len(self.tasks)
+        return [Seen(rung, self.reference, count, self.flips(rung)) for rung in self.tried]
+
+    def jobs(self, rung: float) -> list[Job]:
+        made = at_rung(self.method, rung * self.length)
+        return [Job(task, made, self.max_steps) for task in self.tasks]
+
+    def is_dear(self) -> bool:
+        """Whether even the cheapest rung that was run costs about as much as the reference."""
+        if not isinstance(self.method, Implicit):
+            return False
+        return min(map(self.cost, self.tried)) > USUAL * mean([each.cost for each in self.exact])
+
+    def mean_cost(self, rung: float) -> float:
+        """Evaluations of a replicate at a rung, from those that were run, by powers of it."""
+        known = sorted((each, max(self.cost(each), 1.0)) for each in self.tried)
+        if len(known) == 1:
+            [(at, cost)] = known
+            return float(cost * (at / rung) ** DEARER)
+        (a, cost_a), (b, cost_b) = next(
+            (pair for pair in pairwise(known) if rung <= pair[1][0]), known[-2:]
+        )
+        share = math.log(rung / a) / math.log(b / a)
+        return float(cost_a * (cost_b / cost_a) ** share)
 
 
-def is_flip(found: Trial, exact: Trial) -> bool:
-    """Whether an outcome is another than that of the reference, as the column n_flipped counts."""
-    return (found.outcome, found.inside) != (exact.outcome, exact.inside)
+def mean(values):
+    return sum(values) / len(values)

@@ -4,18 +4,18 @@ The replicates of a pilot are run again without the part, from the same start an
 zone. Nothing is left out of the study: what is found is said, and what it would save.
 """
 
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import attrs
 
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.failures import FAILED
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.forecast import Timed
+from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
@@ -23,7 +23,6 @@ from flocsim.explain import body_scales
 from flocsim.forces import ContactForce
 from flocsim.integrators import Overdamped
 from flocsim.io.confidence import wilson
-from flocsim.io.results.schema import NOT_APPLICABLE
 from flocsim.system import System
 
 SECONDS = 4.0
@@ -137,45 +136,32 @@ def tried_without(
     """Run replicates without a part until it matters, or the time [s] is up."""
     # With the encounters themselves, as an id is another's once its owner has gone.
     made: dict[int, tuple[Encounter, Encounter]] = {}
-    drivers: dict[str, Callable] = {}
+    warm: set[str] = set()
     changed, count, spent, before, whole = 0, 0, 0.0, 0.0, 0.0
+
+    def bare(draw: Draw) -> Draw:
+        encounter = draw.encounter
+        if id(encounter) not in made:
+            system = part.left_out(encounter.system)
+            made[id(encounter)] = attrs.evolve(encounter, system=system), encounter
+        return attrs.evolve(draw, encounter=made[id(encounter)][0])
+
     for run in runs:
         go_on()
         if count >= LEAST and (whole > seconds or changed >= ENOUGH):
             break
-        draw = study.draw(*run.task)
-        encounter = draw.encounter
-        fresh = id(encounter) not in made
-        if fresh:
-            bare = attrs.evolve(encounter, system=part.left_out(encounter.system))
-            made[id(encounter)] = bare, encounter
-        draw = attrs.evolve(draw, encounter=made[id(encounter)][0])
-        if fresh and (kind := draw.encounter.system.family) not in drivers:
-            # Compiled before it is timed.
-            drivers[kind] = study.driver(draw.encounter, draw.encounter.system.integrator)
-            one_without(study, draw, drivers)
+        system = bare(study.draw(*run.task)).encounter.system
+        job = Job(run.task, system.integrator, study.config.integrator.max_steps)
+        if system.family not in warm:  # compiled before it is timed
+            try_out(study, job, changed=bare)
+            warm.add(system.family)
         began = time.process_time()
-        taken, outcome, inside = one_without(study, draw, drivers)
+        found, _ = try_out(study, job, changed=bare)
         count += 1
-        changed += (outcome, inside) != (run.outcome, run.inside)
-        spent, before = spent + taken, before + run.first
+        changed += is_flip(found, run.first)
+        spent, before = spent + found.cpu, before + run.first.cpu
         whole += time.process_time() - began
     return Finding(part.name, changed, count, spent / max(before, 1e-12))
-
-
-def one_without(study, draw, drivers):
-    """(CPU time [s], outcome, inside) of a replicate in a scene without a part."""
-    steps = study.config.integrator.max_steps
-    _ = draw.encounter.scene
-    began = time.process_time()
-    try:
-        row = draw.run(drivers[draw.encounter.system.family], steps) or {}
-        outcome, inside = int(row["outcome"]), int(row["inside"])
-    except MemoryError:
-        raise
-    except Exception:  # of a force of the user's own
-        outcome, inside = FAILED, NOT_APPLICABLE
-    return time.process_time() - began, outcome, inside
 
 
 def words_of(finding: Finding, runs: Sequence[Timed]) -> str:
@@ -196,7 +182,7 @@ def words_of(finding: Finding, runs: Sequence[Timed]) -> str:
             f"{name}: never changed an outcome of {count} replicates{agrees} (rate below "
             f"{100.0 * most:.2g} %); {cost}"
         )
-    again = [run for run in runs if math.isfinite(run.second)]
+    again = [run for run in runs if run.second is not None]
     flips = sum(run.flipped for run in again)
     if again and low <= float(wilson(flips, len(again))[1]):
         return (

@@ -20,6 +20,7 @@ from flocsim.ensembles.pilot.forecast import (
     time_replicates,
     timed,
 )
+from flocsim.ensembles.pilot.trials import Trial
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.study import Study
 from tests.helpers.small_study import small_config, small_study
@@ -67,28 +68,29 @@ def test_replicates_are_run_in_turn_until_the_time_is_up(tmp_path):
     asked = []
     runs = time_replicates(study, tasks, lambda: asked.append(1), seconds=0.0)
     assert len(runs) == 2 * LEAST and len(asked) == 2 * LEAST + 1
-    assert all(run.first > 0.0 for run in runs)
-    assert [math.isfinite(run.second) for run in runs[:8]] == [True] * 2 + [False] * 4 + [True] * 2
-    assert [run.setup > 0.0 for run in runs[:4]] == [True, True, False, False]
+    assert all(run.first.cpu > 0.0 for run in runs)
+    assert [run.second is not None for run in runs[:8]] == [True] * 2 + [False] * 4 + [True] * 2
+    assert [run.first.setup > 0.0 for run in runs[:4]] == [True, True, False, False]
     for run in runs[:4]:
         row = study.run(*run.task[:3], run.task.replicate)
-        assert (run.outcome, run.inside) == (row["outcome"], row["inside"])
+        assert run.first[:2] == (row["outcome"], row["inside"])
 
 
-def test_a_second_run_that_ends_otherwise_is_a_flip(tmp_path, monkeypatch):
+def test_a_second_run_that_ends_otherwise_is_a_flip(tmp_path):
     study = small_study(tmp_path, SPHERES)
     task = in_turn(study.config)[0]
-    assert not timed(study, task, True).flipped
-    other = {"checked_outcome": 3, "checked_inside": 0}
-    monkeypatch.setattr(Study, "run_again", lambda *arguments: other)
-    assert timed(study, task, True).flipped
-    assert not timed(study, task, False).flipped
+    found = timed(study, task, True)
+    assert found.second and found.second.cost > found.first.cost and not found.flipped
+    assert timed(study, task, False).second is None
+    other = found.second._replace(outcome=3, inside=0)
+    assert found._replace(second=other).flipped
+    assert not found._replace(second=None).flipped
 
 
 def test_no_second_runs_where_the_study_has_none(tmp_path):
     study = small_study(tmp_path, SPHERES | {"integrator": {"check_share": 0.0}})
     runs = time_replicates(study, in_turn(study.config), never, seconds=0.0)
-    assert not any(math.isfinite(run.second) for run in runs)
+    assert not any(run.second for run in runs)
     assert forecast_of(study, runs, 1, 0.0).again == 0.0
 
 
@@ -101,8 +103,11 @@ def test_every_rank_makes_its_own_pairs(tmp_path):
 
 def test_pairs_that_were_not_seen_are_made_like_the_later_ones(tmp_path):
     study = small_study(tmp_path, {"replicates": 40, "shapes": {"vertices": [1, 4]}})
-    blank = Timed(in_turn(study.config)[0], 0, 1, 1.0, math.nan, 0.0)
-    runs = [blank._replace(setup=setup) for setup in (9.0, 0.0, 7.0, 1.0, 0.0, 3.0)]
+    task = in_turn(study.config)[0]
+    blank = Timed(task, Trial(0, 1, cpu=1.0))
+    runs = [
+        Timed(task, Trial(0, 1, cpu=1.0, setup=setup)) for setup in (9.0, 0.0, 7.0, 1.0, 0.0, 3.0)
+    ]
     assert setting_up(study, runs, 1) == pytest.approx(20.0 + (6 - 4) * 2.0)
     assert setting_up(study, [blank], 1) == 0.0
 

@@ -1,7 +1,5 @@
 """Which parts of the physics changed no outcome: said, tried fairly, and never acted on."""
 
-import math
-
 import attrs
 import pytest
 
@@ -22,6 +20,7 @@ from flocsim.ensembles.pilot.needless import (
     words_of,
 )
 from flocsim.ensembles.pilot.sample import Task
+from flocsim.ensembles.pilot.trials import Trial
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.small_study import small_study
@@ -68,7 +67,7 @@ def test_attraction_that_holds_spheres_matters(study, runs):
 
 
 def test_outcomes_are_held_against_those_of_the_pilot(study, runs):
-    other = [run._replace(inside=1 - run.inside) for run in runs]
+    other = [run._replace(first=run.first._replace(inside=1 - run.first.inside)) for run in runs]
     found = tried_without(study, other, Part("nothing", lambda system: system), never, 0.0)
     assert found[1:3] == (LEAST, LEAST)
 
@@ -125,8 +124,8 @@ TASK = Task(0, 1, 0.0, 0)
 
 def again(count, flips):
     """Replicates that were run again, of which some flipped, and as many that were not."""
-    once = Timed(TASK, 0, 1, 1.0, math.nan, 0.0)
-    return [once._replace(second=2.0, flipped=k < flips) for k in range(count)] + [once] * count
+    once = Timed(TASK, Trial(0, 1))
+    return [once._replace(second=Trial(int(k < flips), 1)) for k in range(count)] + [once] * count
 
 
 @pytest.mark.parametrize(
