@@ -85,7 +85,7 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
-        ["outputs", "opening"],
+        ["outputs", "opening", "groups"],
         [
             "files",
             "own_mark",
@@ -106,12 +106,8 @@ HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/mpi.py"],
     "h5py": [
         "io/opening.py",
+        "io/groups.py",
         "io/results/layout.py",
-        "io/results/groups.py",
-        "io/results/swarm_file.py",
-        "io/results/strength_file.py",
-        "io/results/sweep_file.py",
-        "io/shapes/library.py",
         "io/trajectory.py",
     ],
     "skimage": ["io/images/*.py"],

@@ -15,6 +15,8 @@ from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.exchange.vtkhdf import write_vtkhdf
 from flocsim.io.files import Rule, keep, seal, write_file
+from flocsim.io.groups import write_labelled
+from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.opening import opened_file
 
 KIND = "flocsim trajectory"
@@ -56,49 +58,39 @@ def write_trajectory(
     """
     import h5py
 
+    count = len(shapes)
+    scales: dict[str, Any] = {
+        "time": times,
+        "body": np.arange(count),
+        "component": np.array(COMPONENTS, object),
+        "axis": np.array(COMPONENTS[:2], object),
+    } | {f"vertex_{body}": np.arange(len(each.vertices)) for body, each in enumerate(shapes)}
     arrays = {"position": position, "velocity": velocity}
-    if len(shapes) == 2:
+    if count == 2:
         arrays["centre_distance"] = centre_distance(position)
+    axes = ("time", "body", "component")
+    columns = {
+        name: Column(axes[: array.ndim], array, about_of(DATASETS[name]))
+        for name, array in arrays.items()
+    }
+    for body, shape in enumerate(shapes):
+        of_points, about = (f"vertex_{body}", "axis"), {"units": "m", "radius": shape.radius}
+        columns[f"vertices_{body}"] = Column(of_points, np.array(shape.vertices), about)
+        if shape.is_compound:
+            table = table_of(shape.parts)
+            for name, values, unit in (
+                ("part", table.part, "1"), ("ring", table.ring, "1"),
+                ("point_radius", table.radius, "m"),
+            ):  # fmt: skip
+                columns[f"{name}_{body}"] = Column(of_points[:1], values, {"units": unit})
+    coordinates = {}
+    for name, values in scales.items():
+        said = DATASETS.get(name, ("1", name.replace("_", " of body ")))
+        coordinates[name] = Column((name,), values, about_of(said))
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
-        file.attrs["kind"] = KIND
-        file.attrs["schema_version"] = SCHEMA_VERSION
-        for name, value in facts.items():
-            file.attrs[name] = value
-        scales: dict[str, Any] = {
-            "time": times, "body": np.arange(len(shapes)), "component": list(COMPONENTS),
-            "axis": list(COMPONENTS[:2]),
-        }  # fmt: skip
-        for body, shape in enumerate(shapes):
-            scales[f"vertex_{body}"] = np.arange(len(shape.vertices))
-        for name, values in scales.items():
-            kind = h5py.string_dtype() if isinstance(values, list) else None
-            scale = file.create_dataset(name, data=values, dtype=kind)
-            scale.make_scale(name)
-            units, text = DATASETS.get(name, ("1", name.replace("_", " of body ")))
-            scale.attrs["units"], scale.attrs["long_name"] = units, text
-
-        def write(name: str, array: np.ndarray, axes: Sequence[str]) -> Any:
-            dataset = file.create_dataset(name, data=array)
-            for place, axis in enumerate(axes):
-                dataset.dims[place].attach_scale(file[axis])
-            return dataset
-
-        for name, array in arrays.items():
-            dataset = write(name, array, ("time", "body", "component")[: array.ndim])
-            dataset.attrs["units"], dataset.attrs["long_name"] = DATASETS[name]
-        for body, shape in enumerate(shapes):
-            axes = (f"vertex_{body}", "axis")
-            dataset = write(f"vertices_{body}", np.array(shape.vertices), axes)
-            dataset.attrs["units"] = "m"
-            dataset.attrs["radius"] = shape.radius
-            if shape.is_compound:
-                table = table_of(shape.parts)
-                for name, column in (("part", table.part), ("ring", table.ring)):
-                    dataset = write(f"{name}_{body}", column, axes[:1])
-                    dataset.attrs["units"] = "1"
-                dataset = write(f"point_radius_{body}", table.radius, axes[:1])
-                dataset.attrs["units"] = "m"
+        file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})
+        write_labelled(file, Labelled(coordinates, columns))
         write_vtkhdf(file, times, position, shapes)
     write_file(path, seal(buffer.getvalue()), rule)
 

@@ -12,12 +12,7 @@ import numpy as np
 
 from flocsim.ensembles.estimates.events import INSIDE_CLASSES, OUTSIDE_CLASSES, events
 from flocsim.io.confidence import numerical_error
-from flocsim.io.results.schema import LAST_AXES, NOT_APPLICABLE
-
-
-def has_last_axis(name: str) -> bool:
-    """Whether the arrays of a probability have a last axis: of classes, or kinds of bond."""
-    return any(axis in name for axis in LAST_AXES)
+from flocsim.io.results.schema import NOT_APPLICABLE, last_axis
 
 
 def count_changes(
@@ -40,7 +35,7 @@ def count_changes(
             ("checked", trial | trial_again), ("gained", gained), ("lost", lost)
         ):  # fmt: skip
             total = np.sum(checked & flags, axis=-1)
-            last = has_last_axis(name)
+            last = last_axis(name)
             counts[f"n_{kind}_{name}"] = np.moveaxis(total, 0, -1) if last else total
     return counts
 
@@ -71,7 +66,7 @@ def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         checked = counts[f"n_checked_{name}"]
         flipped = counts[f"n_gained_{name}"] + counts[f"n_lost_{name}"]
         arrays = (flipped, checked, trials)
-        if has_last_axis(name):
+        if last_axis(name):
             parts = zip(*(np.moveaxis(each, -1, 0) for each in arrays), strict=True)
             found[f"{name}_numerical"] = np.stack([numerical_error(*p) for p in parts], axis=-1)
         else:

@@ -38,7 +38,7 @@ from flocsim.io.opening import UNREADABLE
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.provenance import now
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import BLOCK, opened, read_scalar
+from flocsim.io.results.file import BLOCK, opened, scalar_of
 from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
@@ -337,7 +337,7 @@ def take_results(start, output):
     """Use the rows of an older results file; FlocsimError if they are not of this study."""
     before = stamp(os.fspath(output))
     file = start.resources.enter_context(opened(output))
-    run = {name: read_scalar(dataset) for name, dataset in file["run"].items()}
+    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
     if "identity" not in run:
         raise UsageError(f"{output} does not say what it was made from: {ELSEWHERE}")
     try:

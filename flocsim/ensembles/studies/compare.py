@@ -12,7 +12,7 @@ from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
 from flocsim.io.confidence import numerical_error
-from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled, about_of
 from flocsim.io.results.schema import (
     AXES,
     COMPARED,
@@ -63,10 +63,11 @@ class Comparison:
             "type": np.array(self.types, dtype=object), "vertices": self.vertices,
             "delta": self.delta,
         }  # fmt: skip
-        about = {axis: dict(zip(("units", "long_name"), COORDINATES[axis], strict=True))
-                 for axis in AXES}  # fmt: skip
         return Labelled(
-            {axis: Column((axis,), values, about[axis]) for axis, values in axes.items()},
+            {
+                axis: Column((axis,), values, about_of(COORDINATES[axis]))
+                for axis, values in axes.items()
+            },
             {
                 name: Column(AXES, values, {"units": "1", "long_name": MEANINGS[name]})
                 for name, values in self.arrays[probability].items()

@@ -24,37 +24,13 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.files import held
-from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled, about_of
+from flocsim.io.labelled import DataFrame, Dataset, Labelled
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import read_results
-from flocsim.io.results.schema import (
-    AXES,
-    COORDINATES,
-    DIFFERENCES,
-    EVENTS,
-    FLAGS,
-    LAST_AXES,
-    POOLED,
-    RADII,
-    REPLICATES,
-    TABLE,
-    Results,
-    last_axis,
-)
+from flocsim.io.results.schema import GROUPS, Results
 from flocsim.trajectories.trajectory import Trajectory
-
-GROUPS: dict[str, tuple[dict, tuple[str, ...]]] = {
-    "probabilities": (TABLE, AXES),
-    "pooled": (POOLED, AXES[:2]),
-    "differences": (DIFFERENCES, ("against", "event", *AXES)),
-    "replicates": (REPLICATES, (*AXES, "replicate")),
-}
-"""Groups of a results file: what each holds, and along which axes."""
-
-SIZED = ("probabilities", "pooled")
-"""Groups that have the radii of the types beside them; the replicates have their own."""
 
 
 class StudyResults:
@@ -107,42 +83,10 @@ class StudyResults:
         """The arrays of a group of the file with their axes; UsageError for an unknown one."""
         if group not in GROUPS:
             raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
-        schema, axes = GROUPS[group]
         arrays: Mapping[str, np.ndarray] = getattr(self, group)
         if not arrays:
             raise UsageError(f"{self.path} has no group {group}: it was written without")
-        columns = {}
-        for name, said in schema.items():
-            further = (last_axis(name),) if group == "probabilities" and last_axis(name) else ()
-            about = about_of(said) | self.flags(group, name)
-            columns[name] = Column((*axes, *filter(None, further)), arrays[name], about)
-        used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
-        sizes = {name: self.radius(name) for name in RADII if group in SIZED}
-        return Labelled({axis: self.coordinate(axis) for axis in used} | sizes, columns)
-
-    def radius(self, name: str) -> Column:
-        """The radius r_i or r_j that stands for each type: a coordinate along the types."""
-        return Column(("type",), self.results.radii[name], about_of(RADII[name]))
-
-    def flags(self, group: str, name: str) -> dict:
-        """The codes of a column of the replicates, and their words."""
-        if group != "replicates":
-            return {}
-        words = self.results.failures
-        flags = FLAGS | {"failure": (tuple(range(len(words))), words)}
-        if name not in flags:
-            return {}
-        values, meanings = flags[name]
-        return {"flag_values": np.array(values, "u1"), "flag_meanings": " ".join(meanings)}
-
-    def coordinate(self, axis: str) -> Column:
-        """The values along an axis."""
-        known = {
-            "type": np.array(self.types, dtype=object), "vertices": self.vertices,
-            "delta": self.delta, "replicate": np.arange(self.count),
-            "against": np.array(AXES, dtype=object), "event": np.array(EVENTS, dtype=object),
-        } | {name: np.array(words, dtype=object) for name, words in LAST_AXES.items()}  # fmt: skip
-        return Column((axis,), known[axis], about_of(COORDINATES[axis]))
+        return self.results.labelled(group, arrays)
 
     def to_xarray(self, group: str = "probabilities") -> Dataset:
         """A group of the file as an xarray Dataset, with units, meanings and flags.
@@ -159,7 +103,7 @@ class StudyResults:
 
         UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
         """
-        return self.labelled(group).to_pandas(GROUPS[group][1])
+        return self.labelled(group).to_pandas(GROUPS[group].index)
 
     def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
         """One of the figures of `flocsim plot`, as a matplotlib Figure.

@@ -33,7 +33,7 @@ from flocsim.ensembles.storage.plan import (
     write_plan,
 )
 from flocsim.ensembles.storage.resume import asked_of
-from flocsim.ensembles.studies.opened import GROUPS, StudyResults, open_results
+from flocsim.ensembles.studies.opened import StudyResults, open_results
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.ensembles.study import flocs_of
 from flocsim.errors import FileError, UsageError
@@ -43,12 +43,12 @@ from flocsim.io.journal.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.opening import kind_of
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
-from flocsim.io.results.schema import RADII
+from flocsim.io.results.schema import GROUPS, RADII
 from flocsim.io.results.swarm_file import FORMAT as SWARM_FORMAT
 from flocsim.io.results.swarm_file import SwarmResults, read_swarm
 from flocsim.io.results.sweep_file import (
     FORMAT,
-    SCHEMAS,
+    JOINED,
     SweepResults,
     Swept,
     read_sweep,
@@ -191,7 +191,7 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     lengths = [len(values) for values in over.values()]
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        clash = lasts.count(last) > 1 or any(last in axes for _, axes in GROUPS.values())
+        clash = lasts.count(last) > 1 or any(last in group.index for group in GROUPS.values())
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))
         found = [value_of(configs[stride * place], key) for place in range(lengths[axis])]
@@ -226,7 +226,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in SCHEMAS:
+    for group in JOINED:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):

@@ -1,8 +1,10 @@
 """What was found in an HDF5 file, held against what its kind should have."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import attrs
+import numpy as np
 
 from flocsim.io.hdf5.structure import Node, Unfit
 
@@ -23,26 +25,40 @@ GROUP_ATTRIBUTES = {"coordinates": ("text", ())}
 
 
 @attrs.frozen
-class Column:
-    """A dataset: its type and its axes, each a length or the name of one that is found.
+class Declared:
+    """A dataset: its type and its axes, each a length or the name of one that is found, its unit,
+    its meaning, and where it holds codes these and their words.
 
-    Axes of one name are of one length. ``needed``: whether its group must have it.
+    Axes of one name are of one length.
     """
 
     type: str
     axes: tuple[int | str, ...] = ()
-    needed: bool = True
+    unit: str = "1"
+    text: str = ""
+    codes: tuple[Sequence[int], Sequence[str]] | None = None
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Its attributes."""
+        said: dict[str, Any] = {"units": self.unit, "long_name": self.text}
+        if self.codes is not None:
+            said["flag_values"] = np.array(self.codes[0], "u1")
+            said["flag_meanings"] = " ".join(self.codes[1])
+        return said
 
 
 def hold_against(
-    nodes: Mapping[str, Node], groups: Mapping[str, Mapping[str, Column]], needed: Iterable[str]
-) -> dict[str, int]:
+    nodes: Mapping[str, Node], groups: Mapping[str, Mapping[str, Declared]],
+    needed: Iterable[str], known: Mapping[str, int] | None = None,
+) -> dict[str, int]:  # fmt: skip
     """{axis: length} where every group and dataset of a file is as its kind should have it.
 
-    ``groups``: {path: {name: Column}}, ``needed`` the paths of those that it must have. Raises
-    Unfit for a group or dataset that is missing, unknown, or of another type or shape.
+    ``groups``: {path: {name: Declared}}, ``needed`` the paths of those that it must have, ``known``
+    the lengths of axes that are always the same. Raises Unfit for a group or dataset that is
+    missing, unknown, or of another type or shape.
     """
-    lengths: dict[str, int] = {}
+    lengths = dict(known or {})
     for path in needed:
         if path not in nodes or nodes[path].type is not None:
             raise Unfit(f"there is no group {path}")
@@ -58,8 +74,8 @@ def hold_against(
         else:
             check_column(path, node, groups[group][name], lengths)
     for group, columns in groups.items():
-        for name, column in columns.items():
-            if group in nodes and column.needed and f"{group}/{name}" not in nodes:
+        for name in columns:
+            if group in nodes and f"{group}/{name}" not in nodes:
                 raise Unfit(f"{group}/{name} is missing")
     return lengths
 

@@ -5,34 +5,29 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.hdf5.expected import Column, hold_against
+from flocsim.io.groups import scalars_in
+from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.hdf5.structure import Node
-from flocsim.io.results.kernel_group import expected_kernel
+from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.schema import (
     AGGREGATED,
     AXES,
     BONDS,
     CLASSES,
-    DIFFERENCES,
     EVENTS,
+    FLOCS,
+    GROUPS,
     LAST_AXES,
     NOT_APPLICABLE,
     OUTCOMES,
-    POOLED,
     RADII,
-    REPLICATES,
     TABLE,
+    WORDS,
     Results,
-    tail_of,
 )
 
-TYPE, VERTICES, DELTA = (Column(kind, (axis,)) for kind, axis in zip(
-    ("text", "i8", "f8"), AXES, strict=True))  # fmt: skip
-SIZES = {name: Column(kind, ("type",)) for name, (kind, _, _) in RADII.items()}
-STUDY = {"type": TYPE, "vertices": VERTICES, "delta": DELTA}
 OPTIONAL = ("pooled", "differences", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
-RUN_TYPES = ("text", "i8", "f8")
 FAILED = OUTCOMES.index("failed")
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
@@ -41,34 +36,13 @@ BOUND_CLASSES = [CLASSES.index(name) for name in AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
-def columns_of(schema, axes):
-    """{name: Column} of the arrays of a schema."""
-    return {name: Column(kind, axes) for name, (kind, _, _) in schema.items()}
-
-
 def check_structure(nodes: Mapping[str, Node]) -> None:
     """ValueError unless the groups and datasets of a file are those of results."""
-    run = {
-        path.removeprefix("run/"): Column(node.type)
-        for path, node in nodes.items()
-        if path.startswith("run/") and node.type in RUN_TYPES
-    }
-    groups = {
-        "probabilities": {
-            name: Column(kind, (*AXES, *tail_of(name))) for name, (kind, _, _) in TABLE.items()
-        } | STUDY | SIZES
-        | {axis: Column("text", (len(words),)) for axis, words in LAST_AXES.items()},
-        "pooled": columns_of(POOLED, AXES[:2]) | {"type": TYPE, "vertices": VERTICES} | SIZES,
-        "differences": columns_of(DIFFERENCES, (len(AXES), len(EVENTS), *AXES))
-        | STUDY
-        | {"against": Column("text", (len(AXES),)), "event": Column("text", (len(EVENTS),))},
-        "replicates": columns_of(REPLICATES, (*AXES, "replicate"))
-        | STUDY | {"replicate": Column("i8", ("replicate",))},
-        "kernel": expected_kernel(),
-        "flocs": {"floc": Column("text", ("floc",))},
-        "run": run,
-    }  # fmt: skip
-    lengths = hold_against(nodes, groups, groups.keys() - set(OPTIONAL))
+    declared = {**GROUPS, "kernel": KERNEL_GROUP, "flocs": FLOCS}
+    groups = {name: group.arrays for name, group in declared.items()}
+    groups["run"] = scalars_in(nodes, "run")
+    known = {axis: len(words) for axis, words in WORDS.items()}
+    lengths = hold_against(nodes, groups, groups.keys() - set(OPTIONAL), known)
     if not 0 < lengths["type"] * lengths["vertices"] * lengths["delta"] <= MOST_CONDITIONS:
         raise ValueError(f"there are no conditions, or more than {MOST_CONDITIONS}")
     kinds = {"flag_meanings": ("text", ()), "flag_values": ("u1", None)}

@@ -27,6 +27,7 @@ import numpy as np
 
 from flocsim.errors import FileError
 from flocsim.io.files import Rule, keep
+from flocsim.io.groups import scalar_of, values_of
 from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results.checks import (
     CODED,
@@ -42,6 +43,7 @@ from flocsim.io.results.row_file import ROWS, new_row_file
 from flocsim.io.results.schema import (
     CLASSES,
     DIFFERENCES,
+    GROUPS,
     NOT_APPLICABLE,
     OUTCOMES,
     POOLED,
@@ -110,20 +112,20 @@ def read_overview(path: str | os.PathLike) -> tuple[Results, "Totals"]:
 
 def results_in(file, replicates):
     """The Results in an open file."""
-    table, rows = file["probabilities"], file["replicates"]
+    table, rows = GROUPS["probabilities"].read(file["probabilities"]), file["replicates"]
     results = Results(
-        types=table["type"].asstr()[()],
-        vertices=table["vertices"][()],
-        delta=table["delta"][()],
+        types=table["type"],
+        vertices=table["vertices"],
+        delta=table["delta"],
         replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
-        probabilities={name: table[name][()] for name in TABLE},
-        run={name: read_scalar(dataset) for name, dataset in file["run"].items()},
+        probabilities={name: table[name] for name in TABLE},
+        run={name: scalar_of(dataset) for name, dataset in file["run"].items()},
         failures=rows["failure"].attrs["flag_meanings"].split(),
-        flocs=file["flocs/floc"].asstr()[()] if "flocs" in file else (),
+        flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
         pooled=read_group(file, "pooled", POOLED),
         differences=read_group(file, "differences", DIFFERENCES),
         count=len(rows["replicate"]),
-        radii={name: table[name][()] for name in RADII},
+        radii={name: table[name] for name in RADII},
         kernel=read_kernel(file),
     )
     check_tables(results)
@@ -135,10 +137,6 @@ def results_in(file, replicates):
 def read_group(file, name, schema):
     """The arrays of a group that a file may lack."""
     return {each: file[name][each][()] for each in schema} if name in file else {}
-
-
-def read_scalar(dataset):
-    return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
 
 
 SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")

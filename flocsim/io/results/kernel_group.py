@@ -7,11 +7,9 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.hdf5.expected import Column as Expected
-from flocsim.io.labelled import Column, Labelled, about_of
-from flocsim.io.results.groups import write_labelled
+from flocsim.io.groups import Group, declared
+from flocsim.io.labelled import Labelled
 
-GROUP = "kernel"
 AXES = ("mechanism", "vertices", "i", "j")
 
 WHAT = {"c": "that touch", "inside": "that touch inside the zone", "a": "that aggregate"}
@@ -71,6 +69,7 @@ SCALES = {
     "j": ("text", "1", "size class of the other body"),
 }
 RADIUS = {"r_eq": ("f8", "m", "equivalent radius of the size class; of measured flocs the median")}
+KERNEL_GROUP = Group.of(declared(KERNEL, AXES), SCALES, declared(RADIUS, ("i",)))
 SMALLEST = -1e-9
 """Rounding below 0."""
 
@@ -101,22 +100,10 @@ class Kernel:
 
     def labelled(self) -> Labelled:
         """The arrays with their axes."""
-        columns = {
-            name: Column(AXES, self.arrays[name], about_of(about)) for name, about in KERNEL.items()
-        }
-        labels = np.array(self.labels, dtype=object)
-        values = (
-            np.array(self.mechanisms, dtype=object),
-            np.asarray(self.vertices),
-            labels,
-            labels,
-        )
-        axes = {
-            axis: Column((axis,), each, about_of(SCALES[axis]))
-            for axis, each in zip(AXES, values, strict=True)
-        }
-        axes["r_eq"] = Column(("i",), np.asarray(self.radii), about_of(RADIUS["r_eq"]))
-        return Labelled(axes, columns)
+        return KERNEL_GROUP.labelled({
+            "mechanism": self.mechanisms, "vertices": self.vertices, "i": self.labels,
+            "j": self.labels, "r_eq": self.radii, **self.arrays,
+        })  # fmt: skip
 
     def place_of(
         self, mechanism: str | None = None, vertices: int | None = None
@@ -135,34 +122,18 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def write_kernel(file: Any, kernel: Kernel) -> None:
-    """Write the group into an open file."""
-    write_labelled(file.create_group(GROUP), kernel.labelled())
-
-
-def expected_kernel() -> dict[str, Expected]:
-    """What the group must hold."""
-    return (
-        {name: Expected(kind, AXES) for name, (kind, _, _) in KERNEL.items()}
-        | {axis: Expected(SCALES[axis][0], (axis,)) for axis in AXES}
-        | {"r_eq": Expected("f8", ("i",))}
-    )
-
-
 def read_kernel(file: Any) -> Kernel | None:
     """The group of an open file, None where it has none; ValueError for values that cannot be."""
-    if GROUP not in file:
+    if "kernel" not in file:
         return None
-    group = file[GROUP]
-    labels = [tuple(group[axis].asstr()[()]) for axis in ("i", "j")]
-    if labels[0] != labels[1]:
+    found = KERNEL_GROUP.read(file["kernel"])
+    if found["i"].tolist() != found["j"].tolist():
         raise ValueError("kernel/i and kernel/j name other classes")
-    arrays = {name: group[name][()] for name in KERNEL}
+    arrays = {name: found[name] for name in KERNEL}
     check_kernel(arrays)
     return Kernel(
-        tuple(group["mechanism"].asstr()[()]), group["vertices"][()], labels[0],
-        group["r_eq"][()], arrays,
-    )  # fmt: skip
+        tuple(found["mechanism"]), found["vertices"], tuple(found["i"]), found["r_eq"], arrays
+    )
 
 
 def check_kernel(arrays: Mapping[str, np.ndarray]) -> None:

@@ -11,21 +11,8 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.results.kernel_group import write_kernel
-from flocsim.io.results.schema import (
-    AXES,
-    COORDINATES,
-    DIFFERENCES,
-    EVENTS,
-    FLAGS,
-    LAST_AXES,
-    POOLED,
-    RADII,
-    REPLICATES,
-    TABLE,
-    Results,
-    last_axis,
-)
+from flocsim.io.groups import write_labelled
+from flocsim.io.results.schema import FLOCS, REPLICATES, Results
 
 FORMAT = "flocsim results"
 SCHEMA_VERSION = 5
@@ -98,22 +85,14 @@ def frame_of(results: Results) -> Frame:
     frame = Frame()
     with h5py.File(frame.image, "w") as file:
         file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-        study = {"type": list(results.types), "vertices": results.vertices, "delta": results.delta}
-        lists = {axis: list(words) for axis, words in LAST_AXES.items()}
-        write_group(file, "probabilities", results.probabilities, TABLE, AXES, study | lists)
-        write_radii(file["probabilities"], results)
-        if results.pooled:
-            write_group(file, "pooled", results.pooled, POOLED, AXES[:2], study)
-            write_radii(file["pooled"], results)
-        if results.differences:
-            axes = ("against", "event", *AXES)
-            more = {"against": list(AXES), "event": list(EVENTS)}
-            write_group(file, "differences", results.differences, DIFFERENCES, axes, study | more)
+        for name in ("probabilities", "pooled", "differences"):
+            if getattr(results, name):
+                write_labelled(file.create_group(name), results.labelled(name))
         if results.kernel is not None:
-            write_kernel(file, results.kernel)
+            write_labelled(file.create_group("kernel"), results.kernel.labelled())
         if results.flocs:
-            write_coordinate(file.create_group("flocs"), "floc", list(results.flocs))
-        frame.streams = reserve_replicates(file, study, results)
+            write_labelled(file.create_group("flocs"), FLOCS.labelled({"floc": results.flocs}))
+        frame.streams = reserve_replicates(file, results)
         # Last, so that its length moves no byte of the groups before it.
         group = file.create_group("run")
         for name, value in results.run.items():
@@ -125,78 +104,25 @@ def frame_of(results: Results) -> Frame:
     return frame
 
 
-def write_group(file, name, arrays, schema, axes, coordinates):
-    group = file.create_group(name)
-    lasts = {variable: (last_axis(variable),) for variable in schema if last_axis(variable)}
-    for axis in dict.fromkeys((*axes, *(axis for last in lasts.values() for axis in last))):
-        write_coordinate(group, axis, coordinates[axis])
-    for variable, about in schema.items():
-        dataset = group.create_dataset(variable, data=arrays[variable])
-        annotate(dataset, about, group, (*axes, *lasts.get(variable, ())))
-
-
-def write_radii(group, results):
-    """The radii of the types, coordinates that are no axis: xarray looks for the attribute."""
-    for name, about in RADII.items():
-        annotate(group.create_dataset(name, data=results.radii[name]), about, group, AXES[:1])
-    group.attrs["coordinates"] = " ".join(RADII)
-
-
-def annotate(dataset, about, group, axes):
-    _, unit, text = about
-    dataset.attrs.update({"units": unit, "long_name": text})
-    for number, axis in zip(range(dataset.ndim), axes, strict=False):
-        dataset.dims[number].attach_scale(group[axis])
-
-
-def reserve_replicates(file, study, results):
+def reserve_replicates(file, results):
     """The group of replicates, all but its values; where in the file they go."""
+    labelled, streamed = results.labelled("replicates"), ("replicate", *REPLICATES)
     group = file.create_group("replicates")
-    for axis in AXES:
-        write_coordinate(group, axis, study[axis])
-    flags = FLAGS | {"failure": (tuple(range(len(results.failures))), results.failures)}
-    shape = (*results.shape, results.count)
-    scale = empty_dataset(group, "replicate", (results.count,), "i8")
-    scale.make_scale("replicate")
-    annotate_scale(scale, "replicate")
-    datasets = [scale]
-    for name, about in REPLICATES.items():
-        dataset = empty_dataset(group, name, shape, about[0])
-        annotate(dataset, about, group, (*AXES, "replicate"))
-        if name in flags:
-            values, meanings = flags[name]
-            dataset.attrs["flag_values"] = np.array(values, "u1")
-            dataset.attrs["flag_meanings"] = " ".join(meanings)
-        datasets.append(dataset)
+    datasets = write_labelled(group, labelled, empty_dataset, streamed)
     file.flush()
     return [
-        (dataset.id.get_offset(), dataset.nbytes, dataset.name.rsplit("/", 1)[1])
+        (dataset.id.get_offset(), dataset.nbytes, name)
         for dataset in datasets
-        if dataset.nbytes
+        if (name := dataset.name.rsplit("/", 1)[1]) in streamed and dataset.nbytes
     ]
 
 
-def empty_dataset(group, name, shape, kind):
+def empty_dataset(group, name, values):
     """A dataset with its place in the file, whose values HDF5 does not write."""
     import h5py
 
     plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plan.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plan.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    little = np.dtype(kind).newbyteorder("<")
-    return group.create_dataset(name, shape, little, dcpl=plan)
-
-
-def write_coordinate(group, axis, values):
-    """A dimension scale; words are stored as variable-length UTF-8."""
-    import h5py
-
-    words = isinstance(values, list)
-    scale = group.create_dataset(axis, data=values, dtype=h5py.string_dtype() if words else None)
-    scale.make_scale(axis)
-    annotate_scale(scale, axis)
-
-
-def annotate_scale(scale, axis):
-    unit, text = COORDINATES[axis]
-    scale.attrs.update({"units": unit, "long_name": text})
+    little = values.dtype.newbyteorder("<")
+    return group.create_dataset(name, values.shape, little, dcpl=plan)

@@ -166,7 +166,7 @@ def codes(name):
 
 
 def coordinates():
-    rows = [[f"`{name}`", text] for name, (_, text) in COORDINATES.items()]
+    rows = [[f"`{name}`", text] for name, (_, _, text) in COORDINATES.items()]
     sizes = [[f"`{name}` [m]", text] for name, (_, _, text) in RADII.items()]
     return (
         f"{markdown_table(['axis', 'meaning'], rows)}\n\n"

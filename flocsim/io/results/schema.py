@@ -3,12 +3,15 @@
 The file itself is written and read by `flocsim.io.results.file`, which offers these names too.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.io.groups import Group, declared
+from flocsim.io.hdf5.expected import Declared
+from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import Kernel
 
 OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
@@ -140,23 +143,25 @@ FLAGS = {
     "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
 COORDINATES = {
-    "type": ("1", "collision type, pair of equivalent radii (i-j) or of size classes"),
-    "vertices": ("1", "vertices N of each body; 1 is the equivalent sphere"),
-    "delta": ("1", "horizontal displacement of the centres as a share of delta_max"),
+    "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
+    "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
+    "delta": ("f8", "1", "horizontal displacement of the centres as a share of delta_max"),
     "class": (
+        "text",
         "1",
         "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
     ),
     "bond": (
+        "text",
         "1",
         "certificate: no later load can open it; hook: at rest, and the contacts carry the load, "
         "as statics shows, where attraction could not; rest: it has kept its pose under its load, "
         "without such a proof",
     ),
-    "replicate": ("1", "replicate index"),
-    "floc": ("1", "name of the floc"),
-    "against": ("1", "compared with the condition that comes first along this axis"),
-    "event": ("1", "inside: of all collisions; aggregated: of the decided ones"),
+    "replicate": ("i8", "1", "replicate index"),
+    "floc": ("text", "1", "name of the floc"),
+    "against": ("text", "1", "compared with the condition that comes first along this axis"),
+    "event": ("text", "1", "inside: of all collisions; aggregated: of the decided ones"),
 }
 
 RADII = {
@@ -166,15 +171,31 @@ RADII = {
 """Numbers that stand for each collision type, along the axis `type`."""
 
 
-def last_axis(name: str) -> str | None:
-    """The last axis of an array of `TABLE`, where it has one more than the conditions."""
-    return next((axis for axis in LAST_AXES if axis in name), None)
+def last_axis(name: str) -> tuple[str, ...]:
+    """The last axis of an array of `TABLE`, where it has one more than the conditions; or none."""
+    return tuple(axis for axis in LAST_AXES if axis in name)
 
 
 def tail_of(name: str) -> tuple[int, ...]:
     """The length of `last_axis`, or nothing."""
-    axis = last_axis(name)
-    return () if axis is None else (len(LAST_AXES[axis]),)
+    return tuple(len(LAST_AXES[axis]) for axis in last_axis(name))
+
+
+SIZES = declared(RADII, AXES[:1])
+GROUPS = {
+    "probabilities": Group.of(
+        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
+         for name, (kind, unit, text) in TABLE.items()}, COORDINATES, SIZES,
+    ),
+    "pooled": Group.of(declared(POOLED, AXES[:2]), COORDINATES, SIZES),
+    "differences": Group.of(declared(DIFFERENCES, ("against", "event", *AXES)), COORDINATES),
+    "replicates": Group.of(declared(REPLICATES, (*AXES, "replicate"), FLAGS), COORDINATES),
+}  # fmt: skip
+"""Groups of a results file; the failure codes of the replicates have words of their own in each."""
+FLOCS = Group({}, declared({"floc": COORDINATES["floc"]}, ("floc",)))
+"""The group of the flocs' names."""
+WORDS = LAST_AXES | {"against": AXES, "event": EVENTS}
+"""Axes whose words are the same in every file."""
 
 
 def as_names(names: Iterable) -> tuple[str, ...]:
@@ -256,6 +277,28 @@ class Results:
             if array.shape != shapes[name]:
                 raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shapes[name]}")
         object.__setattr__(self, group, checked)
+
+    def labelled(self, group: str, arrays: Mapping[str, np.ndarray] | None = None) -> Labelled:
+        """A group with its axes; ``arrays``: those of the group, where they are not at hand.
+
+        Replicates that were left on the disk are zeros.
+        """
+        declared = GROUPS[group]
+        found = getattr(self, group) if arrays is None else arrays
+        if group == "replicates":
+            codes = tuple(range(len(self.failures))), self.failures
+            columns = dict(declared.columns)
+            columns["failure"] = attrs.evolve(columns["failure"], codes=codes)
+            declared = attrs.evolve(declared, columns=columns)
+            shape = (*self.shape, self.count)
+            found = found or {
+                name: np.broadcast_to(np.zeros((), each.type), shape)
+                for name, each in columns.items()
+            }
+        axes = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
+        return declared.labelled(
+            {**axes, "replicate": np.arange(self.count), **WORDS, **self.radii, **found}
+        )
 
     @property
     def shape(self) -> tuple[int, int, int]:

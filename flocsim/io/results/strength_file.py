@@ -10,7 +10,6 @@ was asked for has been tested: the file of a survey that still runs, or was stop
 there is so far.
 """
 
-import io
 import json
 import os
 from pathlib import Path
@@ -19,18 +18,16 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.hdf5.expected import Column as Expected
-from flocsim.io.hdf5.expected import check_root, hold_against
+from flocsim.io.files import Rule, keep
+from flocsim.io.groups import Group, check_format, declared, write_groups
+from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.json_text import read_json
-from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.labelled import Labelled
 from flocsim.io.opening import opened_file
-from flocsim.io.results.groups import write_labelled
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
 FORMAT = "flocsim strength"
 SCHEMA_VERSION = 2
-ROOT = {"format": "text", "schema_version": "i8", "about": "text"}
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
 """Words of the codes of ``status``: between two rates; at the lowest rate already; at none; a run
@@ -64,9 +61,15 @@ RATE = {"rate": ("f8", "s-1", "rate at which a share of the doublets has opened;
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
-FURTHER = {
-    "doublet": ("1", "number of the doublet"),
-    "quantile": ("1", "share of the doublets"),
+SCALES = COORDINATES | {
+    "doublet": ("i8", "1", "number of the doublet"),
+    "quantile": ("f8", "1", "share of the doublets"),
+}
+CODES = {"bond": FLAGS["bond"], "status": (range(len(STATUS)), STATUS)}
+
+GROUPS = {
+    "doublets": Group.of(declared(DOUBLETS, ("doublet",), CODES), SCALES),
+    "conditions": Group.of(declared(COUNTS, AXES) | declared(RATE, (*AXES, "quantile")), SCALES),
 }
 
 
@@ -99,67 +102,24 @@ class Strengths:
         return self.conditions.columns[name].values
 
 
-def coordinates(axes: tuple) -> dict[str, Column]:
-    """The scales of types, numbers of vertices and displacements."""
-    types, vertices, delta = axes
-    values = {
-        "type": np.array(list(types), dtype=object), "vertices": np.asarray(vertices, "i8"),
-        "delta": np.asarray(delta, "f8"),
-    }  # fmt: skip
-    return {
-        name: Column((name,), value, about_of(COORDINATES[name])) for name, value in values.items()
-    }
-
-
 def labelled_doublets(columns: dict[str, np.ndarray]) -> Labelled:
     """The group ``doublets`` of plain columns (k,)."""
-    found = {}
-    for name, schema in DOUBLETS.items():
-        kind, notes = schema[0], about_of(schema)
-        flags = FLAGS["bond"] if name == "bond" else (range(len(STATUS)), STATUS)
-        if kind == "u1":
-            notes |= {"flag_values": np.array(flags[0], "u1"), "flag_meanings": " ".join(flags[1])}
-        found[name] = Column(("doublet",), np.asarray(columns[name], kind), notes)
     count = len(next(iter(columns.values())))
-    scale = Column(("doublet",), np.arange(count), about_of(FURTHER["doublet"]))
-    return Labelled({"doublet": scale}, found)
+    return GROUPS["doublets"].labelled({"doublet": np.arange(count), **columns})
 
 
 def labelled_conditions(axes: tuple, columns: dict[str, np.ndarray]) -> Labelled:
-    """The group ``conditions`` of plain arrays."""
-    scales = coordinates(axes)
-    scales["quantile"] = Column(("quantile",), np.array(QUANTILES), about_of(FURTHER["quantile"]))
-    found = {
-        name: Column((*AXES, *(("quantile",) * (name in RATE))), columns[name], about_of(schema))
-        for name, schema in (COUNTS | RATE).items()
-    }
-    return Labelled(scales, found)
+    """The group ``conditions`` of plain arrays; ``axes``: types, numbers of vertices, δ."""
+    scales = dict(zip(AXES, axes, strict=True))
+    return GROUPS["conditions"].labelled({**scales, "quantile": QUANTILES, **columns})
 
 
 def write_strengths(path: str | Path, found: Strengths, rule: Rule = keep) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
-    import h5py
-
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        file.attrs.update(
-            {"format": FORMAT, "schema_version": SCHEMA_VERSION, "about": json.dumps(found.about)}
-        )
-        write_labelled(file.create_group("doublets"), found.doublets)
-        write_labelled(file.create_group("conditions"), found.conditions)
-    write_file(path, seal(image.getvalue()), rule)
-
-
-EXPECTED = {
-    "doublets": {name: Expected(kind, ("doublet",)) for name, (kind, _, _) in DOUBLETS.items()}
-    | {"doublet": Expected("i8", ("doublet",))},
-    "conditions": {name: Expected(kind, AXES) for name, (kind, _, _) in COUNTS.items()}
-    | {name: Expected(kind, (*AXES, "quantile")) for name, (kind, _, _) in RATE.items()}
-    | {
-        "type": Expected("text", ("type",)), "vertices": Expected("i8", ("vertices",)),
-        "delta": Expected("f8", ("delta",)), "quantile": Expected("f8", (len(QUANTILES),)),
-    },
-}  # fmt: skip
+    about = json.dumps(found.about)
+    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "about": about}
+    groups = {"doublets": found.doublets, "conditions": found.conditions}
+    write_groups(path, attributes, groups, rule=rule)
 
 
 def read_strengths(path: str | os.PathLike) -> Strengths:
@@ -167,23 +127,17 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
     with opened_file(
         path, lambda reason: f"{path} holds no readable strengths of bonds: {reason}"
     ) as (file, nodes):
-        check_root(nodes, ROOT)
-        if str(file.attrs["format"]) != FORMAT or int(file.attrs["schema_version"]) != (
-            SCHEMA_VERSION
-        ):
-            raise ValueError(f"its format is not {FORMAT} of version {SCHEMA_VERSION}")
+        check_format(file, nodes, FORMAT, SCHEMA_VERSION, {"about": "text"})
         known = read_json(str(file.attrs["about"]), {})
         if not isinstance(known, dict):
             raise ValueError("its attribute about is no table")
-        hold_against(nodes, EXPECTED, EXPECTED)
-        doublets, conditions = file["doublets"], file["conditions"]
-        types = conditions["type"].asstr()[()].tolist()
-        axes = types, conditions["vertices"][()], conditions["delta"][()]
-        columns = {name: doublets[name][()] for name in DOUBLETS}
-        check_places(columns, tuple(map(len, axes)))
+        wanted = {name: group.arrays for name, group in GROUPS.items()}
+        hold_against(nodes, wanted, wanted, {"quantile": len(QUANTILES)})
+        doublets, conditions = (group.read(file[name]) for name, group in GROUPS.items())
+        check_places(doublets, tuple(len(conditions[axis]) for axis in AXES))
         return Strengths(
-            known, labelled_doublets(columns),
-            labelled_conditions(axes, {name: conditions[name][()] for name in COUNTS | RATE}),
+            known, GROUPS["doublets"].labelled(doublets),
+            GROUPS["conditions"].labelled(conditions | {"quantile": QUANTILES}),
         )  # fmt: skip
 
 

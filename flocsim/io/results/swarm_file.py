@@ -8,9 +8,8 @@
 - ``run``        scalars: config text, versions, machine
 """
 
-import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,14 @@ import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.parts import PointTable, parts_in
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.hdf5.expected import Column as Expected
-from flocsim.io.hdf5.expected import check_root, hold_against
-from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.files import Rule, keep
+from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
+from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.labelled import Labelled
 from flocsim.io.opening import opened_file
-from flocsim.io.results.groups import write_labelled
 
 FORMAT = "flocsim swarm"
 SCHEMA_VERSION = 4
-ROOT = {"format": "text", "schema_version": "i8"}
 
 WALL = -2
 """In `bodies/floc`: a wall."""
@@ -122,18 +119,21 @@ SCALES = {
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
-GROUPS: dict[str, list[tuple[dict, tuple[str, ...]]]] = {
-    "counts": [(COUNTS, MOMENTS), (BY_CLASS, (*MOMENTS, "class"))],
-    "snapshots": [(SNAPSHOTS, (*MOMENTS, "body", "component")), (CLUSTER, (*MOMENTS, "body"))],
-    "bodies": [
-        (BODIES, ("replicate", "body")), (POINTS, ("replicate", "point", "axis")),
-        (RINGS, ("replicate", "point")),
-        (BOX, ("replicate", "axis")),
-    ],
-    "bonds": [(BONDS, ("bond",))],
-    "ends": [(ENDS, ("replicate",))],
+GROUPS = {
+    "counts": Group.of(
+        declared(COUNTS, MOMENTS) | declared(BY_CLASS, (*MOMENTS, "class")), SCALES
+    ),
+    "snapshots": Group.of(
+        declared(SNAPSHOTS, (*MOMENTS, "body", "component"))
+        | declared(CLUSTER, (*MOMENTS, "body")), SCALES,
+    ),
+    "bodies": Group.of(
+        declared(BODIES, ("replicate", "body")) | declared(POINTS, ("replicate", "point", "axis"))
+        | declared(RINGS, ("replicate", "point")) | declared(BOX, ("replicate", "axis")), SCALES,
+    ),
+    "bonds": Group.of(declared(BONDS, ("bond",)), SCALES),
+    "ends": Group.of(declared(ENDS, ("replicate",)), SCALES),
 }  # fmt: skip
-"""Groups → columns and their axes."""
 
 
 @attrs.frozen(eq=False)
@@ -153,17 +153,7 @@ class SwarmResults:
         """A group's arrays with their axes; UsageError for an unknown one."""
         if group not in GROUPS:
             raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
-        columns = {
-            name: Column(axes, self.groups[group][name], about_of(schema[name]))
-            for schema, axes in GROUPS[group]
-            for name in schema
-        }
-        used = dict.fromkeys(axis for column in columns.values() for axis in column.axes)
-        axes = {
-            axis: Column((axis,), np.asarray(self.scales[axis]), about_of(SCALES[axis]))
-            for axis in used
-        }
-        return Labelled(axes, columns)
+        return GROUPS[group].labelled({**self.scales, **self.groups[group]})
 
     def to_xarray(self, group: str = "counts") -> Any:
         """A group as an xarray Dataset."""
@@ -183,17 +173,9 @@ def mean(values: np.ndarray) -> np.ndarray:
 
 def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
-    import h5py
-
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-        for name in GROUPS:
-            write_labelled(file.create_group(name), results.labelled(name))
-        run = file.create_group("run")
-        for name, value in results.run.items():
-            run[name] = value
-    write_file(path, seal(image.getvalue()), rule)
+    groups = {name: results.labelled(name) for name in GROUPS}
+    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION}
+    write_groups(path, attributes, groups, results.run, rule)
 
 
 def read_swarm(path: str | os.PathLike) -> SwarmResults:
@@ -203,61 +185,20 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
         file,
         nodes,
     ):
-        check_root(nodes, ROOT)
-        found = str(file.attrs["format"]), int(file.attrs["schema_version"])
-        if found != (FORMAT, SCHEMA_VERSION):
-            raise ValueError(f"it is no {FORMAT} of version {SCHEMA_VERSION}")
-        hold_against(nodes, {**expected(), "run": scalars(nodes)}, [*GROUPS, "run"])
+        check_format(file, nodes, FORMAT, SCHEMA_VERSION)
+        wanted = {name: group.arrays for name, group in GROUPS.items()}
+        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*GROUPS, "run"])
         scales: dict[str, np.ndarray] = {}
         groups: dict[str, dict[str, np.ndarray]] = {}
-        for name, parts in GROUPS.items():
-            groups[name] = {
-                column: file[name][column][()] for schema, _ in parts for column in schema
-            }
-            for axis in axes_of(parts):
-                dataset = file[name][axis]
-                words = SCALES[axis][0] == "text"
-                values = np.array(dataset.asstr()[()].tolist()) if words else dataset[()]
-                if axis in scales and not np.array_equal(scales[axis], values):
+        for name, group in GROUPS.items():
+            found = group.read(file[name])
+            groups[name] = {column: found[column] for column in group.columns}
+            for axis in group.scales:
+                if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):
                     raise ValueError(f"{name}/{axis} is not that of the other groups")
-                scales[axis] = values
-        run = {name: scalar(dataset) for name, dataset in file["run"].items()}
+        run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)
-
-
-def axes_of(parts: Sequence[tuple[dict, tuple[str, ...]]]) -> list[str]:
-    """The axes of a group, each once."""
-    return list(dict.fromkeys(axis for _, axes in parts for axis in axes))
-
-
-def expected() -> dict[str, dict[str, Expected]]:
-    """{group: {dataset: Expected}}."""
-    groups = {}
-    for name, parts in GROUPS.items():
-        columns = {
-            column: Expected(about[0], axes) for schema, axes in parts
-            for column, about in schema.items()
-        }  # fmt: skip
-        groups[name] = columns | {
-            axis: Expected(SCALES[axis][0], (axis,)) for axis in axes_of(parts)
-        }
-    return groups
-
-
-def scalars(nodes: Mapping[str, Any]) -> dict[str, Expected]:
-    """What the group ``run`` holds: any scalars."""
-    inside = [path for path, node in nodes.items() if path.startswith("run/") and node.type]
-    return {
-        path.partition("/")[2]: Expected(nodes[path].type) for path in inside
-        if nodes[path].type in ("text", "i8", "f8")
-    }  # fmt: skip
-
-
-def scalar(dataset: Any) -> Any:
-    """A scalar of the group ``run``."""
-    value = dataset[()]
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value.item()
 
 
 def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:

@@ -26,10 +26,10 @@ for every N, so that between conditions nothing changes but N.  Every dataset ha
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
 
-import io
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,9 +41,11 @@ from flocsim.geometry.shapes.parts import Part, PointTable, is_compound, parts_i
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.hdf5.expected import Column, hold_against
+from flocsim.io.files import Rule, keep
+from flocsim.io.groups import column_of, declared, values_of, write_groups
+from flocsim.io.hdf5.expected import Declared, hold_against
 from flocsim.io.hdf5.structure import Node
+from flocsim.io.labelled import Labelled
 from flocsim.io.opening import opened_file, text_of
 
 if TYPE_CHECKING:
@@ -64,30 +66,43 @@ LARGEST = 1.0
 """Metres beyond which nothing of a floc lies."""
 MOST_PIXELS = 1e12
 
-FLOC_COLUMNS = {
-    # name: (attribute of ShapeEntry, type, units, long name)
-    "id": ("floc_id", str, "", "picture and region"),
-    "image": ("image", str, "", "file name of the picture"),
-    "pixel_size": ("pixel_size", float, "m", "length of a pixel's side"),
-    "centroid": ("centroid", float, "px", "centroid in the picture, x right and y down"),
-    "area": ("area", np.int64, "px", "pixels of the mask"),
-    "equivalent_radius": ("equivalent_radius", float, "px", "radius of the circle of equal area"),
-    "spheroradius": ("spheroradius", float, "px", "spheroradius asked for"),
-}
+FLOC_COLUMNS = declared(
+    {
+        "id": ("text", "", "picture and region"),
+        "image": ("text", "", "file name of the picture"),
+        "pixel_size": ("f8", "m", "length of a pixel's side"),
+        "centroid": ("f8", "px", "centroid in the picture, x right and y down"),
+        "area": ("i8", "px", "pixels of the mask"),
+        "equivalent_radius": ("f8", "px", "radius of the circle of equal area"),
+        "spheroradius": ("f8", "px", "spheroradius asked for"),
+    },
+    ("floc",),
+)
+FLOC_COLUMNS["centroid"] = attrs.evolve(FLOC_COLUMNS["centroid"], axes=("floc", 2))
 
 FIT_COLUMNS = {
-    "vertices": ("m", "vertices around the floc's centroid, x right and y up"),
-    "radius": ("m", "spheroradius"),
-    "relative_error": ("percent", "pixels that differ, in percent of the mask's pixels"),
+    "vertices": ("f8", "m", "vertices around the floc's centroid, x right and y up"),
+    "radius": ("f8", "m", "spheroradius"),
+    "relative_error": ("f8", "percent", "pixels that differ, in percent of the mask's pixels"),
+}
+POINT_COLUMNS = {
+    "part": ("i8", "", "part of the floc that a vertex belongs to"),
+    "ring": ("i8", "", "ring of the part: 0 its outline, from 1 its holes"),
+    "point_radius": ("f8", "m", "spheroradius of the part"),
 }
 
+ATTRIBUTES = {
+    "id": "floc_id", "part": "points.part", "ring": "points.ring",
+    "point_radius": "points.radius",
+}  # fmt: skip
+"""What a column holds of a ShapeEntry or a StoredFit, where that has another name."""
 
-POINT_COLUMNS: dict[str, tuple[str, type, str, str]] = {
-    # name: (column of a PointTable, type, units, long name)
-    "part": ("part", np.int64, "", "part of the floc that a vertex belongs to"),
-    "ring": ("ring", np.int64, "", "ring of the part: 0 its outline, from 1 its holes"),
-    "point_radius": ("radius", float, "m", "spheroradius of the part"),
-}
+
+def fits_at(count: int, compound: bool) -> dict[str, Declared]:
+    """The columns of fits with so many vertices; ``compound``: of flocs with holes or parts."""
+    columns = declared(FIT_COLUMNS, ("floc",))
+    columns["vertices"] = attrs.evolve(columns["vertices"], axes=("floc", count, 2))
+    return columns | (declared(POINT_COLUMNS, ("floc", count)) if compound else {})
 
 
 @attrs.frozen(eq=False)
@@ -186,8 +201,6 @@ def write_library(
     Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
     written.
     """
-    import h5py
-
     entries = list(entries)
     if not entries:
         raise UsageError("a shape library needs at least one floc, found none")
@@ -206,32 +219,22 @@ def write_library(
         )
 
     compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
-    image = io.BytesIO()
-    with h5py.File(image, "w", track_order=False) as file:
-        file.attrs["kind"] = KIND
-        file.attrs["schema_version"] = COMPOUND_VERSION if compound else SCHEMA_VERSION
-        file.attrs.update(settings or {})
-        group = file.create_group("flocs")
-        for name, (attribute, kind, units, long_name) in FLOC_COLUMNS.items():
-            values = [getattr(entry, attribute) for entry in entries]
-            dtype = h5py.string_dtype() if kind is str else kind
-            _write_column(group, name, np.array(values, dtype=dtype), units, long_name)
-        for count in sorted(entries[0].fits):
-            group = file.create_group(f"fits/{count}")
-            fits = [entry.fits[count] for entry in entries]
-            for name, (units, long_name) in FIT_COLUMNS.items():
-                column = np.array([getattr(fit, name) for fit in fits], dtype=float)
-                _write_column(group, name, column, units, long_name)
-            if compound:
-                write_rings(group, [fit.points for fit in fits])
-    write_file(path, seal(image.getvalue()), rule)
+    groups = {"flocs": labelled(FLOC_COLUMNS, entries)}
+    for count in sorted(entries[0].fits):
+        fits = [entry.fits[count] for entry in entries]
+        groups[f"fits/{count}"] = labelled(fits_at(count, compound), fits)
+    version = COMPOUND_VERSION if compound else SCHEMA_VERSION
+    attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
+    write_groups(path, attributes, groups, rule=rule)
 
 
-def write_rings(group, tables):
-    """The columns of POINT_COLUMNS of some fits."""
-    for name, (attribute, kind, units, long_name) in POINT_COLUMNS.items():
-        values = np.array([getattr(table, attribute) for table in tables], dtype=kind)
-        _write_column(group, name, values, units, long_name)
+def labelled(columns, owners):
+    """What columns hold of some owners."""
+    found = {}
+    for name, each in columns.items():
+        value = attrgetter(ATTRIBUTES.get(name, name))
+        found[name] = column_of(each, [value(owner) for owner in owners])
+    return Labelled({}, found)
 
 
 def reach_of(entry):
@@ -239,12 +242,6 @@ def reach_of(entry):
     return max(
         max(np.abs(fit.vertices).max(), fit.points.radius.max()) for fit in entry.fits.values()
     )
-
-
-def _write_column(group, name, values, units, long_name):
-    dataset = group.create_dataset(name, data=values, track_times=False)
-    dataset.attrs["units"] = units
-    dataset.attrs["long_name"] = long_name
 
 
 def is_library(path: str | os.PathLike) -> bool:
@@ -297,26 +294,13 @@ def opened(path: str | os.PathLike) -> AbstractContextManager[tuple[Any, dict[st
 
 def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
     """ValueError unless the groups and datasets of a file are those of a shape library."""
-    kinds = {str: "text", float: "f8", np.int64: "i8"}
-    columns = {
-        name: Column(kinds[kind], ("floc", 2) if name == "centroid" else ("floc",))
-        for name, (_, kind, *_) in FLOC_COLUMNS.items()
-    }
-    groups: dict[str, dict[str, Column]] = {"flocs": columns, "fits": {}}
+    groups: dict[str, Mapping[str, Declared]] = {"flocs": FLOC_COLUMNS, "fits": {}}
     for path in nodes:
         group, _, count = path.rpartition("/")
         if group == "fits":
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
                 raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
-            groups[path] = {
-                name: Column("f8", ("floc", int(count), 2) if name == "vertices" else ("floc",))
-                for name in FIT_COLUMNS
-            }
-            if compound:
-                groups[path] |= {
-                    name: Column(kinds[about[1]], ("floc", int(count)))
-                    for name, about in POINT_COLUMNS.items()
-                }
+            groups[path] = fits_at(int(count), compound)
     lengths = hold_against(nodes, groups, groups)
     if lengths["floc"] < 1 or len(groups) < 3:
         raise ValueError("there are no flocs")
@@ -328,18 +312,15 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
 def _entries(file):
     """The ShapeEntries of an open library; ValueError for values that cannot be."""
     flocs = {}
-    for name, (attribute, kind, *_) in FLOC_COLUMNS.items():
-        dataset = file["flocs"][name]
-        if kind is str:
-            flocs[attribute] = [str(text) for text in dataset.asstr()[()]]
-        else:
-            values = dataset[()]
+    for name, declared_as in FLOC_COLUMNS.items():
+        values = values_of(file["flocs"][name])
+        if declared_as.type != "text":
             least = -MOST_PIXELS if name == "centroid" else 0.0
             most = LARGEST if name == "pixel_size" else MOST_PIXELS
             inside = (values >= least) & (values <= most) & (values != 0 if least == 0.0 else True)
             if not inside.all():
                 raise ValueError(f"flocs/{name} holds values that are no numbers of a floc's")
-            flocs[attribute] = values.tolist()
+        flocs[ATTRIBUTES.get(name, name)] = values.tolist()
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have one id")
@@ -374,7 +355,7 @@ def _tables(count, group, vertices, radius):
     """The PointTables of all flocs at N = ``count``; None for those of one ring."""
     if "part" not in group:
         return [None] * len(vertices)
-    columns = {column: group[name][()] for name, (column, *_) in POINT_COLUMNS.items()}
+    columns = {ATTRIBUTES[name].removeprefix("points."): group[name][()] for name in POINT_COLUMNS}
     wide = columns["radius"]
     if not np.all((wide > 0.0) & (wide <= LARGEST)) or np.any(wide.min(axis=1) != radius):
         raise ValueError(f"fits/{count}/point_radius holds values that are no radii of a floc's")

@@ -116,7 +116,7 @@ def check(found, folder):
         else:
             assert part.count == label
         for axis in ("type", "vertices", "delta"):
-            assert table.axes[axis].values.tolist() == part.coordinate(axis).values.tolist()
+            assert table.axes[axis].values.tolist() == part.labelled().axes[axis].values.tolist()
         for column, values in part.probabilities.items():
             np.testing.assert_array_equal(table.columns[column].values[place], values)
 
