@@ -12,7 +12,7 @@ from flocsim.body import Body
 from flocsim.commands import init
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.page import schema_page
+from flocsim.ensembles.config.page import config_parts
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
     FORCES,
@@ -28,6 +28,7 @@ from flocsim.ensembles.config.schema import (
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.io.markdown import with_parts
 from tests.helpers.small_study import write_star_library
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -241,7 +242,7 @@ def test_commented_settings_of_the_example_are_valid_too(tmp_path):
         "import attrs\nfrom flocsim.forces import CentreForce\n\n\n@attrs.frozen\n"
         "class Yukawa(CentreForce):\n    @staticmethod\n    def kernel(pair):\n        return 0.0\n"
     )
-    text = uncommented(init.EXAMPLE)
+    text = uncommented((init.TEMPLATES / "study.toml").read_text("utf-8"))
     text = text.replace("What follows", "# What follows").replace("\ndistance", "\n# distance")
     text = text.replace("\ncentre", "\n# centre")
     path = tmp_path / "study.toml"
@@ -253,17 +254,20 @@ def test_commented_settings_of_the_example_are_valid_too(tmp_path):
 
 def test_the_page_of_all_keys_is_current():
     page = (ROOT / "docs" / "config.md").read_text("utf-8")
-    assert page == schema_page(), "run: python -m flocsim.ensembles.config.page > docs/config.md"
+    command = "python -m flocsim.ensembles.config.page docs/config.md"
+    assert page == with_parts(page, config_parts()), f"run: {command}"
 
 
 def test_the_page_names_every_key():
-    page = schema_page()
+    page = config_parts()["keys"]
     for table_class in [*TABLES.values(), *FORCES.values()]:
         assert all(f"| `{key}` |" in page for key in keys_of(table_class))
 
 
 def test_the_pages_defaults_are_valid_toml():
-    rows = [line.split(" | ") for line in schema_page().split("\n") if line.startswith("| `")]
+    rows = [
+        line.split(" | ") for line in config_parts()["keys"].split("\n") if line.startswith("| `")
+    ]
     defaults = [cells[2] for cells in rows if len(cells) == 4 and cells[2].startswith("`")]
     assert len(defaults) > 20
     for default in defaults:
