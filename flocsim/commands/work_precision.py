@@ -4,19 +4,20 @@ With `--replicate 17`, error against run time of one collision (the other is
 `flocsim.commands.precision.ladder`).
 """
 
+import math
 from argparse import Namespace
 from typing import Any
 
 import attrs
 
 from flocsim.commands.precision import ladder
+from flocsim.commands.precision.judged import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.studies.replicates import one_count_study
-from flocsim.errors import FlocsimError
+from flocsim.ensembles.studies.replicates import one_count_study, with_one_count
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-from flocsim.integrators.amplification import end_distance
+from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import OUTCOMES
 
 TIGHTEST = 1e-13
@@ -30,8 +31,6 @@ STEP_COUNTS = (1_000, 10_000, 100_000)
 MOST_STEPS = 1_000_000
 """Steps after which a method counts as having failed."""
 
-HEADER = f"{'method':<16}{'setting':>11}{'error [m]':>12}{'time [ms]':>12}{'steps':>9}  end"
-
 
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
@@ -40,7 +39,7 @@ def add_parser(subparsers: Any) -> None:
         description="Run some replicates of a study by every method and tolerance that "
         'accuracy = "auto" may choose, and print how many outcomes flip, how far d_c is off, and '
         "what it takes. With --replicate: one replicate by every integrator over six decades of "
-        "tolerance, to the time at which it is decided, and how far its end is from the reference.",
+        "tolerance, and how far it is from the reference where the first of both is decided.",
     )
     add_replicate(parser)
     ladder.add_arguments(parser)
@@ -48,44 +47,12 @@ def add_parser(subparsers: Any) -> None:
     return parser
 
 
-def methods(duration):
-    """(name, setting as text, integrator) of all runs."""
-    for method in (Implicit, DormandPrince54):
-        for tolerance in TOLERANCES:
-            yield method.__name__, f"{tolerance:.0e} m", method(tolerance)
-    for count in STEP_COUNTS:
-        step = duration / count
-        yield "VelocityVerlet", f"{step:.1e} s", VelocityVerlet(step)
-
-
-def reference(system, duration):
-    """The end (n, 3) of the tightest run; FlocsimError where it does not end."""
-    found = attrs.evolve(system, integrator=Implicit(TIGHTEST)).run(
-        duration, max_steps=MOST_STEPS, record=False
-    )
-    if found.status.name != "FINISHED":
-        raise FlocsimError(f"no reference: {found.status.reason}")
-    return found.position[-1]
-
-
-def row(system, duration, exact, name, setting, integrator):
-    """One line of the table; no error is shown for a run that failed."""
-    system = attrs.evolve(system, integrator=integrator)
-    # The faster of two: the first may have compiled.
-    runs = [system.run(duration, max_steps=MOST_STEPS, record=False) for _ in range(2)]
-    found = min(runs, key=lambda each: each.wall_time)
-    error = "-"
-    if found.status.name == "FINISHED":
-        error = f"{end_distance(system.bodies, found.position[-1], exact):.1e}"
-    time, end = f"{1e3 * found.wall_time:.2f}", found.status.name.lower().replace("_", " ")
-    return f"{name:<16}{setting:>11}{error:>12}{time:>12}{found.steps:>9}  {end}"
-
-
-def replicate(config, place, number):
-    """(System where the replicate starts, how long [s] until it is decided, its row)."""
-    study = one_count_study(config, place[1])
-    found = study.run(*place, number)
-    return study.draw(*place, number).system(), float(found["t_end"]), found
+def methods(duration: float) -> list[Integrator]:
+    """The methods of all runs of a collision that takes so long [s]."""
+    found: list[Integrator] = [
+        method(tolerance) for method in (Implicit, DormandPrince54) for tolerance in TOLERANCES
+    ]
+    return found + [VelocityVerlet(duration / count) for count in STEP_COUNTS]
 
 
 def run(args: Namespace) -> int:
@@ -96,14 +63,17 @@ def run(args: Namespace) -> int:
     config = load_config(args.config)
     place = select(config, args)
     check_study(config)
-    system, duration, found = replicate(config, place, args.replicate)
-    exact = reference(system, duration)
-    name = config.scene.names[place[0]]
+    found = one_count_study(config, place[1]).run(*place, args.replicate)
+    assert found is not None
     print(
-        f"type {name}, N = {place[1]}, delta = {place[2]:g}, replicate {args.replicate}: "
-        f"{OUTCOMES[found['outcome']]} after {1e3 * duration:.4g} ms"
+        f"type {config.scene.names[place[0]]}, N = {place[1]}, delta = {place[2]:g}, replicate "
+        f"{args.replicate}: {OUTCOMES[found['outcome']]} after {1e3 * found['t_end']:.4g} ms\n"
+        f"error: of any point of an outline, where it or Implicit at {TIGHTEST:.0e} m is decided "
+        f"first, against that\n\n{HEADER}"
     )
-    print(f"error: of any point of an outline, against Implicit at {TIGHTEST:.0e} m\n\n{HEADER}")
-    for method in methods(duration):
-        print(row(system, duration, exact, *method), flush=True)
+    most = attrs.evolve(config.integrator, max_steps=MOST_STEPS)
+    checker = Checker(attrs.evolve(with_one_count(config, place[1]), integrator=most))
+    for method in methods(found["t_end"]):
+        case = Case(place[0], place[1], math.nan, method, place[2], args.replicate)
+        print(line_of(config, case, checker.judge(case, TIGHTEST)), flush=True)
     return 0

@@ -1,1 +1,1 @@
-"""What `flocsim work-precision` is made of: the whole ladder of both methods."""
+"""What `flocsim check` and `flocsim work-precision` print: runs against exact ones, ladders."""
