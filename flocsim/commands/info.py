@@ -121,8 +121,7 @@ def swarm_text(path):
         warnings = stored(results.run, "warnings")
     except ValueError as error:
         raise FileError(f"{path} holds no readable results of a swarm: {error}") from error
-    lines = [f"{name:<19} {value}" for name, value in facts]
-    lines += [f"warning: {visible(line, '')}" for line in warnings]
+    lines = [*fact_lines(facts), *(f"warning: {visible(line, '')}" for line in warnings)]
     return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table_of(results)])
 
 
@@ -133,13 +132,10 @@ def library_text(path):
     facts = [
         ("shapes", f"{len(entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
-        *(
-            (name.replace("_", " "), visible(str(value), ""))
-            for name, value in read_settings(path).items()
-        ),
+        *((name.replace("_", " "), str(value)) for name, value in read_settings(path).items()),
     ]
-    lines = [f"{name:<14} {value}" for name, value in facts]
-    return "\n".join([f"{path}: a shape library", "", *lines, "", format_errors(entries)])
+    heading = f"{path}: a shape library"
+    return "\n".join([heading, "", *fact_lines(facts), "", format_errors(entries)])
 
 
 @attrs.frozen
@@ -173,10 +169,7 @@ def summary(path: str, results: Results, totals: Totals) -> Summary:
 
 def results_text(path, results, totals):
     said = summary(path, results, totals)
-    facts = said.facts + said.origin
-    width = max(len(name) for name, _ in facts)
-    lines = [f"{path}: results of a collision ensemble", ""]
-    lines += [f"{name:<{width}}  {visible(value, '')}" for name, value in facts]
+    lines = [f"{path}: results of a collision ensemble", "", *fact_lines(said.facts + said.origin)]
     if said.warnings:
         lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
     if said.failed:
@@ -187,6 +180,12 @@ def results_text(path, results, totals):
     if results.kernel is not None:
         return "\n".join([*lines, "", *kernel_lines(results.kernel)])
     return "\n".join([*lines, *efficiency_block(results), "", table])
+
+
+def fact_lines(facts):
+    """[(name, value)] as aligned lines; what a file says is shown, and steers no terminal."""
+    width = max(len(name) for name, _ in facts)
+    return [f"{visible(name, ''):<{width}}  {visible(value, '')}" for name, value in facts]
 
 
 def efficiency_block(results):
@@ -214,9 +213,8 @@ def trajectory_text(path):
     for name, value in found.facts.items():
         if name != "config":
             told = f"{value:.6g}" if isinstance(value, float) else str(value)
-            facts.append((visible(name.replace("_", " "), ""), visible(told, "")))
-    width = max(len(name) for name, _ in facts)
-    return "\n".join([f"{path}: a trajectory", "", *(f"{n:<{width}}  {v}" for n, v in facts)])
+            facts.append((name.replace("_", " "), told))
+    return "\n".join([f"{path}: a trajectory", "", *fact_lines(facts)])
 
 
 def sweep_text(path):
@@ -256,11 +254,9 @@ def strength_text(path):
     facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
     for name, value in found.about.items():
         if name not in ("asked", "complete"):
-            facts.append((visible(name.replace("_", " "), ""), visible(str(value), "")))
-    width = max(len(name) for name, _ in facts)
-    lines = [f"{name:<{width}}  {value}" for name, value in facts]
+            facts.append((name.replace("_", " "), str(value)))
     kind = "strengths of bonds" + ("" if found.complete else ", unfinished")
-    return "\n".join([f"{path}: {kind}", "", *lines, "", table_of(found)])
+    return "\n".join([f"{path}: {kind}", "", *fact_lines(facts), "", table_of(found)])
 
 
 def unfinished_text(found):
@@ -270,18 +266,17 @@ def unfinished_text(found):
     planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
     counts = results.probabilities["n_total"]
     facts = [
-        ("types", ", ".join(visible(name, "") for name in results.types)),
+        ("types", ", ".join(results.types)),
         ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
         ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
         ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
          f"{planned}"),
         ("numerical error", checked_line(results) or "unknown: none was run again yet"),
-        ("begun", visible(f"{last['date']} by {last['command']}", "")),
+        ("begun", f"{last['date']} by {last['command']}"),
     ]  # fmt: skip
     if found.unread:
         facts.append(("damaged", f"{found.unread} bytes of rows, left out"))
-    lines = [f"{found.path}: {found.progress}", ""]
-    lines += [f"{name:<18} {value}" for name, value in facts]
+    lines = [f"{found.path}: {found.progress}", "", *fact_lines(facts)]
     shown = reasons.most_common(MOST_FAILURES)
     lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
@@ -306,7 +301,7 @@ def conditions(results):
 def sizes(results, totals):
     """[(name, value)] of the radii of the types, and between which values the replicates were."""
     known = [
-        f"{visible(name, '')}: {1e6 * i:.4g}, {1e6 * j:.4g}"
+        f"{name}: {1e6 * i:.4g}, {1e6 * j:.4g}"
         for name, i, j in zip(
             results.types, results.radii["r_i"], results.radii["r_j"], strict=True
         )
@@ -314,7 +309,7 @@ def sizes(results, totals):
     ]
     facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
     if classes := class_words(stored(results.run, "size_classes")):
-        facts.insert(0, ("size classes", visible(classes.partition(": ")[2], "")))
+        facts.insert(0, ("size classes", classes.partition(": ")[2]))
     units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
     words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
     for name, (low, high) in totals.spans.items():
@@ -355,8 +350,8 @@ def settling(run):
     """[(name, value)] of the bodies at their terminal speeds, a line for each collision type."""
     types: dict[str, list[str]] = {}
     for each in stored(run, "settling"):
-        number = f"{visible(each['body'], '')} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
-        types.setdefault(visible(each["type"], ""), []).append(number)
+        number = f"{each['body']} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
+        types.setdefault(each["type"], []).append(number)
     return [("settling", f"{name}: {', '.join(numbers)}") for name, numbers in types.items()]
 
 
@@ -364,7 +359,7 @@ def thermal(run):
     """[(name, value)] of what integrals say of equivalent spheres, for each type of a brownian
     study."""
     found = stored(run, "equivalent_spheres")
-    return [("thermal", f"{visible(each['type'], '')}: {sphere_words(each)}") for each in found]
+    return [("thermal", f"{each['type']}: {sphere_words(each)}") for each in found]
 
 
 def origin(run):
@@ -375,7 +370,7 @@ def origin(run):
             continue
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
-        facts.append((visible(name.replace("_", " "), ""), visible(str(value), "")))
+        facts.append((name.replace("_", " "), str(value)))
     kinds = stored(run, "cpus")
     names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
     return [*facts, ("kind of CPU", "; ".join(names))] if names else facts

@@ -19,8 +19,6 @@ from flocsim.forces import Contact, ContactForce
 PARTS = 16
 """Intervals of the work of the contact force, an even number."""
 
-HALVINGS = 60
-
 
 def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
     """Deepest overlap [m] of a mass [kg] at a speed [m/s] on a spring [N/m] and dashpot [N s/m]."""
@@ -75,13 +73,12 @@ def stiffness_for(
         more = math.sqrt(factor) if scales else 1.0
         return depth(speed, mass, factor * stiffness, more * damping)
 
-    low, high = 1.0, 2.0
+    from scipy.optimize import brentq
+
+    high = 2.0
     while found(high) > deepest:
         high *= 2.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if found(middle) > deepest else (low, middle)
-    return high * stiffness
+    return stiffness * float(brentq(lambda factor: found(factor) - deepest, 1.0, high))
 
 
 def rounded_up(value: float) -> float:

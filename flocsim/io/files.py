@@ -8,7 +8,6 @@ import contextlib
 import ctypes
 import enum
 import errno
-import hashlib
 import itertools
 import os
 import secrets
@@ -20,14 +19,12 @@ from typing import BinaryIO
 import attrs
 
 from flocsim.errors import FileError
-from flocsim.io.pieces import PIECES_LINE, is_in_pieces, size_of_pieces
+from flocsim.io.pieces import PIECES_LINE, digest_at, digest_of, is_in_pieces, size_of_pieces
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
 SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
 DAMAGED = "is damaged, its checksum is wrong: use a copy or run it again"
-BLOCK = 2**20
-"""Bytes that are read at a time."""
 
 NO_SPACE_TAKEN = {errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
 """What file systems answer that cannot take the space of a file beforehand."""
@@ -134,8 +131,7 @@ def fresh_beside(target: Path, length: int = 0) -> tuple[Path, int]:
 
 def left_over_prefix(target):
     """How the temporary names of one target begin, short however long its own name is."""
-    digest = hashlib.blake2b(os.fsencode(target.name), digest_size=6).hexdigest()
-    return f".flocsim-{digest}-"
+    return f".flocsim-{digest_of(os.fsencode(target.name), 6).hex()}-"
 
 
 def remove_left_over(target):
@@ -272,7 +268,7 @@ def reserve(descriptor, size):
 
 
 def seal_of(digest):
-    return SEAL_MARK + digest.hexdigest().encode() + b"\n"
+    return SEAL_MARK + digest.hex().encode() + b"\n"
 
 
 def ordinary_target(path: str | os.PathLike) -> Path:
@@ -378,7 +374,7 @@ def end_of(file):
 
 def seal(data: bytes) -> bytes:
     """The bytes of an HDF5 file with their checksum appended."""
-    return data + seal_of(hashlib.blake2b(data, digest_size=32))
+    return data + seal_of(digest_of(data))
 
 
 def read_sealed(path: str | os.PathLike) -> bytes:
@@ -427,11 +423,6 @@ def check_seal(path, file):
             f"{path} does not end in flocsim's checksum: it is of another kind, was cut short or "
             "was changed by another program; use the original file"
         )
-    digest, left = hashlib.blake2b(digest_size=32), size
-    file.seek(0)
-    while block := file.read(min(left, BLOCK)):
-        digest.update(block)
-        left -= len(block)
-    if seal_of(digest) != tail:
+    if seal_of(digest_at(file, 0, size)[0]) != tail:
         raise FileError(f"{path} {DAMAGED}")
     return size

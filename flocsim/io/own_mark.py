@@ -5,12 +5,13 @@ can be drawn again from the data, so a new one may take its place. A photograph,
 another program, or one that was touched up by hand has no mark or a wrong one.
 """
 
-import hashlib
 import os
 import stat
 import struct
 import zlib
 from pathlib import Path
+
+from flocsim.io.pieces import digest_of
 
 NAME = b"flocsim blake2b-256"
 
@@ -51,7 +52,7 @@ def marked(data: bytes, suffix: str) -> bytes:
     """The bytes of a figure or page with their mark; ``suffix`` such as ".png" tells the format."""
     remark, after = PLACES[suffix]
     end = len(data) - after
-    return data[:end] + remark(digest_of(data)) + data[end:]
+    return data[:end] + remark(digest_of(data).hex().encode()) + data[end:]
 
 
 def is_marked(data: bytes, suffix: str) -> bool:
@@ -62,10 +63,6 @@ def is_marked(data: bytes, suffix: str) -> bool:
     end = len(data) - after
     start = end - len(remark(b"0" * 64))
     return start >= 0 and marked(data[:start] + data[end:], suffix) == data
-
-
-def digest_of(data):
-    return hashlib.blake2b(data, digest_size=32).hexdigest().encode()
 
 
 def is_own(path: Path) -> bool:

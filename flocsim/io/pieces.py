@@ -22,9 +22,9 @@ BLOCK = 2**20
 """Bytes that are read at a time."""
 
 
-def digest_of(data: bytes | memoryview) -> bytes:
-    """The digest of a piece."""
-    return hashlib.blake2b(data, digest_size=32).digest()
+def digest_of(data: bytes | memoryview, size: int = 32) -> bytes:
+    """The blake2b digest of some data, of so many bytes."""
+    return hashlib.blake2b(data, digest_size=size).digest()
 
 
 def seal_of_pieces(table: np.ndarray) -> bytes:
@@ -70,7 +70,7 @@ def size_of_pieces(file: BinaryIO) -> int | None:
     place = 0
     for entries in table_blocks(file, size, number):
         for length, digest in entries.tolist():
-            if digest_at(file, place, length) != digest:
+            if digest_at(file, place, length) != (digest, length):
                 return None
             place += length
     return size
@@ -85,11 +85,12 @@ def table_blocks(file: BinaryIO, start: int, number: int) -> Iterator[np.ndarray
         yield np.frombuffer(data[: len(data) // PIECE.itemsize * PIECE.itemsize], PIECE)
 
 
-def digest_at(file: BinaryIO, place: int, length: int) -> bytes:
-    """The digest of a piece as it stands in an open file."""
-    found = hashlib.blake2b(digest_size=32)
+def digest_at(file: BinaryIO, place: int, length: int, size: int = 32) -> tuple[bytes, int]:
+    """(digest, length) of the data at a place in an open file, which may be shorter than asked
+    for."""
+    found, left = hashlib.blake2b(digest_size=size), length
     file.seek(place)
-    while length and (block := file.read(min(length, BLOCK))):
+    while left and (block := file.read(min(left, BLOCK))):
         found.update(block)
-        length -= len(block)
-    return found.digest()
+        left -= len(block)
+    return found.digest(), length - left

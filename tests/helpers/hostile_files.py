@@ -318,11 +318,12 @@ def change_json(rng, value):
 def encode_words(kind, words, data):
     """A record of any words, with right checksums."""
     template = encode(kind, {}, data)
-    from flocsim.io.journal.records import CHECKED, HEAD, digest
+    from flocsim.io.journal.records import CHECKED, HEAD
+    from flocsim.io.pieces import digest_of
 
     mark, kind, _, length, data_digest, _ = HEAD.unpack_from(template)
     head = HEAD.pack(mark, kind, len(words), length, data_digest, b"")[:CHECKED]
-    return b"".join([head, digest(head + words, 8), words, data])
+    return b"".join([head, digest_of(head + words, 8), words, data])
 
 
 def journal_file(rng, folder, parts):

@@ -10,7 +10,7 @@ study, q belongs to a type; a reference at s₀ is off by itself, and adds q g(s
 Flips seen are Poisson distributed around n q (g(s) + g(s₀)). Before anything is seen q has a gamma
 distribution of mean FLIPS and shape SHAPE, β a normal one, of those that the scenes of
 benchmarks/accuracy/auto.py have. What is then known of a rate is a mixture of gamma distributions
-over β, whose quantiles are found by halving. Few flips thus leave a wide distribution, and none at
+over β. Few flips thus leave a wide distribution, and none at
 all the width of what was there before and of how many were run.
 """
 
@@ -65,20 +65,17 @@ class Belief(NamedTuple):
 
     def bound(self, rung: float, confidence: float) -> float:
         """What the rate of flips at a rung stays below with that probability."""
+        from scipy.optimize import brentq
         from scipy.special import gammainc
 
-        scaled = self.rates / falls(rung)
-        low, high = 0.0, 1.0
-        while np.sum(self.weights * gammainc(self.shape, scaled * high)) < confidence:
+        scaled, high = self.rates / falls(rung), 1.0
+
+        def beyond(rate):
+            return float(np.sum(self.weights * gammainc(self.shape, scaled * rate))) - confidence
+
+        while beyond(high) < 0.0:
             high *= 2.0
-        # As fine as a rate of flips can mean anything.
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if np.sum(self.weights * gammainc(self.shape, scaled * middle)) < confidence:
-                low = middle
-            else:
-                high = middle
-        return high
+        return float(brentq(beyond, 0.0, high, xtol=1e-15))
 
 
 def beliefs(seen: Sequence[Sequence[Seen]]) -> list[Belief]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, STARTS, Condition, Interval, merged, missing
 from flocsim.errors import FileError
-from flocsim.io.journal.records import digest as digest_of
+from flocsim.io.pieces import digest_of
 from flocsim.io.results.schema import ROW_SIZE
 
 ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8"), ("digest", "V16")])

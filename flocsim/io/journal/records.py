@@ -10,7 +10,6 @@ the next record is looked for by its mark. A file that was made to keep its read
 after a while: what is left of it then counts as damaged.
 """
 
-import hashlib
 import json
 import struct
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from typing import Any, BinaryIO
 import attrs
 
 from flocsim.io.json_text import read_json
+from flocsim.io.pieces import digest_at, digest_of
 
 MARK = b"\x93FLOCREC"
 HEAD = struct.Struct("<8sIIQ16s8s")
@@ -58,14 +58,10 @@ class Damage:
     is_cut: bool = False
 
 
-def digest(data, size):
-    return hashlib.blake2b(data, digest_size=size).digest()
-
-
 def encode(kind: int, description: dict[str, Any], data: bytes = b"") -> bytes:
     words = json.dumps(description, sort_keys=True, ensure_ascii=False).encode("utf-8", "replace")
-    head = HEAD.pack(MARK, kind, len(words), len(data), digest(data, 16), b"")[:CHECKED]
-    return b"".join([head, digest(head + words, 8), words, data])
+    head = HEAD.pack(MARK, kind, len(words), len(data), digest_of(data, 16), b"")[:CHECKED]
+    return b"".join([head, digest_of(head + words, 8), words, data])
 
 
 def data_digest(record: bytes) -> bytes:
@@ -91,7 +87,7 @@ def read_head(file, offset):
         return None, len(head)
     words = file.read(words_length)
     read = len(head) + len(words)
-    if digest(head[:CHECKED] + words, 8) != head_digest:
+    if digest_of(head[:CHECKED] + words, 8) != head_digest:
         return None, read
     try:
         description = read_json(words, {})
@@ -112,16 +108,6 @@ def next_mark(file, start):
         start += max(len(held) - len(MARK) + 1, 0)
         held = held[-len(MARK) + 1 :]
     return None
-
-
-def digest_of_part(file, offset, length):
-    """(digest, length) of the data there, which may be shorter than asked for."""
-    file.seek(offset)
-    found, left = hashlib.blake2b(digest_size=16), length
-    while left and (block := file.read(min(left, BLOCK))):
-        found.update(block)
-        left -= len(block)
-    return found.digest(), length - left
 
 
 def begins_a_record(file, place, end):
@@ -158,7 +144,7 @@ def scan(file: BinaryIO) -> Iterator[Record | Damage]:
             yield Damage(damaged, place)
             damaged = None
         kind, description, offset, length, expected = found
-        seen, there = digest_of_part(file, offset, length)
+        seen, there = digest_at(file, offset, length, 16)
         stop = offset + there
         if there == length and seen == expected:
             yield Record(kind, description, offset, length, expected)

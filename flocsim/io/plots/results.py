@@ -24,7 +24,7 @@ from flocsim.io.plots.style import (
     plain,
     set_probability_axis,
     set_vertex_axis,
-    type_title,
+    type_titles,
     vertex_positions,
 )
 from flocsim.io.results.efficiency import efficiency
@@ -100,13 +100,10 @@ def figure_6(results: Results) -> Figure:
 def probability_figure(results, name):
     """One panel per type, one line per delta, against N, with bars for both errors."""
     with house_style():
-        figure, panels = panel_grid(len(results.types))
+        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name])
         for number, axes in enumerate(panels):
             draw_probability(axes, results, number, name)
-            axes.set_title(type_title(number, results.types[number]))
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS[name])
-        add_delta_legend(panels[:PANELS_PER_ROW][-1], results.delta)
+        add_delta_legend(last, results.delta)
         return figure
 
 
@@ -126,13 +123,10 @@ def bonds(results: Results) -> Figure:
 def shares_figure(results, name, legend_width):
     """One panel per type, one line for each class or kind of bond, against N."""
     with house_style():
-        figure, panels = panel_grid(len(results.types), legend_width)
+        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], legend_width)
         for number, axes in enumerate(panels):
             draw_shares(axes, results, number, name)
-            axes.set_title(type_title(number, results.types[number]))
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS[name])
-        add_shares_legend(panels[:PANELS_PER_ROW][-1], name)
+        add_shares_legend(last, name)
         return figure
 
 
@@ -148,7 +142,7 @@ def overview(results: Results) -> Figure:
                 draw_probability(axes, results, number, name)
             for axes, name in zip(grid[2:, number], SHARES, strict=True):
                 draw_shares(axes, results, number, name)
-            grid[0, number].set_title(type_title(number, results.types[number]))
+            grid[0, number].set_title(type_titles(results.types)[number])
             grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
             axes.set_ylabel(LABELS[name])
@@ -161,7 +155,8 @@ def overview(results: Results) -> Figure:
 def against_delta(results: Results) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
     with house_style():
-        figure, panels = panel_grid(len(results.types), x_label=DELTA_LABEL)
+        titles = type_titles(results.types)
+        figure, panels, last = panel_grid(titles, LABELS["pr_a"], x_label=DELTA_LABEL)
         colours = graded_colours(len(results.vertices))
         order = np.argsort(results.delta)
         for number, axes in enumerate(panels):
@@ -173,11 +168,8 @@ def against_delta(results: Results) -> Figure:
                 few = trials_of(results, "pr_a")[number, index][order] < FEW
                 draw_bars(axes, places, bands, index, colour, few)
             note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
-            axes.set_title(type_title(number, results.types[number]))
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
-        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "vertices $N$" + BARS + HOLLOW)
+        add_line_legend(last, words, colours, "vertices $N$" + BARS + HOLLOW)
         return figure
 
 
@@ -187,7 +179,7 @@ def efficiencies(results: Results) -> Figure:
     docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
     """
     with house_style():
-        figure, panels = panel_grid(len(results.types), legend_width=1.9)
+        figure, panels, last = panel_grid(type_titles(results.types), "efficiency $E$", 1.9)
         words = [
             r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
         ]  # fmt: skip
@@ -202,12 +194,7 @@ def efficiencies(results: Results) -> Figure:
                     continue
                 bands = [*(each[number] for each in found), np.zeros(len(results.vertices))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
-            axes.set_title(type_title(number, results.types[number]))
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel("efficiency $E$")
-        add_line_legend(
-            panels[:PANELS_PER_ROW][-1], words, colours, "aggregations per approach\n(bars: 95 %)"
-        )
+        add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
         return figure
 
 
@@ -225,7 +212,8 @@ def against_size(results: Results) -> Figure:
     known = (r_i > 0.0) & (r_j > 0.0)
     receivers = np.unique(r_i[known].round(9))
     with house_style():
-        figure, panels = panel_grid(len(results.vertices), x_label="approaching $r_j$ [µm]")
+        titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
+        figure, panels, _ = panel_grid(titles, LABELS["pr_a"], x_label="approaching $r_j$ [µm]")
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
         missing = "the sizes are not known" if results.pooled else "not yet pooled"
@@ -235,8 +223,6 @@ def against_size(results: Results) -> Figure:
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.minorticks_off()
-            count = results.vertices[number]
-            axes.set_title("sphere" if count == 1 else f"$N$ = {count}")
             if not (known.any() and results.pooled):
                 note_if_empty(axes, np.array([np.nan]), missing)
                 continue
@@ -245,8 +231,6 @@ def against_size(results: Results) -> Figure:
                 rows = rows[np.argsort(r_j[rows])]
                 bands = [results.pooled["pr_a" + end][rows, number] for end in ENDS]
                 draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS["pr_a"])
         if known.any() and results.pooled:
             bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
             bar.minorticks_off()
@@ -268,8 +252,10 @@ def add_line_legend(axes, words, colours, title):
     place_legend(axes, handles, title)
 
 
-def panel_grid(count, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
-    """A figure with ``count`` equal panels, at most three a row, and room for a legend."""
+def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
+    """(a figure with equal panels of these titles, at most three a row, and room for a legend, the
+    panels, the last one of the first row, beside which the legend stands)."""
+    count = len(titles)
     columns = min(count, PANELS_PER_ROW)
     rows = -(-count // PANELS_PER_ROW)
     figure = new_figure(PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25)
@@ -279,7 +265,11 @@ def panel_grid(count, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
     for axes in grid[max(count - columns, 0) : count]:
         axes.xaxis.set_tick_params(labelbottom=True)
         axes.set_xlabel(x_label)
-    return figure, list(grid[:count])
+    for axes, title in zip(grid, titles, strict=False):
+        axes.set_title(title)
+    for axes in grid[:count:PANELS_PER_ROW]:
+        axes.set_ylabel(y_label)
+    return figure, list(grid[:count]), grid[columns - 1]
 
 
 def draw_probability(axes, results, number, name):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.plots.results import PANELS_PER_ROW, add_line_legend, note_if_empty, panel_grid
-from flocsim.io.plots.style import Figure, graded_colours, house_style, type_title
+from flocsim.io.plots.results import add_line_legend, note_if_empty, panel_grid
+from flocsim.io.plots.style import Figure, graded_colours, house_style, type_titles
 from flocsim.io.results.strength_file import STATUS, Strengths
 
 OPENED = [STATUS.index(name) for name in ("opened", "opens_at_least_rate")]
@@ -30,9 +30,8 @@ def over_rate(found: Strengths) -> Figure:
     """A panel per type, a line per N, all displacements together."""
     types, vertices = (found.conditions.axes[name].values for name in ("type", "vertices"))
     with house_style():
-        figure, panels = panel_grid(
-            len(types), 2.0, f"rate G of the {found.about.get('flow')} [1/s]"
-        )
+        x_label = f"rate G of the {found.about.get('flow')} [1/s]"
+        figure, panels, last = panel_grid(type_titles(types), "share of bonds opened", 2.0, x_label)
         colours = graded_colours(len(vertices))
         for number, axes in enumerate(panels):
             any_opened = 0
@@ -45,12 +44,8 @@ def over_rate(found: Strengths) -> Figure:
             axes.set_ylim(0.0, 1.04)
             axes.set_xscale("log")
             note_if_empty(axes, np.array([1.0] if any_opened else [np.nan]), "no bond opened")
-            axes.set_title(type_title(number, types[number]))
         label_rates(panels[0])
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel("share of bonds opened")
-        words = [f"{n}" for n in vertices]
-        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, "N")
+        add_line_legend(last, [f"{n}" for n in vertices], colours, "N")
         return figure
 
 

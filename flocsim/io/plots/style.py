@@ -149,11 +149,11 @@ def plain(text):
     return str(text).replace("$", r"\$")
 
 
-def type_title(number, name):
-    """A panel's title, e.g. "(a) Type II"; a pair of radii needs no "Type"."""
-    kind = "Type " if re.fullmatch("[IVX]+", name) else ""
-    letter = chr(ord("a") + number) if number < 26 else str(number + 1)
-    return f"({letter}) {kind}{plain(name)}"
+def type_titles(names):
+    """The titles of panels, e.g. "(b) Type II"; a pair of radii needs no "Type"."""
+    letters = [chr(ord("a") + n) if n < 26 else str(n + 1) for n in range(len(names))]
+    kinds = ["Type " if re.fullmatch("[IVX]+", name) else "" for name in names]
+    return [f"({a}) {b}{plain(c)}" for a, b, c in zip(letters, kinds, names, strict=True)]
 
 
 def vertex_positions(vertices):

@@ -8,7 +8,6 @@ import numpy as np
 from flocsim.io.plots.results import (
     BARS,
     LABELS,
-    PANELS_PER_ROW,
     add_line_legend,
     draw_bars,
     note_if_empty,
@@ -21,7 +20,7 @@ from flocsim.io.plots.style import (
     house_style,
     plain,
     set_probability_axis,
-    type_title,
+    type_titles,
 )
 from flocsim.io.results.sweep_file import SweepResults
 
@@ -53,7 +52,8 @@ def against_key(results: SweepResults) -> Figure:
     is_log = numbers is not None and numbers.min() > 0.0 and numbers.max() > STEEP * numbers.min()
     with house_style():
         unit = f" [{first.unit}]" if first.unit not in ("1", *PREFIXED) else ""
-        figure, panels = panel_grid(len(types), 2.0, plain(first.key) + unit)
+        x_label = plain(first.key) + unit
+        figure, panels, last = panel_grid(type_titles(types), LABELS["pr_a"], 2.0, x_label)
         colours = graded_colours(len(words))
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
@@ -68,7 +68,6 @@ def against_key(results: SweepResults) -> Figure:
                     places = where[order] + 0.1 * aside * np.ptp(where)
                 draw_bars(axes, places, line, index, colours[index])
             note_if_empty(axes, bands[0][number], "no decided collision")
-            axes.set_title(type_title(number, types[number]))
             if numbers is None:
                 axes.set_xticks(where, labels=[plain(each) for each in first.values])
                 continue
@@ -81,10 +80,8 @@ def against_key(results: SweepResults) -> Figure:
                 EngFormatter(first.unit) if first.unit in PREFIXED else StrMethodFormatter("{x:g}")
             )
             axes.xaxis.set_major_formatter(style)
-        for axes in panels[::PANELS_PER_ROW]:
-            axes.set_ylabel(LABELS["pr_a"])
         title = ", ".join(plain(name) for name in others) + BARS
-        add_line_legend(panels[:PANELS_PER_ROW][-1], words, colours, title)
+        add_line_legend(last, words, colours, title)
         return figure
 
 

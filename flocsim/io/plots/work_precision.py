@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.io.plots.style import Figure, house_style, new_figure, type_title
+from flocsim.io.plots.style import Figure, house_style, new_figure, type_titles
 
 COLOURS = {"Implicit": "#0072B2", "DormandPrince54": "#D55E00"}
 MARKERS = {"Implicit": "o", "DormandPrince54": "^"}
@@ -40,10 +40,11 @@ def draw_ladders(
     with house_style():
         figure = new_figure(2.5 * len(panels) + 0.8, 4.8)
         rows = figure.subplots(2, len(panels), squeeze=False, sharex="col", sharey="row")
+        titles = type_titles(list(panels))
         for place, (name, rungs) in enumerate(panels.items()):
             draw_flips(rows[0, place], rungs, chosen.get(name), target)
             draw_errors(rows[1, place], rungs, chosen.get(name))
-            rows[0, place].set_title(type_title(place, name))
+            rows[0, place].set_title(titles[place])
             rows[1, place].set_xlabel("CPU time of a replicate [ms]")
         rows[0, 0].set_ylabel("outcomes that flip [%]")
         rows[1, 0].set_ylabel("error of d_c [m], bar to 90 %")
