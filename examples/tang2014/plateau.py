@@ -19,7 +19,6 @@ import numpy as np
 from output import marked, save_all, write_page
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.collision.encounter import Record
 from flocsim.ensembles.collision.zone import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
@@ -107,9 +106,10 @@ def sweeps_table(found):
 
 def nearest_approach(study, kind, replicate):
     """(outcome, least d_c − r_i − r_j [m] from the collision on) of a replicate."""
-    record = Record()
-    row = study.run(kind, VERTICES, SHARE, replicate, record)
-    times, position, _ = record.arrays()
+    draw = study.draw(kind, VERTICES, SHARE, replicate)
+    run = draw.begin(study.driver(draw.encounter), study.config.integrator.max_steps, record=True)
+    row = draw.row(run, run.to_end())
+    times, position, _ = run.motion()
     distance = centre_distance(position)
     after = distance[times >= row["t_collision"]] if row["inside"] <= 1 else distance
     radius_i, radius_j = study.pairings[kind].radii

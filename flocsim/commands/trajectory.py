@@ -4,21 +4,16 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from flocsim.ensembles.collision.draw import Record
-from flocsim.ensembles.collision.failures import FAILURES
-from flocsim.ensembles.collision.forces_between import forces_between
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import check_study, inputs_of
-from flocsim.ensembles.studies.replicates import chosen, one_count_study
+from flocsim.ensembles.studies.replicates import chosen, one_count_study, replicate_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
-from flocsim.io.plots.collision import draw_distance, draw_forces, draw_strip, write_animation
 from flocsim.io.plots.style import checked_format, save
-from flocsim.io.results.schema import OUTCOMES
-from flocsim.io.trajectory import centre_distance, write_trajectory
-from flocsim.trajectories.frames import frames_of
+from flocsim.io.trajectory import write_trajectory
+from flocsim.trajectories.figures import animated, drawn
 
 ANIMATION_FRAMES = 60
 
@@ -89,40 +84,27 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
 
 def outcome_line(config, place, replicate, row):
     condition, vertices, share = place
-    outcome = OUTCOMES[row["outcome"]]
-    reason = f" ({FAILURES[row['failure']]})" if row["failure"] else ""
+    reason = f" ({row['failure']})" if row["failure"] != "none" else ""
     name = config.scene.names[condition]
     touch = ""
-    if row["inside"] <= 1:
+    if row["inside"] != "not_applicable":
         touch = f"collision at {1e3 * row['t_collision']:.4g} ms, "
         touch += f"d_c = {1e6 * row['d_c_collision']:.4g} um; "
     return (
         f"type {name}, N = {vertices}, delta = {share:g}, replicate {replicate}: "
-        f"{outcome}{reason}; {touch}end at {1e3 * row['t_end']:.4g} ms, {row['steps']} steps"
+        f"{row['outcome']}{reason}; {touch}end at {1e3 * row['t_end']:.4g} ms, {row['steps']} steps"
     )
 
 
-def draw(args, encounter, arrays, row, title):
+def draw(args, trajectory, title):
     """Draw and save what was asked for; the paths written."""
-    times, position, _ = arrays
-    touch, zone = row["t_collision"], encounter.zone_distance
-    motion = times, centre_distance(position)
-    rule = figure_rule(args.overwrite)
-    frames = frames_of(encounter.shapes, times, position, touch, args.frames)
-    strip = draw_strip(
-        frames.outlines, frames.times, frames.paths, title,
-        centre_distance=frames.centre_distance, zone_distance=zone, contacts=frames.contacts,
-        seen_from=0,
-    )  # fmt: skip
-    written = save_all(strip, args.output, rule)
-    if args.distance:
-        written += save_all(draw_distance(*motion, zone, title), args.distance, rule)
-    if args.forces:
-        instants, forces = forces_between(encounter, *arrays)
-        written += save_all(draw_forces(instants, forces, touch, title), args.forces, rule)
+    rule, written = figure_rule(args.overwrite), []
+    asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
+    for figure, names in asked.items():
+        if names:
+            written += save_all(drawn(trajectory, figure, args.frames, title), names, rule)
     if args.animation:
-        frames = frames_of(encounter.shapes, times, position, touch, ANIMATION_FRAMES)
-        write_animation(args.animation, frames, motion, zone, title, rule)
+        animated(trajectory, Path(args.animation), ANIMATION_FRAMES, title, rule)
         written.append(Path(args.animation))
     return written
 
@@ -159,20 +141,18 @@ def run(args: Namespace) -> int:
     outputs = [Output(path, figure_rule(args.overwrite)) for path in drawn]
     motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
     check_outputs([*outputs, *motion], inputs_of(config, args.config))
-    study = one_count_study(config, place[1])
-    record = Record()
-    row = study.run(*place, args.replicate, record)
-    encounter = study.encounter(*place[:2], study.numbers(args.replicate))
-    title = outcome_line(config, place, args.replicate, row)
+    found = replicate_of(args.replicate, place, one_count_study(config, place[1]))
+    assert found.row is not None, "a replicate of a study"
+    title = outcome_line(config, place, args.replicate, found.row)
     print(title)
-    arrays = record.arrays()
-    for path in draw(args, encounter, arrays, row, title.split(";")[0]):
+    for path in draw(args, found, title.split(";")[0]):
         print(path)
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate}
-        facts["zone_distance"] = encounter.zone_distance
-        times, position, velocity = arrays
-        rule = data_rule(args.overwrite)
-        write_trajectory(args.save, times, position, velocity, encounter.shapes, facts, rule)
+        facts["zone_distance"] = found.row["D_0"]
+        write_trajectory(
+            args.save, found.t, found.position, found.velocity, found.shapes, facts,
+            data_rule(args.overwrite),
+        )  # fmt: skip
         print(args.save)
     return 0

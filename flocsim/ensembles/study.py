@@ -9,7 +9,7 @@ import numpy as np
 
 from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
-from flocsim.ensembles.collision.draw import Draw, Record
+from flocsim.ensembles.collision.draw import CHECKED, Draw
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
@@ -21,9 +21,6 @@ from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import NOT_APPLICABLE, RADII
-
-CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
-"""Column of a second run → the same of the first."""
 
 Kind = tuple[int, int]
 """Place of a collision type, and N: they stand for all that runs the same compiled code."""
@@ -187,7 +184,7 @@ class Study:
 
     def run(
         self, condition: int, vertices: int, share: float, replicate: int,
-        record: Record | None = None, halted: Callable[[], bool] | None = None,
+        halted: Callable[[], bool] | None = None,
     ) -> dict | None:  # fmt: skip
         """Run one replicate, as in `draw`. The row as a dict.
 
@@ -195,14 +192,10 @@ class Study:
         """
         draw = self.draw(condition, vertices, share, replicate)
         driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
-        row = draw.run(driver, max_steps, record, halted)
-        if row is None:
-            return None
-        row |= dict(zip(("floc_i", "floc_j"), draw.flocs, strict=True))
-        row |= dict.fromkeys(CHECKED, NOT_APPLICABLE)
+        row = draw.run(driver, max_steps, halted)
         exact = self.exact[self.pairings[condition].name]
         checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
-        if record is not None or exact is None or not checked:
+        if row is None or exact is None or not checked:
             return row
         found = self.run_again(draw, exact, halted)
         return None if found is None else row | found

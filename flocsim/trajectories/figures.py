@@ -1,5 +1,6 @@
 """What a Trajectory shows: frames of it, distance and forces of a pair, an animation."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
+from flocsim.io.files import Rule
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.collision import (
     draw_distance,
@@ -17,7 +19,7 @@ from flocsim.io.plots.collision import (
 )
 from flocsim.io.plots.style import CLASS_WORDS, Figure
 from flocsim.io.trajectory import centre_distance
-from flocsim.trajectories.frames import Frames, frames_at, travelled
+from flocsim.trajectories.frames import Frames, frames_at, instants_along
 from flocsim.trajectories.replay import motion_at
 
 FIGURES = ("strip", "distance", "forces", "energies")
@@ -29,11 +31,17 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     if not is_whole(count) or not 2 <= count <= MOST_FRAMES:
         raise UsageError(f"frames must be a whole number from 2 to {MOST_FRAMES}, found {count!r}")
     position, shapes = trajectory.position, trajectory.shapes
-    way = travelled(position, [shape.bounding_radius for shape in shapes])
-    wanted = np.linspace(0.0, way[-1], count)
-    # What stays where it is is seen at its start and its end.
-    times = np.interp(wanted, way, trajectory.t) if way[-1] > 0.0 else trajectory.t[[0, -1]]
+    sizes = [shape.bounding_radius for shape in shapes]
+    touch, _ = touch_and_zone(trajectory)
+    times = instants_along(trajectory.t, position, sizes, count, touch)
     return frames_at(shapes, times, places_at(trajectory, times), position)
+
+
+def touch_and_zone(trajectory: Any) -> tuple[float, float]:
+    """(instant [s] at which the outlines of a study's replicate touched, its D_0 [m]); NaN of any
+    other run."""
+    row = getattr(trajectory, "row", None)
+    return (math.nan, math.nan) if row is None else (row["t_collision"], row["D_0"])
 
 
 def places_at(trajectory: Any, times: np.ndarray) -> np.ndarray:
@@ -52,18 +60,19 @@ def title_of(trajectory: Any) -> str:
     return str(trajectory.status).partition(":")[0].lower()
 
 
-def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
-    """One of FIGURES of a Trajectory."""
+def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -> Figure:
+    """One of FIGURES of a Trajectory; ``title``: another one than `title_of` gives."""
     if figure not in FIGURES:
         raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
-    title = title_of(trajectory)
+    title = title_of(trajectory) if title is None else title
+    touch, zone = touch_and_zone(trajectory)
     if figure == "strip":
         seen = frames_of(trajectory, frames)
         pair = len(trajectory.shapes) == 2
         return draw_strip(
             seen.outlines, seen.times.tolist(), seen.paths, title, contacts=seen.contacts,
             seen_from=0 if len(trajectory.shapes) > 1 else None,
-            centre_distance=seen.centre_distance.tolist() if pair else None,
+            centre_distance=seen.centre_distance.tolist() if pair else None, zone_distance=zone,
         )  # fmt: skip
     if figure == "energies":
         found = trajectory.energies()
@@ -71,23 +80,26 @@ def drawn(trajectory: Any, figure: str, frames: int) -> Figure:
         return draw_energies(found.t, found.work, kinetic.tolist(), title)
     check_pair(trajectory)
     if figure == "distance":
-        return draw_distance(*distances(trajectory), title=title)
+        return draw_distance(*distances(trajectory), zone, title)
     apart = trajectory.position[:, 1, :2] - trajectory.position[:, 0, :2]
     direction = apart / np.hypot(*apart.T)[:, None]
     along = {
         name: np.sum(force[:, 1, :2] * direction, axis=1)
         for name, force in trajectory.forces().items()
     }
-    return draw_forces(trajectory.t, along, title=title)
+    return draw_forces(trajectory.t, along, touch, title)
 
 
-def animated(trajectory: Any, path: Path, frames: int) -> None:
-    """Write the animation of a pair."""
+def animated(
+    trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule | None = None
+) -> None:
+    """Write the animation of a pair; ``rule`` says what becomes of a file that is there."""
     if path.suffix.lower() != ".gif":
         raise UsageError(f"{path}: an animation's name must end in .gif")
     check_pair(trajectory)
     seen = frames_of(trajectory, frames)
-    write_animation(path, seen, distances(trajectory), rule=figure_rule())
+    _, zone = touch_and_zone(trajectory)
+    write_animation(path, seen, distances(trajectory), zone, title, rule or figure_rule())
 
 
 def distances(trajectory: Any) -> tuple[list[float], list[float]]:

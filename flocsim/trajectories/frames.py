@@ -1,5 +1,6 @@
 """Frames of a motion, for drawing: what is seen at some of its instants."""
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -45,9 +46,21 @@ def travelled(position: np.ndarray, sizes: Sequence[float]) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(steps + turns)])
 
 
-def rows_along(way: np.ndarray, count: int) -> np.ndarray:
-    """``count`` rows evenly along a way, the first and the last among them; some may be alike."""
-    return np.searchsorted(way, np.linspace(0.0, way[-1], count)).clip(0, len(way) - 1)
+def instants_along(
+    times: np.ndarray, position: np.ndarray, sizes: Sequence[float], count: int,
+    touch: float = math.nan,
+) -> np.ndarray:  # fmt: skip
+    """``count`` times [s] of a motion evenly along its way: its start and its end among them, and
+    the instant of a ``touch``, where there is one. Others as in `travelled`."""
+    way = travelled(position, sizes)
+    if not way[-1] > 0.0:
+        return times[[0, -1]]
+    wanted = np.linspace(0.0, way[-1], count)
+    found = np.interp(wanted, way, times)
+    if math.isfinite(touch) and count > 2:
+        nearest = np.abs(wanted[1:-1] - np.interp(touch, times, way)).argmin()
+        found[1 + nearest] = touch
+    return np.unique(found)
 
 
 def frames_at(
@@ -64,28 +77,3 @@ def frames_at(
         [whole[:, n, :2] for n in range(len(shapes))],
         centre_distance(places) if apart else np.zeros(len(times)),
     )
-
-
-def choose_instants(
-    times: np.ndarray, position: np.ndarray, size: float, count: int, collision: float
-) -> np.ndarray:
-    """Rows of ``count`` instants: start, collision, end, and the rest evenly along the way.
-
-    ``position`` (k, 2, 3); ``size`` [m], by which turning counts; ``collision`` time [s] or nan.
-    """
-    way = travelled(position, [size, size])
-    rows = rows_along(way, count)
-    if np.isfinite(collision) and count > 2:
-        touch = int(np.abs(times - collision).argmin())
-        inner = 1 + int(np.abs(way[rows[1:-1]] - way[touch]).argmin())
-        rows[inner] = touch
-    return np.unique(rows)
-
-
-def frames_of(
-    shapes: Sequence[Shape], times: np.ndarray, position: np.ndarray, collision: float, count: int
-) -> Frames:
-    """The Frames of a replicate's motion: ``position`` (k, 2, 3), ``collision`` time [s] or nan."""
-    size = 0.5 * sum(shape.bounding_radius for shape in shapes)
-    rows = choose_instants(times, position, size, count, collision)
-    return frames_at(shapes, times[rows], position[rows], position)

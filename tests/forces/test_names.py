@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Fluid, Sphere, System
-from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.forces_between import centre_forces, outline_name
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.fields import quantity
-from flocsim.forces import CentreForce, Contact, Gravity, StokesDrag, SurfaceForce
+from flocsim.forces import CentreForce, Contact, Gravity, SurfaceForce
 from flocsim.forces.base import names_of, told_apart
 from flocsim.forces.codegen import laws_of
 from flocsim.swarms.swarm import Swarm
-from tests.helpers.small_study import load_text
 
 R = 1e-6
 APART = [Body(Sphere(R), (4.0 * R * k, 0.0), density=2650.0) for k in range(2)]
@@ -121,18 +118,3 @@ def test_the_one_that_gives_no_number_is_blamed(wrong):
     name = names_of(forces)[wrong].replace("(", r"\(").replace(")", r"\)")
     with pytest.warns(KernelWarning, match=rf"{name}: Pull.kernel"):
         System(APART, forces).run(1e-6, jit=False, max_steps=100)
-
-
-def test_what_acts_in_a_replicate_is_told_of_each(tmp_path):
-    config = load_text(tmp_path, 'preset = "tang2014"\n[scene]\ntypes = ["III"]\n')
-    bodies = [
-        Body(Sphere(size), (0.0, 9e-5 * k), density=2650.0) for k, size in enumerate((5e-6, 2e-5))
-    ]
-    system = System(
-        bodies, [Gravity(), StokesDrag(), Contact(), Pull(1e-15), Pull(3e-15), Skin(), Skin()]
-    )
-    encounter = Encounter(system, config.scene, 1e-4)
-    instants = tuple(np.full(1, value) for value in (3e-6, 1e-6, 0.0))
-    found = centre_forces(encounter, np.zeros(1), (None, *instants))
-    assert {name: value[0] for name, value in found.items()} == {"Pull": -1e-15, "Pull (2)": -3e-15}
-    assert outline_name(encounter) == "contact + Skin + Skin (2)"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.trajectories.frames import frames_at, rows_along, travelled
+from flocsim.trajectories.frames import frames_at, travelled
 
 
 def fall(count=101):
@@ -28,14 +28,6 @@ def test_the_way_is_that_against_the_first_with_its_turns():
     assert np.all(np.diff(way) > 0.0)
     assert travelled(position, [1e-6] * 3)[-1] == pytest.approx(17e-6)
     assert travelled(position[:, :1], [1e-6])[-1] == pytest.approx(10e-6)
-
-
-def test_rows_lie_evenly_along_the_way():
-    way = np.concatenate([np.zeros(5), np.linspace(0.0, 1.0, 101)])
-    rows = rows_along(way, 6)
-    np.testing.assert_allclose(way[rows], np.linspace(0.0, 1.0, 6), atol=0.011)
-    assert rows[-1] == len(way) - 1
-    assert rows_along(np.zeros(3), 4).tolist() == [0, 0, 0, 0]
 
 
 def test_frames_are_seen_from_the_first_with_every_contact():

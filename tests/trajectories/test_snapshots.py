@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.ensembles.collision.draw import Record
-from flocsim.ensembles.collision.start import draws
-from flocsim.trajectories.frames import choose_instants, frames_of, travelled
+from flocsim.ensembles.studies.replicates import replicate_of
+from flocsim.trajectories.figures import frames_of
+from flocsim.trajectories.frames import frames_at, instants_along, travelled
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study
 
@@ -22,36 +22,41 @@ def fall(count=101):
     return times, position
 
 
+SIZES = (1e-6, 1e-6)
+
+
 @pytest.mark.parametrize("count", [2, 3, 6, 50])
 def test_start_and_end_are_among_the_instants(count):
     times, position = fall()
-    rows = choose_instants(times, position, 1e-6, count, np.nan)
-    assert (rows[0], rows[-1], len(rows)) == (0, 100, count)
+    found = instants_along(times, position, SIZES, count)
+    assert (found[0], found[-1], len(found)) == (times[0], times[-1], count)
 
 
-@pytest.mark.parametrize("collision", [0.013, 0.333, 0.5, 0.98])
+@pytest.mark.parametrize("collision", [0.0131, 0.333, 0.5, 0.98])
 def test_the_collision_is_among_the_instants(collision):
     times, position = fall(1001)
-    rows = choose_instants(times, position, 1e-6, 6, collision)
-    assert np.abs(times[rows] - collision).min() < 5e-4
-    assert (rows[0], rows[-1]) == (0, 1000)
+    found = instants_along(times, position, SIZES, 6, collision)
+    assert collision in found and len(found) == 6
+    assert (found[0], found[-1]) == (times[0], times[-1])
 
 
 def test_evenly_along_the_way_not_in_time():
     times, position = fall(1001)
     position[:, 1, 1] = 10e-6 - 10e-6 * times - 7e-6 * times**4
-    rows = choose_instants(times, position, 1e-6, 8, np.nan)
-    np.testing.assert_allclose(np.diff(travelled(position, [1e-6, 1e-6])[rows]), 1e-6, rtol=0.05)
+    found = instants_along(times, position, SIZES, 8)
+    way = np.interp(found, times, travelled(position, SIZES))
+    np.testing.assert_allclose(np.diff(way), 1e-6, rtol=1e-6)
 
 
-def test_a_motion_shorter_than_the_frames_asked_for():
+def test_what_stays_where_it_is_is_seen_at_its_start_and_end():
     times, position = fall(3)
-    assert choose_instants(times, position, 1e-6, 6, np.nan).tolist() == [0, 1, 2]
+    assert instants_along(times, 0.0 * position, SIZES, 6).tolist() == [0.0, 1.0]
 
 
 def test_frames_are_seen_from_the_receiver():
     times, position = fall()
-    frames = frames_of(TWO, times, position, 1.0, 5)
+    rows = [0, 25, 50, 75, 100]
+    frames = frames_at(TWO, times[rows], position[rows], position)
     assert len(frames.outlines) == len(frames.contacts) == len(frames.times)
     for (receiver, approaching), distance in zip(
         frames.outlines, frames.centre_distance, strict=True
@@ -64,11 +69,8 @@ def test_frames_are_seen_from_the_receiver():
 
 def test_contacts_show_where_the_outlines_touch(tmp_path):
     study = small_study(tmp_path)
-    record = Record()
-    row = study.run(0, 16, 0.0, 0, record)
-    times, position, _ = record.arrays()
-    shapes = study.encounter(0, 16, draws(1, 0)).shapes
-    frames = frames_of(shapes, times, position, row["t_collision"], 6)
+    trajectory = replicate_of(0, (0, 16, 0.0), study)
+    frames, row = frames_of(trajectory, 6), trajectory.row
     at = int(np.abs(frames.times - row["t_collision"]).argmin())
     assert frames.times[at] == row["t_collision"]
     # numpy's hypot in the frame, the compiled one in the row.

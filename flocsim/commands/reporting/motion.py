@@ -19,7 +19,7 @@ from flocsim.io.plots.collision import (
     time_unit,
 )
 from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS
-from flocsim.trajectories.frames import choose_instants, seen_from_first
+from flocsim.trajectories.frames import instants_along, seen_from_first
 
 FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)
@@ -76,11 +76,11 @@ def motion_of(example: Example) -> str:
     places = seen_from_first(trajectory.position)
     relative = places * [MICRO, MICRO, 1.0]
     touch = float(trajectory.row["t_collision"])
-    size = 0.5 * sum(shape.bounding_radius for shape in shapes)
-    rows = choose_instants(times, trajectory.position, size, FRAMES, touch)
+    reaches = [shape.bounding_radius for shape in shapes]
+    instants = instants_along(times, trajectory.position, reaches, FRAMES, touch)
+    rows = np.unique([np.abs(times - each).argmin() for each in instants])
     shown = int(np.abs(times[rows] - touch).argmin()) if math.isfinite(touch) else 0
-    reaches = [MICRO * shape.bounding_radius for shape in shapes]
-    eyes, half = windows_of(relative[rows], reaches)
+    eyes, half = windows_of(relative[rows], MICRO * np.array(reaches))
     distance = np.hypot(*(relative[:, 1, :2] - relative[:, 0, :2]).T)
     unit, factor = time_unit(times)
     zone = MICRO * example.zone_distance

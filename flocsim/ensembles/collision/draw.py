@@ -4,27 +4,18 @@ import math
 from collections.abc import Callable
 
 import attrs
-import numpy as np
 
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, WHY, replicate_row
 from flocsim.integrators.base import Integrator, Status
+from flocsim.io.results.schema import NOT_APPLICABLE
 from flocsim.run import Run
 from flocsim.system import System
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 
-
-class Record:
-    """Asks Draw.run to keep every step of a replicate."""
-
-    run: Run | None = None
-    status: Status | None = None
-
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times (k,), places (k, 2, 3) and velocities (k, 2, 3)."""
-        assert self.run is not None, "nothing has been run"
-        return self.run.motion()
+CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
+"""Column of a second run → the same of the first."""
 
 
 @attrs.frozen(eq=False)
@@ -59,25 +50,24 @@ class Draw:
         )  # fmt: skip
 
     def run(
-        self, driver: Callable, max_steps: int, record: Record | None = None,
-        halted: Callable[[], bool] | None = None, integrator: Integrator | None = None,
+        self, driver: Callable, max_steps: int, halted: Callable[[], bool] | None = None,
+        integrator: Integrator | None = None,
     ) -> dict | None:  # fmt: skip
         """Run the replicate; the row of the table of replicates as a dict.
 
-        ``record``, optional, is a Record to receive the motion. ``halted()``, optional, is asked
-        every some thousand steps whether to give up; the row is None then. Others: as in begin.
+        ``halted()``, optional, is asked every some thousand steps whether to give up; the row is
+        None then. Others: as in begin.
         """
-        run = self.begin(driver, max_steps, record=record is not None, integrator=integrator)
+        run = self.begin(driver, max_steps, integrator=integrator)
         status = run.to_end(halted)
         if status == Status.PAUSED:
             return None
-        if record is not None:
-            record.run, record.status = run, status
         return self.row(run, status)
 
     def row(self, run: Run, status: Status) -> dict:
         """The row of a Run that has ended so; failed where a force gives no number."""
-        row = replicate_row(status, self.angles, run)
+        row = replicate_row(status, self.angles, run) | dict.fromkeys(CHECKED, NOT_APPLICABLE)
+        row |= dict(zip(("floc_i", "floc_j"), self.flocs, strict=True))
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):
             row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
         return row

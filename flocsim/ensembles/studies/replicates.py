@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 
 from flocsim.arrays import UNTIL
-from flocsim.ensembles.collision.draw import Record
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels.study import study_of
@@ -69,12 +68,11 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words."""
     if not is_whole(replicate) or not replicate >= 0:
         raise UsageError(f"replicate must be a whole number from 0, found {replicate!r}")
-    began, record = time.perf_counter(), Record()
-    row = study.run(*place, int(replicate), record)
-    assert row is not None and record.run is not None and record.status is not None
-    draw = study.draw(*place, int(replicate))
+    began, draw = time.perf_counter(), study.draw(*place, int(replicate))
     driver, max_steps = study.driver(draw.encounter), study.config.integrator.max_steps
-    system, run = draw.encounter.system, record.run
+    system, run = draw.encounter.system, draw.begin(driver, max_steps, record=True)
+    status = run.to_end()
+    row = draw.row(run, status)
 
     def fresh() -> Run:
         return draw.begin(driver, max_steps)
@@ -82,7 +80,7 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     legs = ((run.steps, float(run.clock[UNTIL])),)
     origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)
     lasted = time.perf_counter() - began
-    return Trajectory.of(run, record.status, lasted, row=row_in_words(row), origin=origin)
+    return Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)
 
 
 def row_in_words(row: dict) -> dict:

@@ -190,9 +190,8 @@ def draw_forces(
     with house_style():
         figure = new_figure(5.4, 2.6)
         axes = figure.subplots()
-        for place, (colour, (name, force)) in enumerate(
-            zip(FORCE_COLOURS, curves.items(), strict=False)
-        ):
+        for place, (name, force) in enumerate(curves.items()):
+            colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
             push = np.where(force > 0.0, force, np.nan)
             pull = np.where(force < 0.0, -force, np.nan)
             # Drag balances weight: what lies under another curve is seen on both sides of it.

@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.arrays import NOW
 from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.draw import Draw, Record
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.io.results.schema import OUTCOMES
@@ -75,8 +75,10 @@ def test_a_replicate_repeats_to_the_bit_in_any_order(study):
 
 def recorded(study):
     """(row, arrays) of one replicate."""
-    record = Record()
-    return study.run(0, 16, 0.0, 0, record), record.arrays()
+    draw = study.draw(0, 16, 0.0, 0)
+    steps = study.config.integrator.max_steps
+    run = draw.begin(study.driver(draw.encounter), steps, record=True)
+    return draw.row(run, run.to_end()), run.motion()
 
 
 def test_recording_changes_nothing_and_pieces_make_the_whole(study, monkeypatch):
