@@ -23,15 +23,13 @@ from flocsim.forces.check import (
     results,
     sample_pairs,
 )
+from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.plausibility.doubts import doubts_of
 from flocsim.plausibility.reynolds import all_settled, settled
 from flocsim.plausibility.settling import lone_view
-
-PLACES = {"x", "y", "angle", "time"}
-SPEEDS = {"vx", "vy", "spin"}
 
 LAWLESS = (
     ("centre_force", "forces along lines of centres", "none is given"),
@@ -129,7 +127,7 @@ def no_partner(system):
 
 def body_derivative(system, force):
     reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
-    by = [name for name, fields in (("velocity", SPEEDS), ("place", PLACES)) if reads & fields]
+    by = [name for name, fields in (("velocity", VELOCITIES), ("place", PLACES)) if reads & fields]
     if not by:
         return "constant, nothing to differentiate"
     return f"derivative by {' and '.join(by)} from differences of its kernel"

@@ -35,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
     listed = actions.add_parser("list", help="print name, picture, r_eq and errors of every floc")
     chosen = actions.add_parser("select", help="write the flocs that are asked for to a library")
     merged = actions.add_parser("merge", help="write the flocs of several libraries to one")
-    for action, run in ((listed, run_list), (chosen, run_select), (merged, run_merge)):
+    for action, run in ((listed, run_list), (chosen, run_write), (merged, run_write)):
         action.add_argument("libraries", nargs="+", metavar="LIBRARY",
             help="shape library that flocsim fit wrote")  # fmt: skip
         action.set_defaults(run=run)
@@ -72,31 +72,22 @@ def run_list(args: argparse.Namespace) -> int:
     return 0
 
 
-def run_select(args: argparse.Namespace) -> int:
-    """Write the flocs of one library, or of several merged, that meet all that is asked."""
+def run_write(args: argparse.Namespace) -> int:
+    """Write the flocs of all libraries to one, or those of them that meet all that is asked."""
     rule = data_rule(args.overwrite)
     check_outputs([Output(args.output, rule)], args.libraries)
     libraries, settings = read_all(args.libraries)
     every = merged_entries(libraries)
-    entries = selected(every, args, ", ".join(args.libraries))
+    selects = args.action == "select"
+    entries = selected(every, args, ", ".join(args.libraries)) if selects else every
     if not entries:
         raise UsageError(
             f"{', '.join(args.libraries)}: none of {plural(len(every), 'floc')} is what was asked "
             "for, nothing was written; flocsim shapes list names them"
         )
     write_library(args.output, entries, settings, rule)
-    print(f"{args.output}: {plural(len(entries), 'floc')} of {len(every)}")
-    return 0
-
-
-def run_merge(args: argparse.Namespace) -> int:
-    """Write the flocs of all libraries to one."""
-    rule = data_rule(args.overwrite)
-    check_outputs([Output(args.output, rule)], args.libraries)
-    libraries, settings = read_all(args.libraries)
-    entries = merged_entries(libraries)
-    write_library(args.output, entries, settings, rule)
-    print(f"{args.output}: {plural(len(entries), 'floc')} of {len(libraries)} libraries")
+    of = len(every) if selects else f"{len(libraries)} libraries"
+    print(f"{args.output}: {plural(len(entries), 'floc')} of {of}")
     return 0
 
 

@@ -77,8 +77,3 @@ def exact_method(method: Integrator) -> Integrator | None:
         if name in names and value < math.inf:
             return attrs.evolve(method, **{name: float(f"{factor * value:.15g}")})
     return None
-
-
-def checks_wanted(method: Integrator, share: float | str) -> bool:
-    """Whether any replicate is run again by this method."""
-    return share != 0.0 and exact_method(method) is not None

@@ -16,9 +16,14 @@ from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
 from flocsim.ensembles.collision.start import orientations
 from flocsim.integrators.base import Status
-from flocsim.io.results.schema import AGGREGATED, BLANKS, NOT_APPLICABLE, OUTCOMES, REPLICATES
-
-FAILED = OUTCOMES.index("failed")
+from flocsim.io.results.schema import (
+    AGGREGATED,
+    BLANKS,
+    FAILED,
+    NOT_APPLICABLE,
+    OUTCOMES,
+    REPLICATES,
+)
 
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""

@@ -6,7 +6,6 @@ from flocsim.io.results.schema import BONDS, CLASSES, NOT_APPLICABLE, OUTCOMES
 
 MISSED = OUTCOMES.index("missed")
 UNDECIDED = OUTCOMES.index("undecided")
-FAILED = OUTCOMES.index("failed")
 HELD = OUTCOMES.index("held")
 DECIDED = len(CLASSES)
 """Outcomes below this code are classes A to D."""

@@ -7,7 +7,7 @@ them is correlated, and the difference is known better than from independent sam
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.ensembles.estimates.statistics import AGGREGATED, DECIDED
+from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED
 from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import AXES, NOT_APPLICABLE
 

@@ -13,20 +13,19 @@ from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.events import (
     AGGREGATED,
-    DECIDED,
-    FAILED,
     HELD,
     HOOK,
     INSIDE_CLASSES,
     MISSED,
     OUTSIDE_CLASSES,
     UNDECIDED,
+    events,
 )
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.errors import UsageError
 from flocsim.io.confidence import clustered_proportion, proportion, wilson
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
-from flocsim.io.results.schema import BONDS
+from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES
 
 __all__ = ["probabilities", "tabulate", "wilson"]
 
@@ -138,31 +137,15 @@ def checked_codes(
     return outcome, inside, bond
 
 
-def trials_of(
-    outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """{probability: (whether a replicate counts in it, whether as a success)} from codes."""
-    aggregated = np.isin(outcome, AGGREGATED)
-    within = np.isin(outcome, INSIDE_CLASSES)
-    without = np.isin(outcome, OUTSIDE_CLASSES)
-    return {
-        "pr_inside": (inside != NOT_APPLICABLE, inside == 1),
-        "pr_a_given_inside": (within, within & aggregated),
-        "pr_a_given_outside": (without, without & aggregated),
-        "pr_a": (outcome < DECIDED, aggregated),
-        "pr_sticks": (outcome < DECIDED, aggregated & (bond != HOOK)),
-        "pr_hangs": (outcome < DECIDED, aggregated & (bond == HOOK)),
-    }
-
-
 def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
     """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
 
     S and M are a replicate's successes and trials over all displacements; sums are over
     replicates. Codes are (type, vertices, delta, replicate).
     """
-    sums = {}
-    for name, (trials, successes) in trials_of(outcome, inside, bond).items():
+    sums, counted = {}, events(outcome, inside, bond)
+    for name in POOLED_PROBABILITIES:
+        trials, successes = counted[name]
         m = np.sum(trials, axis=2, dtype=np.int64)
         s = np.sum(successes, axis=2, dtype=np.int64)
         terms = (s, m, s * s, s * m, m * m, m > 0)

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED, HELD, MISSED
+from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED, HELD, MISSED, events
 from flocsim.ensembles.estimates.paired import between, newcombe
-from flocsim.ensembles.estimates.statistics import trials_of
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
@@ -186,8 +185,8 @@ def numerical(results, name, wanted):
 
 
 def trials_in(rows):
-    """{probability: (whether a replicate counts in it, whether as a success)} of COMPARED."""
-    found = trials_of(rows["outcome"], rows["inside"], rows["bond"])
+    """{probability: (whether a replicate counts in it, whether as a success)}, all of COMPARED."""
+    found = events(rows["outcome"], rows["inside"], rows["bond"])
     return found | {PER_APPROACH: approaches(rows["outcome"])}
 
 

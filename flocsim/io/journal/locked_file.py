@@ -15,6 +15,7 @@ from pathlib import Path
 
 from flocsim.errors import FileError
 from flocsim.io.files import sync_folder, unwritable
+from flocsim.io.pieces import BLOCK
 
 LOCK_SECONDS = 10.0
 """Seconds to wait for a job that is just dying, or just finishing, to let go of the file."""
@@ -29,7 +30,6 @@ NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.E
 """What a file system says that has no locks, or whose lock server is away."""
 
 OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-BLOCK = 2**20
 
 
 def open_regular(path: Path, flags: int = os.O_CREAT) -> int:

@@ -15,6 +15,7 @@ from flocsim.io.results.schema import (
     BONDS,
     CLASSES,
     EVENTS,
+    FAILED,
     FLOCS,
     GROUPS,
     LAST_AXES,
@@ -28,7 +29,6 @@ from flocsim.io.results.schema import (
 
 OPTIONAL = ("pooled", "differences", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
-FAILED = OUTCOMES.index("failed")
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.collision.checking import (
-    checks_wanted,
     count_checks,
     exact_method,
     expected_checks,
@@ -77,7 +76,6 @@ def with_method(config, method, **options):
 
 def test_a_method_without_tolerance_and_step_is_not_checked_and_cannot_be_asked_to(tmp_path):
     assert exact_method(Unchangeable()) is None
-    assert not checks_wanted(Unchangeable(), "auto") and checks_wanted(Implicit(), "auto")
     config = small_config(tmp_path, {"shapes": {"vertices": (1,)}})
     own = with_method(config, Unchangeable())
     assert "no tolerance or step" in checked_words(own)
