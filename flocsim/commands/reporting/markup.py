@@ -8,37 +8,11 @@ import base64
 import hashlib
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 
 from flocsim.errors import visible
 
-STYLE = """\
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
-  max-width: 84rem; margin: 0 auto; padding: 1rem 1.5rem 4rem; }
-h1 { font-size: 1.5rem; margin: .5rem 0 1rem; overflow-wrap: anywhere; }
-h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem; border-bottom: 1px solid #d5dae0; }
-nav a { margin-right: 1rem; } a { color: #0b62a4; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
-th, td { padding: .18rem .6rem; text-align: right; white-space: nowrap; }
-th { background: #f2f4f7; vertical-align: bottom; white-space: normal; }
-tbody tr:nth-child(even) { background: #fafbfc; }
-tr.first td { border-top: 1px solid #c5ccd4; }
-table.facts th, table.facts td { text-align: left; vertical-align: top; white-space: normal;
-  overflow-wrap: anywhere; }
-table.facts th { white-space: nowrap; font-weight: 600; }
-ul.warnings { background: #fff6e0; border: 1px solid #e6c35c; padding: .6rem 1rem .6rem 2rem; }
-ul.failed { background: #fdeeee; border: 1px solid #dd9a9a; padding: .6rem 1rem .6rem 2rem; }
-figure { margin: 1rem 0 1.6rem; } figure img { max-width: 100%; height: auto; }
-figcaption { font-size: 13px; color: #48505a; }
-pre { background: #f6f8fa; padding: .8rem; overflow-x: auto; font-size: 13px; }
-.motions { display: grid; grid-template-columns: repeat(auto-fit, minmax(29rem, 1fr)); gap: 1rem; }
-.motion { border: 1px solid #d5dae0; padding: .7rem; margin: 0; }
-.motion .panels { display: flex; gap: .5rem; } .motion svg { display: block; width: 50%; }
-.motion .controls { display: flex; gap: .6rem; align-items: center; }
-.motion input { flex: 1; } .motion output { font-size: 13px; min-width: 12rem; }
-@media print { .controls, nav { display: none !important; } }
-"""
+STYLE = Path(__file__).with_name("page.css").read_text("utf-8")
 
 
 def text(value: object) -> str:

@@ -2,8 +2,8 @@
 
 To add a key, add an attribute here, and nothing else: its name is the key, its metadata say what
 it takes (flocsim.fields, and ``read_by`` of values.py for what those cannot say). The loader reads
-it, its messages name it, `--set` sets it, and `python -m flocsim.ensembles.config.page` writes it
-into docs/config.md. A new table is a class here and an attribute of Config. Keys that exclude each
+it, its messages name it, `--set` sets it, and `python docs/schema_tables.py` writes it into
+docs/config.md. A new table is a class here and an attribute of Config. Keys that exclude each
 other stand in ALTERNATIVES and INSTEAD_OF, what is checked between tables in ``contradictions``.
 Metadata of this schema alone: ``shown`` is the default where it depends on other keys, ``only_for``
 the one source of flocs that a key goes with; ``beside_class`` marks keys that stay where a class is

@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import tomllib
 from pathlib import Path
 
 import attrs
@@ -12,23 +11,19 @@ from flocsim.body import Body
 from flocsim.commands import init
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.page import config_parts
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
     FORCES,
-    TABLES,
     TYPES,
     BodiesConfig,
     IntegratorConfig,
     SceneConfig,
     ShapesConfig,
     ZoneConfig,
-    keys_of,
 )
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.io.markdown import with_parts
 from tests.helpers.small_study import write_star_library
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -250,25 +245,3 @@ def test_commented_settings_of_the_example_are_valid_too(tmp_path):
     config = load_config(path)
     assert config.fluid.buoyancy
     assert config.force_names == ("van_der_waals", "double_layer", "contact", "mine")
-
-
-def test_the_page_of_all_keys_is_current():
-    page = (ROOT / "docs" / "config.md").read_text("utf-8")
-    command = "python -m flocsim.ensembles.config.page docs/config.md"
-    assert page == with_parts(page, config_parts()), f"run: {command}"
-
-
-def test_the_page_names_every_key():
-    page = config_parts()["keys"]
-    for table_class in [*TABLES.values(), *FORCES.values()]:
-        assert all(f"| `{key}` |" in page for key in keys_of(table_class))
-
-
-def test_the_pages_defaults_are_valid_toml():
-    rows = [
-        line.split(" | ") for line in config_parts()["keys"].split("\n") if line.startswith("| `")
-    ]
-    defaults = [cells[2] for cells in rows if len(cells) == 4 and cells[2].startswith("`")]
-    assert len(defaults) > 20
-    for default in defaults:
-        tomllib.loads(f"key = {default.strip('`')}")

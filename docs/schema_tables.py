@@ -1,18 +1,33 @@
-"""All keys and presets, from the schema itself, for docs/config.md.
+"""What the schemas say of config and results files, in docs/config.md and docs/results.md.
 
-Write them anew with `python -m flocsim.ensembles.config.page docs/config.md`.
+`python docs/schema_tables.py` makes those parts of both pages anew that stand between
+`<!-- of the schema: NAME -->` and `<!-- end -->`.
 """
 
 import inspect
 import re
-import sys
+from collections.abc import Mapping
+from pathlib import Path
 
 from flocsim.ensembles.config import presets
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, STUDY_KEYS, TABLES, keys_of
 from flocsim.ensembles.config.swarm_scene import SwarmScene
-from flocsim.io.markdown import markdown_table, rewrite
+from flocsim.errors import UsageError
+from flocsim.io.markdown import markdown_table
+from flocsim.io.results.kernel_group import KERNEL
+from flocsim.io.results.schema import (
+    COORDINATES,
+    DIFFERENCES,
+    FLAGS,
+    POOLED,
+    RADII,
+    REPLICATES,
+    TABLE,
+)
+
+DOCS = Path(__file__).parent
 
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
@@ -90,5 +105,58 @@ def flat(table, around=""):
             yield f"{around}{key}", value
 
 
+ENDS = ("_low", "_high", "_numerical")
+"""Ends of the names of bounds."""
+
+
+def results_parts() -> dict[str, str]:
+    """{name: table} of all that docs/results.md has of the schema."""
+    groups = {
+        "probabilities": TABLE, "pooled": POOLED, "differences": DIFFERENCES,
+        "replicates": REPLICATES, "kernel": KERNEL,
+    }  # fmt: skip
+    axes = [[f"`{name}`", text] for name, (*_, text) in COORDINATES.items()]
+    sizes = [[f"`{name}` [m]", text] for name, (*_, text) in RADII.items()]
+    return {name: table(schema) for name, schema in groups.items()} | {
+        "coordinates": markdown_table(["axis", "meaning"], axes),
+        "radii": markdown_table(["coordinate", "meaning"], sizes),
+    }
+
+
+def table(schema):
+    """A Markdown table of one group; bounds go with what they bound."""
+    rows = []
+    for name, (kind, unit, text) in schema.items():
+        if not name.endswith(ENDS):
+            shown = ", ".join(
+                [f"`{name}`", *(f"`{end}`" for end in ENDS if f"{name}{end}" in schema)]
+            )
+            rows.append([shown, kind, unit, text + codes(name)])
+    return markdown_table(["dataset", "type", "unit", "meaning"], rows)
+
+
+def codes(name):
+    if name not in FLAGS:
+        return ""
+    return ": " + ", ".join(f"{value} {word}" for value, word in zip(*FLAGS[name], strict=True))
+
+
+def with_parts(page: str, parts: Mapping[str, str]) -> str:
+    """A page with its parts anew: what stands between ``<!-- of the schema: NAME -->`` and
+    ``<!-- end -->``. UsageError unless these are the parts that it has."""
+    found = re.findall(r"<!-- of the schema: (.*) -->", page)
+    if sorted(found) != sorted(parts):
+        raise UsageError(f"a page of {', '.join(found)} has other parts than {', '.join(parts)}")
+    return re.sub(
+        r"(<!-- of the schema: (.*) -->\n\n)[\s\S]*?(\n<!-- end -->)",
+        lambda match: f"{match[1]}{parts[match[2]].strip()}\n{match[3]}", page,
+    )  # fmt: skip
+
+
+PAGES = {"config.md": config_parts, "results.md": results_parts}
+"""Page → what makes its parts."""
+
 if __name__ == "__main__":
-    rewrite(sys.argv[1], config_parts())
+    for name, made in PAGES.items():
+        page = DOCS / name
+        page.write_text(with_parts(page.read_text("utf-8"), made()), "utf-8")

@@ -1,0 +1,68 @@
+"""docs/config.md and docs/results.md say what the schemas do."""
+
+import importlib.util
+import tomllib
+
+import pytest
+
+from flocsim.ensembles.config.schema import FORCES, TABLES, keys_of
+from flocsim.errors import UsageError
+from flocsim.io.results.layout import SCHEMA_VERSION
+from flocsim.io.results.schema import REPLICATES
+from tests.helpers.small_study import ROOT
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """The module that makes the parts of the pages."""
+    path = ROOT / "docs" / "schema_tables.py"
+    spec = importlib.util.spec_from_file_location("schema_tables", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", ["config.md", "results.md"])
+def test_the_pages_are_current(tables, name):
+    page = (ROOT / "docs" / name).read_text("utf-8")
+    assert page == tables.with_parts(page, tables.PAGES[name]()), (
+        "run: python docs/schema_tables.py"
+    )
+
+
+def test_the_page_of_results_has_the_version_and_every_column(tables):
+    assert f"schema version {SCHEMA_VERSION};" in (ROOT / "docs" / "results.md").read_text("utf-8")
+    assert all(f"`{name}`" in tables.results_parts()["replicates"] for name in REPLICATES)
+
+
+def test_the_page_names_every_key(tables):
+    page = tables.config_parts()["keys"]
+    for table_class in [*TABLES.values(), *FORCES.values()]:
+        assert all(f"| `{key}` |" in page for key in keys_of(table_class))
+
+
+def test_the_pages_defaults_are_valid_toml(tables):
+    rows = [
+        line.split(" | ")
+        for line in tables.config_parts()["keys"].split("\n")
+        if line.startswith("| `")
+    ]
+    defaults = [cells[2] for cells in rows if len(cells) == 4 and cells[2].startswith("`")]
+    assert len(defaults) > 20
+    for default in defaults:
+        tomllib.loads(f"key = {default.strip('`')}")
+
+
+PAGE = "Words.\n\n<!-- of the schema: a -->\n\nold\n\n<!-- end -->\n\nMore \\1.\n"
+
+
+def test_parts_of_a_page_are_made_anew_and_words_stay(tables):
+    new = tables.with_parts(PAGE, {"a": "| new \\1 |\n| two |\n"})
+    assert new == PAGE.replace("old", "| new \\1 |\n| two |")
+    assert tables.with_parts(new, {"a": "old"}) == PAGE
+
+
+@pytest.mark.parametrize("parts", [{}, {"b": ""}, {"a": "", "b": ""}])
+def test_a_page_of_other_parts_is_refused(tables, parts):
+    with pytest.raises(UsageError, match="other parts"):
+        tables.with_parts(PAGE, parts)
