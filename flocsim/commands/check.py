@@ -32,7 +32,7 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
 from flocsim.ensembles.preflight import check_study, measured_flocs
 from flocsim.errors import ConfigError, UsageError
-from flocsim.fields.quantities import read_quantity
+from flocsim.fields.quantities import read_number
 from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.terminal import tell
@@ -81,21 +81,13 @@ def ends(option: str, given: list[str] | None, unit: str) -> tuple[float, float]
     if given is None:
         return None
     try:
-        low, high = (as_number(word, unit) for word in given)
+        low, high = (read_number(word, unit) for word in given)
     except (ValueError, ConfigError) as error:
         raise UsageError(f"{option}: {error}") from None
     if not 0.0 < low < high < math.inf:
         raise UsageError(f"{option} must be two values above 0, LOW and HIGH, found {low:g} "
                          f"and {high:g}")  # fmt: skip
     return low, high
-
-
-def as_number(word, unit):
-    """A number in SI units, or a quantity such as "2 um"."""
-    try:
-        return float(word)
-    except ValueError:
-        return read_quantity(word, unit)
 
 
 def sized(config: Config, sizes: tuple[float, float] | None) -> Config:

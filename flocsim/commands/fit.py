@@ -15,7 +15,7 @@ from flocsim.commands.fitting.pictures import (
     titles_of,
 )
 from flocsim.errors import FileError, UsageError
-from flocsim.fields.quantities import read_quantity
+from flocsim.fields.quantities import read_number
 from flocsim.io.files import write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
@@ -233,25 +233,16 @@ def positive(option, text, meaning="pixels"):
 
 def length(option, text):
     """A length above 0 [m]: "0.95 um", or a number of metres."""
-    hint = ""
+    value, hint = 0.0, ""
     try:
-        value = read_quantity(text, "m")
+        value = read_number(text, "m")
     except ValueError as reason:
-        hint = f" ({reason})" if str(reason) and not is_float(text) else ""
-        value = float(text) if is_float(text) else 0.0
+        hint = f" ({reason})" if str(reason) else ""
     if not 0.0 < value < float("inf"):
         raise UsageError(
             f"{option} takes a length above 0 such as '0.95 um', or in metres, found {text!r}{hint}"
         )
     return value
-
-
-def is_float(text):
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def whole(option, text):

@@ -14,26 +14,6 @@ from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.plots.swarm import SWARM_FIGURES, write_swarm_animation
 from flocsim.io.plots.sweep import SWEEP_FIGURES
 
-DESCRIPTION = """\
-Draw the figures of a results file, each into a file of its own:
-{results}
-Bars are Wilson 95 % intervals, thin outer ones with the numerical error on either side.
-Of a shape library that flocsim fit wrote:
-{shapes}
-Of a trajectory file (flocsim trajectory --save, Trajectory.save):
-{motion}
-Of the joined file of flocsim sweep:
-{sweep}
-Of a file of flocsim strength:
-{strength}
-Of a swarm study:
-{swarm}
-Of a kernel study:
-{kernel}
-Of a study that still runs, its figures so far are drawn, marked as unfinished.
-Figures are numbered as in Tang et al. (2014)."""
-
-
 STRIP_FRAMES = 7
 
 
@@ -53,6 +33,18 @@ def distance(trajectory: Any) -> Any:
 
 MOTION_FIGURES = {"strip": strip, "distance": distance}
 
+FIGURES_OF: dict[str, dict] = {
+    "a shape library that flocsim fit wrote": POPULATION_FIGURES,
+    "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":
+        FIGURES,
+    "a trajectory file (flocsim trajectory --save, Trajectory.save)": MOTION_FIGURES,
+    "the joined file of flocsim sweep": SWEEP_FIGURES,
+    "a file of flocsim strength": STRENGTH_FIGURES,
+    "a swarm study": SWARM_FIGURES,
+    "a kernel study": KERNEL_FIGURES,
+}  # fmt: skip
+"""{kind of file: {name: figure}}."""
+
 
 def listed(figures):
     """A line for every figure: its name and the first line of its docstring."""
@@ -64,14 +56,13 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "plot",
         help="draw the figures of a results file or a shape library",
-        description=DESCRIPTION.format(
-            results=listed(FIGURES),
-            shapes=listed(POPULATION_FIGURES),
-            motion=listed(MOTION_FIGURES),
-            sweep=listed(SWEEP_FIGURES),
-            swarm=listed(SWARM_FIGURES),
-            kernel=listed(KERNEL_FIGURES),
-            strength=listed(STRENGTH_FIGURES),
+        description="\n".join(
+            [
+                "Draw the figures of a file, each into a file of its own.",
+                *(f"Of {kind}:\n{listed(figures)}" for kind, figures in FIGURES_OF.items()),
+                "Of a study that still runs, its figures so far are drawn, marked as unfinished.",
+                "Figures are numbered as in Tang et al. (2014).",
+            ]
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -175,10 +166,7 @@ def read_content(path):
 def figure_names(text):
     """The names in a list such as "4,overview", each once; UsageError for an unknown one."""
     names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    known = (
-        *POPULATION_FIGURES, *FIGURES, *MOTION_FIGURES, *SWEEP_FIGURES, *SWARM_FIGURES,
-        *KERNEL_FIGURES, *STRENGTH_FIGURES,
-    )  # fmt: skip
+    known = [name for figures in FIGURES_OF.values() for name in figures]
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         found = ", ".join(map(repr, unknown)) or "none"

@@ -75,6 +75,14 @@ def read_quantity(text: str, unit: str) -> float:
         return float(Decimal(match[1]) * factor(written, unit))
 
 
+def read_number(text: str, unit: str) -> float:
+    """A number of the unit, as "1e-6", or a text with one, as in `read_quantity`."""
+    try:
+        return float(text)
+    except ValueError:
+        return read_quantity(text, unit)
+
+
 @functools.cache
 def registry():
     """pint's units, in decimals; loaded when the first quantity with a unit is met."""
