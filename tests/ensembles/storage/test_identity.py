@@ -30,7 +30,7 @@ NOT_PHYSICS = {
     "io/plots/": "draws",
     "io/exchange/": "writes motions for other programs",
     "io/results/kernel_group.py": "rates, which follow from rows",
-    "io/results/groups.py": "how rates are stored",
+    "io/groups.py": "how arrays are stored",
     "io/labelled.py": "how rates are named",
     "io/outputs.py": "what may be written to",
     "io/own_mark.py": "what may be written to",
