@@ -1,8 +1,23 @@
-"""What of the processor and of its libraries decides the last digits of a result."""
+"""What of the processor and of the libraries decides the last digits of a result."""
 
 import os
 import platform
+import sys
+from importlib import metadata
 from typing import Any
+
+PACKAGES = "numba", "llvmlite", "numpy", "scipy", "shapely", "flocsim"
+
+
+def versions() -> dict[str, str]:
+    """{"version of numpy": "2.4"} and so on."""
+    found = {"version of Python": sys.version}
+    for name in PACKAGES:
+        try:
+            found[f"version of {name}"] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[f"version of {name}"] = "none that is installed"
+    return found
 
 
 def cpu_kind() -> dict:

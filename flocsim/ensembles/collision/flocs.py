@@ -4,7 +4,6 @@ own; resized to the scene, or as they were measured."""
 import hashlib
 import json
 import math
-import sys
 from collections.abc import Sequence
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -14,7 +13,7 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.disk_cache import kept
-from flocsim.compiler.processor import cpu_kind
+from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
@@ -93,15 +92,10 @@ def grow_floc(shapes, seed, index):
 @cache
 def growth_facts() -> str:
     """What a grown and fitted floc follows from beside its numbers: code, versions, processor."""
-    import numba
-    import scipy
-    import shapely
-
     found = hashlib.blake2b(digest_size=16)
     for path in sorted(GEOMETRY.rglob("*.py")):
         found.update(path.read_bytes())
-    libraries = [each.__version__ for each in (np, scipy, numba, shapely)]
-    return f"{found.hexdigest()} {sys.version} {libraries} {cpu_kind()}"
+    return f"{found.hexdigest()} {versions()} {cpu_kind()}"
 
 
 def read_flocs(shapes: ShapesConfig) -> list[Floc]:

@@ -6,19 +6,16 @@ Python and of the packages and the code of the kernels included.
 """
 
 import platform
-import sys
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from typing import Any
 
 import attrs
 
+from flocsim.compiler.processor import versions
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
-
-PACKAGES = ("numba", "llvmlite", "numpy", "scipy", "flocsim")
 
 MOST_DIFFERENCES = 3
 
@@ -58,16 +55,6 @@ class Facts:
 def facts_of(study: Study) -> Facts:
     """The Facts of this rank."""
     return Facts(identity_of(study))
-
-
-def versions() -> dict[str, str]:
-    found = {"version of Python": sys.version}
-    for name in PACKAGES:
-        try:
-            found[f"version of {name}"] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[f"version of {name}"] = "none that is installed"
-    return found
 
 
 def refuse_other_words(rank: int, launch: Launch, words: Mapping[str, Any]) -> None:
