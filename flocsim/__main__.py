@@ -1,6 +1,7 @@
 """The command `flocsim`, also `python -m flocsim`: one subcommand for each thing to do."""
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 
@@ -15,31 +16,10 @@ if {"ensemble", "kernel", "swarm"}.intersection(sys.argv[1:2]):
 if is_limited():
     check_memory()
 
-from flocsim.commands import (
-    check,
-    compare,
-    ensemble,
-    export,
-    fit,
-    info,
-    init,
-    plot,
-    report,
-    shapes,
-    strength,
-    sweep,
-    trajectory,
-    work_precision,
-)
+from flocsim.commands import SUMMARIES, file_of
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError
-
-COMMANDS = (
-    init, fit, shapes, check, ensemble, sweep, trajectory, plot, report, export, compare,
-    strength, work_precision, info,
-)  # fmt: skip
-
 
 STUDIES = {"ensemble", "kernel", "swarm"}
 """Commands that run studies, also under mpirun."""
@@ -50,15 +30,24 @@ ALONE = (
 )
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """The parser of a command line ``words``: of the command that they name alone, for the others
+    need not be loaded for it; of all commands where words are not told."""
     parser = argparse.ArgumentParser(
         prog="flocsim",
         description="When two flocs of real shape meet in water: do they collide, do they stick?",
     )
     parser.add_argument("--version", action="version", version=f"flocsim {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.add_parser(subparsers)
+    wanted = {file_of(each) for each in (SUMMARIES if words is None else words[:1])}
+    loaded = set()
+    for command, summary in SUMMARIES.items():
+        file = file_of(command)
+        if file not in wanted:
+            subparsers.add_parser(command, help=summary)
+        elif file not in loaded:
+            loaded.add(file)
+            importlib.import_module(file).add_parser(subparsers)
     return parser
 
 
@@ -68,10 +57,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         plain_warnings()
         words = sys.argv[1:] if argv is None else argv
         if STUDIES.intersection(words[:1]):
-            arguments = parse_on_all_ranks(make_parser(), argv)
+            arguments = parse_on_all_ranks(make_parser(words), argv)
         else:
             with silent_unless_first():
-                arguments = make_parser().parse_args(argv)
+                arguments = make_parser(words).parse_args(argv)
             if launched_rank() > 0:
                 return 0  # what is no study is one rank's work
             if (launched_size() or 0) > 1:

@@ -46,7 +46,7 @@ def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, 
     def fail(arguments):
         raise error
 
-    monkeypatch.setattr(entry.info, "run", fail)
+    monkeypatch.setattr("flocsim.commands.info.run", fail)
     assert entry.main(["info", "x.h5"]) == code
     assert capsys.readouterr() == ("", said)
 

@@ -1,6 +1,37 @@
 """The subcommands of ``flocsim``, one file each; ``fitting`` is the work behind ``fit``,
 ``reporting`` that behind ``report``.
 
-A subcommand is a file with ``add_parser(subparsers)`` and ``run(arguments)``, the exit code, listed
-in `flocsim.__main__`.
+A subcommand is a file with ``add_parser(subparsers)`` and ``run(arguments)``, the exit code, and
+has a line in SUMMARIES.
 """
+
+SUMMARIES = {
+    "init": "write an example config file",
+    "fit": "fit spheropolygons to the flocs of pictures",
+    "shapes": "list, select and merge the flocs of shape libraries",
+    "check": "run a study's scene at the ends of its sizes, stiffness and tolerance",
+    "ensemble": "run the ensemble of a config file",
+    "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
+    "kernels and efficiencies for population balances",
+    "swarm": 'run a study of many bodies (scene.kind = "swarm"), as ensemble does',
+    "sweep": "run a study at several values of a key",
+    "trajectory": "run one replicate of a config and draw it as a strip of frames",
+    "plot": "draw the figures of a results file or a shape library",
+    "report": "write one HTML page of a results file",
+    "export": "write motion, or rates of encounters, in a format of another program",
+    "compare": "compare two results files: differences of probabilities with 95 %% intervals",
+    "strength": "at what rate a flow opens the bonds of a study",
+    "work-precision": "flips and errors against CPU time, for the methods and tolerances of a "
+    "config",
+    "info": "describe a results file, a running study, a library, a trajectory or a sweep",
+}
+"""{command: what it does}, in the order of the help, which needs no more of them than this."""
+
+ENSEMBLES = "ensemble", "kernel", "swarm"
+"""Commands of one file: a study by the name of its kind of scene."""
+
+
+def file_of(command: str) -> str:
+    """The module of a command."""
+    name = ENSEMBLES[0] if command in ENSEMBLES else command
+    return f"flocsim.commands.{name.replace('-', '_')}"

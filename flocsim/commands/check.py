@@ -13,6 +13,7 @@ from typing import Any
 
 import attrs
 
+from flocsim.commands import SUMMARIES
 from flocsim.commands.precision.judged import (
     HEADER,
     RIGHT,
@@ -50,7 +51,7 @@ TIGHTEST = 1e-14
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "check",
-        help="run a study's scene at the ends of its sizes, stiffness and tolerance",
+        help=SUMMARIES["check"],
         description="Run some replicates of a study at the ends of its sizes, numbers of vertices, "
         "contact stiffness and tolerance, hold them against a much tighter tolerance, and print "
         "what came of each. Exit code 0 where all are right or within their stated error, 1 where "

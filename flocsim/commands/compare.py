@@ -3,13 +3,14 @@
 from argparse import Namespace
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.io.results.schema import COMPARED
 
 
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "compare",
-        help="compare two results files: differences of probabilities with 95 %% intervals",
+        help=SUMMARIES["compare"],
         description="Print the differences of a probability between two results files, at every "
         "condition that both have, with 95 % intervals: of replicates paired where both have "
         "drawn the same orientations (studies of one seed), of independent samples else. What the "

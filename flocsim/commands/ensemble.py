@@ -4,18 +4,13 @@ name, `flocsim swarm` and `flocsim kernel`, for a config of that kind of scene."
 from argparse import Namespace
 from typing import Any
 
+from flocsim.commands import ENSEMBLES, SUMMARIES
 from flocsim.ensembles.cli import add_arguments, run_command
-
-NAMES = {
-    "ensemble": "run the ensemble of a config file",
-    "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
-    "kernels and efficiencies for population balances",
-    "swarm": 'run a study of many bodies (scene.kind = "swarm"), as ensemble does',
-}
 
 
 def add_parser(subparsers: Any) -> None:
-    for name, words in NAMES.items():
+    for name in ENSEMBLES:
+        words = SUMMARIES[name]
         parser = subparsers.add_parser(name, help=words, description=words)
         add_arguments(parser).set_defaults(run=run)
 

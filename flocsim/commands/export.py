@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.errors import UsageError
 from flocsim.io.exchange.gsd_file import write_gsd
 from flocsim.io.files import write_file
@@ -26,7 +27,7 @@ SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "export",
-        help="write motion, or rates of encounters, in a format of another program",
+        help=SUMMARIES["export"],
         description="gsd: the motion that flocsim trajectory --save or Trajectory.save put into a "
         "file, for OVITO and HOOMD's tools, with lengths in um. (ParaView and xarray open the file "
         "itself.) Of the results of a kernel study, csv: a table of all pairs of size classes; "

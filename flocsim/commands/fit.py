@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.commands.fitting.overlays import draw, expected_overlays, pictures_beneath
 from flocsim.commands.fitting.pictures import (
     LOST,
@@ -37,7 +38,7 @@ region, also those left out and why, goes to a table beside the library.
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "fit",
-        help="fit spheropolygons to the flocs of pictures",
+        help=SUMMARIES["fit"],
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.commands import SUMMARIES
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.toml_text import parse
@@ -49,7 +50,7 @@ MOST_FAILURES = 10
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
-        help="describe a results file, a running study, a library, a trajectory or a sweep",
+        help=SUMMARIES["info"],
         description="Print what a file holds: conditions, counts, probabilities with 95 % "
         "intervals, and where it came from. Of a study that still runs or was interrupted, its "
         "replicates so far, without touching it.",

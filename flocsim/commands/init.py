@@ -5,6 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 
@@ -35,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
     kinds = "; ".join(f"{name}: {words}" for name, words in KINDS.items())
     parser = subparsers.add_parser(
         "init",
-        help="write an example config file",
+        help=SUMMARIES["init"],
         description="Write a commented example of a config file, ready to run.",
     )
     parser.add_argument(

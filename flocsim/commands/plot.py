@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.errors import FileError, UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.kernel import KERNEL_FIGURES
@@ -55,7 +56,7 @@ def listed(figures):
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "plot",
-        help="draw the figures of a results file or a shape library",
+        help=SUMMARIES["plot"],
         description="\n".join(
             [
                 "Draw the figures of a file, each into a file of its own.",

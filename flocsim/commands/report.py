@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.commands.reporting.examples import examples_of
 from flocsim.commands.reporting.page import report_page
 from flocsim.ensembles.studies.opened import open_results
@@ -20,9 +21,7 @@ watch, which is run again for it."""
 
 
 def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "report", help="write one HTML page of a results file", description=DESCRIPTION
-    )
+    parser = subparsers.add_parser("report", help=SUMMARIES["report"], description=DESCRIPTION)
     add = parser.add_argument
     add("results", help="results file that flocsim ensemble wrote")
     add("-o", "--output", metavar="FILE.html",

@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 
+from flocsim.commands import SUMMARIES
 from flocsim.commands.fit import number
 from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
@@ -27,7 +28,7 @@ MICRO = 1e6
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "shapes",
-        help="list, select and merge the flocs of shape libraries",
+        help=SUMMARIES["shapes"],
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

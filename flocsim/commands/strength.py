@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.errors import UsageError
 from flocsim.interruption import INTERRUPTED
 from flocsim.io.files import Rule
@@ -33,9 +34,7 @@ to one HDF5 file, anew every 20 s and at Ctrl-C, with a figure beside it at the 
 
 
 def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "strength", help="at what rate a flow opens the bonds of a study", description=DESCRIPTION
-    )
+    parser = subparsers.add_parser("strength", help=SUMMARIES["strength"], description=DESCRIPTION)
     add = parser.add_argument
     add("results", help="results file of flocsim ensemble")
     add("--flow", default="shear", metavar="FLOW",

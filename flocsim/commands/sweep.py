@@ -8,6 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
@@ -25,9 +26,7 @@ COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
 
 
 def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "sweep", help="run a study at several values of a key", description=DESCRIPTION
-    )
+    parser = subparsers.add_parser("sweep", help=SUMMARIES["sweep"], description=DESCRIPTION)
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add(

@@ -4,6 +4,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
+from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
@@ -19,9 +20,7 @@ ANIMATION_FRAMES = 60
 
 
 def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "trajectory", help="run one replicate of a config and draw it as a strip of frames"
-    )
+    parser = subparsers.add_parser("trajectory", help=SUMMARIES["trajectory"])
     parser.set_defaults(run=run)
     add_replicate(parser)
     add = parser.add_argument

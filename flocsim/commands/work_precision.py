@@ -10,6 +10,7 @@ from typing import Any
 
 import attrs
 
+from flocsim.commands import SUMMARIES
 from flocsim.commands.precision import ladder
 from flocsim.commands.precision.judged import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
@@ -35,7 +36,7 @@ MOST_STEPS = 1_000_000
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "work-precision",
-        help="flips and errors against CPU time, for the methods and tolerances of a config",
+        help=SUMMARIES["work-precision"],
         description="Run some replicates of a study by every method and tolerance that "
         'accuracy = "auto" may choose, and print how many outcomes flip, how far d_c is off, and '
         "what it takes. With --replicate: one replicate by every integrator over six decades of "
