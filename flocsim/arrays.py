@@ -91,9 +91,13 @@ SLIP_RATES = STATES
     FLIGHTS,  # how often that was next to nothing (events.grazes)
     OVERLAP,  # by which friction goes while a step's end is looked for [m]
     PART,  # the part of the step by which it goes then
-    GAIN,  # how fast that part follows (contact_mean.follow)
+    FADES,  # the gap within which that of a pair that opens falls to half [m]
     LEFT,  # of an interior-point method: what is left of the gap [m]
-    RUBBING,  # the share of what friction can hold
+    HARDNESS,  # the normal stiffness that the rest are over [N/m]
+    LIMIT,  # what friction can hold [m]
+    RUBBING,  # the share of it that there is
+    STUCK,  # what there would be if the pair stuck [m]
+    YIELDS,  # by how much that grows with v_t [s]
     AHEAD,  # how far the pair slides ahead [m]
     BEHIND,  # and behind [m]
     KEPT_SLIP,  # displacements, set aside while the list is made anew [m]
@@ -107,7 +111,7 @@ SLIP_RATES = STATES
     CYCLE_GAP_BEFORE,  # of the one before [m]
     FLOWN_AT,  # when the pair last touched again behind a flight next to nothing [s]
     SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 25)
+) = range(2 * STATES, 2 * STATES + 29)
 
 MOST_FRAMES = 3
 """Stages for which a body keeps a frame."""
@@ -174,9 +178,8 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     NEAR,  # 1 where it may have a share of a surface force in it
     SLIDING,  # ±1 where it slides in it, in the direction of ξ, 0 where it sticks
     PAIR,  # the row of the two bodies in ``Work.pairs``
-    DOES,  # in an iteration of backward Euler: what it does (contact_mean.mode_of)
     CANDIDATE_COLUMNS,
-) = range(11)
+) = range(10)
 
 # What CLOSED says.
 (

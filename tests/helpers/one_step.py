@@ -1,26 +1,27 @@
 """Single steps of backward Euler, uncompiled, of a few bodies."""
 
 from flocsim import System
-from flocsim.arrays import NOW, TIME, UNTIL, VX, work_of
+from flocsim.arrays import BUSY, NOW, TIME, UNTIL, VX, work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
-from flocsim.integrators.backward_euler.interior import find_closed
-from flocsim.integrators.backward_euler.newton import begin_step, solve_end
-from flocsim.integrators.backward_euler.step import euler_step
+from flocsim.integrators.backward_euler.newton import begin_step
+from flocsim.integrators.backward_euler.step import euler_step, solve_step
 from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 
 
-def newton_alone(scene, work, clock, step, most):
-    """One step by Newton's method from its start."""
-    begin_step(work)
-    return solve_end(scene, work, clock, step, most)
+def from_before(scene, work, clock, step):
+    """One step from contacts as they are at its start, or from anywhere where that leads nowhere."""
+    clock[BUSY] = 0.0
+    begin_step(work, clock)
+    return solve_step(scene, work, clock, step)
 
 
-def newton_from_inside(scene, work, clock, step, most):
-    """One step by both methods."""
-    begin_step(work)
-    return find_closed(scene, work, clock, step) and solve_end(scene, work, clock, step, most)
+def from_anywhere(scene, work, clock, step):
+    """One step of whose contacts nothing is known."""
+    clock[BUSY] = 1.0
+    begin_step(work, clock)
+    return solve_step(scene, work, clock, step)
 
 
 def whole_step(scene, work, clock, counts, step):
@@ -49,9 +50,9 @@ class Stage:
         """The function with this family's others in the place of hooks."""
         return compose(function, self.fillings, jit=False)
 
-    def end(self, step, how=newton_alone, most=100):
+    def end(self, step, how=from_before):
         """Whether the step's end was found; it is left in NOW."""
-        return self.linked(how)(self.scene, self.work, self.clock, step, most)
+        return self.linked(how)(self.scene, self.work, self.clock, step)
 
     def step(self, step):
         """Take a step, however large its error: that over the tolerance."""

@@ -9,14 +9,20 @@ in a step of which the contact is closed but for a part, and s is that part, as 
 line. All of it is continuous in the state at the end, whichever contacts close or open, and N of
 springs and dashpots is the derivative of a convex function of Δ₁: a step has one solution, as far
 as directions do not turn and friction does not slide. The cut is the return mapping of plasticity.
+
+Without a limit of friction a pair may open by T and close without it; then it ends just open, by
+the s with which it does neither. That s would fall to nothing within Δ₀, which may be next to
+nothing: a pair that opens is taken to be closed at the start by FADING of the tolerance at least.
 """
+
+import math
 
 from flocsim.arrays import (
     CANDIDATES,
     CLOSED,
     DAMPING,
     EDGE_BODY,
-    GAIN,
+    FADES,
     GAP,
     NEW,
     NOW,
@@ -41,45 +47,35 @@ from flocsim.integrators.rhs.jacobian import (
 from flocsim.integrators.rhs.views import effective_mass, push_pair, tangential_rate
 from flocsim.laws import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 
+FADING = 0.01
+"""The tangential force of a pair that opens falls to half within a gap of this share of the
+tolerance, or of its overlap at the start where that is more."""
+
 
 def takes_part(work, row):
     """Whether a pair is closed at the start of the step, TRIAL, or at its end, NOW."""
     return work.geometry[NOW, row, GAP] < 0.0 or work.geometry[TRIAL, row, GAP] < 0.0
 
 
-def acts(work, row):
-    """Whether a pair has a force in the step, be it that of a friction that is yet to follow."""
-    return takes_part(work, row) or work.slip[PART, row] > 0.0
-
-
 def closed_share(work, row):
     """The part of the step for which a pair is closed, as its gap goes along a line."""
     before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
     if before < 0.0:
-        return 1.0 if after <= 0.0 else before / (before - after)
+        return 1.0 if after <= 0.0 else work.slip[FADES, row] / (work.slip[FADES, row] + after)
     return after / (after - before) if after < 0.0 else 0.0
+
+
+def share_slope(work, row):
+    """By how much that grows with the gap at the end [1/m]."""
+    before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
+    if before < 0.0 < after:
+        return -work.slip[FADES, row] / (work.slip[FADES, row] + after) ** 2
+    return -before / (after - before) ** 2 if after < 0.0 <= before else 0.0
 
 
 def end_overlap(work, row):
     """Δ₁⁺ of a pair, by its gap at the end [m]."""
     return max(-work.geometry[NOW, row, GAP], 0.0)
-
-
-def go_by(work, row, overlap, part):
-    """Let the friction of a pair go by an overlap [m] and a part of the step from now on."""
-    work.slip[OVERLAP, row], work.slip[PART, row] = overlap, part
-
-
-def follow(work, row):
-    """Let the friction of a pair go by how it is pressed now. A pair may open by its own friction
-    and close without it: where the part of the step turns back, it goes half as far from then on.
-    """
-    part, gain = work.slip[PART, row], work.slip[GAIN, row]
-    change = closed_share(work, row) - part
-    if change * gain < 0.0:
-        gain *= -0.5
-    work.slip[GAIN, row] = gain
-    go_by(work, row, end_overlap(work, row), part + abs(gain) * change)
 
 
 def view_with(scene, work, row, step, after, slip, rate):
@@ -90,6 +86,20 @@ def view_with(scene, work, row, step, after, slip, rate):
         after, pressing, slip, rate, effective_mass(scene, a, b),
         scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
     )  # fmt: skip
+
+
+def sticking_slopes(scene, view, limit, step):
+    """By how much the friction of a pair falls with ξ [N/m] and with v_t [N s/m] while it sticks,
+    by differences that are well below its ``limit`` [m]: that of a small load is tiny."""
+    slip, rate = 0.5 * limit, 1e-3 * limit / step
+    sheared = ContactView(
+        view.overlap, 0.0, slip, 0.0, view.effective_mass, view.radius_i, view.radius_j
+    )
+    dragged = ContactView(
+        view.overlap, 0.0, 0.0, rate, view.effective_mass, view.radius_i, view.radius_j
+    )
+    by_slip = -contact_force(scene, sheared)[1] / slip
+    return by_slip, -contact_force(scene, dragged)[1] / rate
 
 
 def friction_view(scene, work, row, step):
@@ -122,66 +132,64 @@ def friction_force(scene, work, row, step):
     return work.slip[PART, row] * contact_force(scene, friction_view(scene, work, row, step))[1]
 
 
-def friction_slope(scene, work, row, step):
-    """By how much that falls with v_t at the end [N s/m]: ξ₁ goes with it where the pair sticks."""
-    found, part = contact_derivatives(scene, friction_view(scene, work, row, step)), work.slip[PART]
-    by_slip = part[row] * step * found[7] if work.candidates[row, SLIDING] == 0 else 0.0
-    return -part[row] * (found[9] + by_slip)
-
-
 @apart
 def add_mean_forces(scene, work, step):
-    """Add the forces of all contacts in the step to those in NOW."""
+    """Add the forces of all contacts in the step to those in NOW; friction goes by the overlaps at
+    its end."""
     for row in range(work.tally[CANDIDATES]):
-        if acts(work, row):
-            normal = normal_force(scene, work, row, step, end_overlap(work, row))
+        work.slip[OVERLAP, row] = end_overlap(work, row)
+        work.slip[PART, row] = closed_share(work, row)
+        if takes_part(work, row):
+            normal = normal_force(scene, work, row, step, work.slip[OVERLAP, row])
             push_pair(work, NOW, row, normal, friction_force(scene, work, row, step))
         else:
             work.slip[NEW, row], work.candidates[row, SLIDING] = 0.0, 0
 
 
-def add_slopes(scene, work, row, normal, tangential):
-    """Add to the system what the force of a contact falls by for a metre of the gap [N/m], and with
-    the rate along the tangent [N s/m]."""
+def add_slopes(scene, work, row, normal, tangential, coupled):
+    """Add to the system what the force of a contact falls by for a metre of the gap, and with the
+    rate along the tangent [N/m, N s/m]; and by how much friction falls for a metre of the gap."""
     a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
     pair = work.candidates[row, PAIR]
     along, across = normal_rows(work, row), tangent_rows(work, row)
     add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal)
+    add_product(scene, work, STIFFNESS, pair, a, b, across, along, coupled)
     add_product(scene, work, DAMPING, pair, a, b, across, across, tangential)
 
 
-def add_coupling(scene, work, row, step):
-    """Add by how much friction grows with the overlap at the end to the system."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    found = contact_derivatives(scene, friction_view(scene, work, row, step))
-    side = work.candidates[row, SLIDING]
-    by_slip = side * limit_slope(scene, work, NOW, row) if side != 0 else 0.0
-    total = work.slip[PART, row] * (found[3] + found[5] / step + by_slip * found[7])
-    along, across = normal_rows(work, row), tangent_rows(work, row)
-    add_product(scene, work, STIFFNESS, work.candidates[row, PAIR], a, b, across, along, total)
+def friction_slopes(scene, work, row, step):
+    """By how much the friction of a pair falls with v_t at the end [N s/m], and grows with its
+    overlap [N/m] and its part of the step [N]."""
+    view = friction_view(scene, work, row, step)
+    found = contact_derivatives(scene, view)
+    part, side = work.slip[PART, row], work.candidates[row, SLIDING]
+    by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
+    if side != 0:
+        by_limit = side * limit_slope(scene, work, NOW, row) * found[7]
+        by_slip = 0.0
+    elif has(scene, SLIP_LIMIT):
+        limit = slip_limit(scene, view)
+        if 0.0 < limit < math.inf:
+            by_slip, by_rate = sticking_slopes(scene, view, limit, step)
+    by_overlap = part * (found[3] + found[5] / step + by_limit)
+    by_part = found[1] - part * by_slip * step * tangential_rate(work, NOW, row)
+    return part * (by_rate + part * step * by_slip), by_overlap, by_part
 
 
 @apart
-def add_all_derivatives(scene, work, step, coupled):
-    """Add the derivatives of all contacts in the step by the places and velocities at its end; with
-    how friction goes by the gaps if they are ``coupled``."""
+def add_all_derivatives(scene, work, step):
+    """Add the derivatives of all contacts in the step by the places and velocities at its end."""
     for row in range(work.tally[CANDIDATES]):
-        if acts(work, row):
-            after = end_overlap(work, row)
-            normal = normal_stiffness(scene, work, row, step, after) if after > 0.0 else 0.0
-            add_slopes(scene, work, row, normal, friction_slope(scene, work, row, step))
+        if takes_part(work, row):
+            after, stiffness = end_overlap(work, row), 0.0
+            slope, by_overlap, by_part = friction_slopes(scene, work, row, step)
+            coupled = -share_slope(work, row) * by_part
+            if after > 0.0:
+                stiffness = normal_stiffness(scene, work, row, step, after)
+                coupled += by_overlap
+            add_slopes(scene, work, row, stiffness, slope, coupled)
             force = normal_force(scene, work, row, step, after)
             add_turning(scene, work, row, force, friction_force(scene, work, row, step))
-            if coupled and after > 0.0:
-                add_coupling(scene, work, row, step)
-
-
-def mode_of(work, row):
-    """A number that tells apart what a pair does: open, too weak for friction, sticks, slides one
-    way or the other."""
-    if work.geometry[NOW, row, GAP] >= 0.0:
-        return 0
-    return 3 + work.candidates[row, SLIDING] if work.slip[OVERLAP, row] > 0.0 else 1
 
 
 CLOSE = 0.02

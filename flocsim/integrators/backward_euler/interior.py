@@ -1,24 +1,23 @@
-"""Which contacts close and slide in a step: an interior-point method, with whose end Newton's
-method begins.
+"""The pairs of a step as an interior-point method sees them: what closes and slides, all at once.
 
 With hard springs a step is all but a complementarity problem: of every pair, the overlap δ = Δ₁⁺
 that its force has and the gap s = g + δ that is left of it are not below 0, and one of them is 0.
 Newton's method (newton.py) finds which, a few pairs an iteration; here all pairs are followed at
 once along δ s = τ, τ falling to nothing (primal-dual, Wright 1997; as for contacts in Christensen
-et al. 1998): some ten systems for any number of contacts that switch. They are those of Newton's
-method, the stiffness of a pair being its part δ/(δ + s) that is at work. OVERLAP holds δ, LEFT s.
+et al. 1998). The systems are those of Newton's method, the stiffness of a pair being its part
+δ/(δ + s) that is at work. OVERLAP holds δ, LEFT s.
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
-So with friction, whose limit L goes by the δ of the last iteration: what there is of it, f = φ L,
-what there would be if the pair stuck, e, and how far it slides ahead and behind, p and q, all over
-the normal stiffness [m], follow e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
-
+So with friction, whose limit L goes by δ: what there is of it, f = φ L, what there would be if the
+pair stuck, e, and how far it slides ahead and behind, p and q, all over the normal stiffness [m],
+follow e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
 
     df = w (e − f − τ/(L − f) + τ/(L + f) + de),   1/w = 1 + p/(L − f) + q/(L + f)
 
-The turning of forces is left out, which would be too large before they fit, and would make the
-systems indefinite; so that along the way they are those of a convex problem.
+Along the way a pair of such a limit counts as closed for the whole step if it was at its start:
+where it opens L is 0. By the gap, which is far from its end until δ and s are, it would be without
+friction nearly everywhere.
 """
 
 import math
@@ -30,93 +29,48 @@ from flocsim.arrays import (
     CHANGE,
     CLOSED,
     EDGE_BODY,
-    FORCE,
-    FREE,
+    FADES,
     GAP,
+    HARDNESS,
     LEFT,
+    LIMIT,
     NOW,
     OVERLAP,
     PART,
     RUBBING,
-    START,
-    TIME,
+    STUCK,
     TRIAL,
     VELOCITY,
     VERTEX_BODY,
+    YIELDS,
 )
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
-    closed_share,
-    flag_close,
     friction_force,
-    friction_slope,
-    go_by,
+    friction_slopes,
     normal_force,
     normal_stiffness,
+    sticking_slopes,
     view_with,
 )
-from flocsim.integrators.backward_euler.newton import (
-    assemble_rest,
-    evaluate_others,
-    go_along,
-    solve_change,
-)
-from flocsim.integrators.radau.contact_frames import gather_clusters
-from flocsim.integrators.radau.systems import factorise_euler
-from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
-from flocsim.integrators.rhs.views import (
-    effective_mass,
-    pressed_view,
-    push_pair,
-    tangential_rate,
-)
-from flocsim.laws import SLIP_LIMIT, contact_derivatives, has, slip_limit
-
-MOST_ITERATIONS = 45
+from flocsim.integrators.rhs.jacobian import add_turning, normal_rows, tangent_rows
+from flocsim.integrators.rhs.views import pressed_view, push_pair, tangential_rate
+from flocsim.laws import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 
 FAR_FROM_WALL = 0.99
 """What is to stay above 0 goes so far towards it at most in an iteration."""
 
-FALLING, STANDING, LEAST_WAY = 0.003, 0.1, 0.7
-"""τ is this share of the mean of all products: behind an iteration that went so far at least, or
-not."""
+LEAST_LIMIT = 1e-3
+"""Friction holds this share of what the spring alone would let it, at least: L stays above 0."""
 
-FOUND, DOUBTS, MOST_DOUBTS = 0.01, 0.01, 0.1
-"""Of a pair that is found to be open or closed, the smaller one of δ and s is below this share of a
-usual δ; this share of the pairs may be left to Newton's method, and this one behind all iterations.
-"""
+
+SMALL = 0.01
+"""What is off by this share of its parts is nearly right."""
 
 
 def in_play(work, row):
     return work.candidates[row, CLOSED] == 1
-
-
-def usual_force(scene, work, step):
-    """How large forces are that stop, or hold, a body [N], in the mean."""
-    total, count = 0.0, 0
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
-            fx, fy = work.rates[NOW, body, FORCE], work.rates[NOW, body, FORCE + 1]
-            total += math.hypot(fx, fy)
-            count += 1
-    return total / max(count, 1)
-
-
-def friction_of(scene, work, row, step):
-    """Of a pair's friction, over its normal stiffness: by how much it grows with v_t [s], what it
-    would be if the pair stuck, and at most [m]; 0 where nothing limits it."""
-    if not has(scene, SLIP_LIMIT):
-        return 0.0, 0.0, 0.0
-    overlap, rate = work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
-    view = pressed_view(view_with(scene, work, row, step, overlap, 0.0, 0.0), overlap, 0.0)
-    found = contact_derivatives(scene, view)
-    stiffness = found[2] + found[4] / step
-    spring = -found[7] / stiffness
-    slope = spring * work.slip[PART, row] * step - found[9] / stiffness
-    stuck = spring * work.slip[NOW, row] + slope * rate
-    limit = slip_limit(scene, view)
-    return slope, stuck, spring * limit if limit < math.inf else 0.0
 
 
 def rate_along(work, row, kind, entries):
@@ -129,86 +83,122 @@ def rate_along(work, row, kind, entries):
     return total
 
 
-def begin(scene, work, step):
-    """δ and s of all pairs in play to begin with; (a usual δ [m], how many pairs there are)."""
-    count, stopped, way, stiffness = 0, 0.0, 0.0, 0.0
-    for row in range(work.tally[CANDIDATES]):
-        if in_play(work, row):
-            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-            speed = abs(rate_along(work, row, START, normal_rows(work, row)))
-            stopped += effective_mass(scene, a, b) * speed / step
-            way += step * speed
-            stiffness += normal_stiffness(scene, work, row, step, 1e-12)
-            count += 1
-    if count == 0 or not stiffness > 0.0:
-        return 0.0, 0
-    usual = (stopped + count * usual_force(scene, work, step)) / stiffness
-    way = max(way / count, usual)
-    for row in range(work.tally[CANDIDATES]):
-        if in_play(work, row):
-            gap = work.geometry[NOW, row, GAP]
-            overlap = max(-work.geometry[TRIAL, row, GAP], 0.1 * usual)
-            go_by(work, row, overlap, closed_share(work, row))
-            work.slip[LEFT, row] = max(gap + overlap, 0.1 * way)
-            _, stuck, _ = friction_of(scene, work, row, step)
-            work.slip[RUBBING, row] = 0.0
-            work.slip[AHEAD, row] = max(stuck, 0.1 * usual)
-            work.slip[BEHIND, row] = max(-stuck, 0.1 * usual)
-    return usual, count
+def part_of_step(work, row, limited):
+    """The part of the step for which a pair is closed, by how much that grows with δ, and by how
+    much it falls with s [1/m]: at their ends contact_mean's."""
+    over, left, before = (
+        work.slip[OVERLAP, row],
+        work.slip[LEFT, row],
+        work.geometry[TRIAL, row, GAP],
+    )
+    if before >= 0.0:
+        return over / (over + before), before / (over + before) ** 2, 0.0
+    if limited:
+        return 1.0, 0.0, 0.0
+    held = over + work.slip[FADES, row]
+    return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
 
 
-def mean_product(scene, work, step):
+def note_friction(scene, work, row, step):
+    """Write down of a pair, over its normal stiffness, HARDNESS [N/m]: by how much friction grows
+    with v_t, YIELDS [s], what it would be if the pair stuck, STUCK, and at most, LIMIT [m]; 0 where
+    nothing limits it, or there is none."""
+    slip, overlap, rate = work.slip, work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
+    view = pressed_view(view_with(scene, work, row, step, overlap, 0.0, 0.0), overlap, 0.0)
+    found = contact_derivatives(scene, view)
+    hardness, limit = found[2] + found[4] / step, 0.0
+    spring, drag = -found[7], -found[9]
+    if has(scene, SLIP_LIMIT):
+        held = slip_limit(scene, view)
+        if 0.0 < held < math.inf:
+            spring, drag = sticking_slopes(scene, view, held, step)
+            most = view_with(scene, work, row, step, overlap, held, abs(rate))
+            limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * spring * held) / hardness
+    part, _, _ = part_of_step(work, row, limit > 0.0)
+    slip[PART, row], slip[HARDNESS, row], slip[LIMIT, row] = part, hardness, limit
+    slip[YIELDS, row] = (spring * part * step + drag) / hardness
+    slip[STUCK, row] = spring / hardness * slip[NOW, row] + slip[YIELDS, row] * rate
+
+
+def mean_product(work):
     """The mean of δ s, p (L − f) and q (L + f) over the pairs in play [m²]."""
-    total, count = 0.0, 0
+    total, count, slip = 0.0, 0, work.slip
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
-            total += work.slip[OVERLAP, row] * work.slip[LEFT, row]
+            total += slip[OVERLAP, row] * slip[LEFT, row]
             count += 1
-            _, _, limit = friction_of(scene, work, row, step)
-            if limit > 0.0:
-                ahead, behind = work.slip[AHEAD, row], work.slip[BEHIND, row]
-                total += limit * (ahead + behind + work.slip[RUBBING, row] * (behind - ahead))
+            if slip[LIMIT, row] > 0.0:
+                ahead, behind = slip[AHEAD, row], slip[BEHIND, row]
+                both = ahead + behind + slip[RUBBING, row] * (behind - ahead)
+                total += slip[LIMIT, row] * both
                 count += 2
     return total / max(count, 1)
 
 
 def pull(work, row, target):
-    """By how much a pair's δ is to change where its gap stays, over δ + s times that [m²]."""
+    """By how much a pair's δ is to change where its gap stays [m]."""
     overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
     off = left - work.geometry[NOW, row, GAP] - overlap
-    return target - overlap * left + overlap * off
+    return (target - overlap * left + overlap * off) / (overlap + left)
 
 
-def drag(work, row, stuck, limit, target):
+def drag(work, row, target):
     """(w, by how much a pair's friction f is to change where v_t stays [m])."""
+    limit = work.slip[LIMIT, row]
     force = work.slip[RUBBING, row] * limit
     above, below = limit - force, limit + force
     weight = 1.0 / (1.0 + work.slip[AHEAD, row] / above + work.slip[BEHIND, row] / below)
-    return weight, weight * (stuck - force - target / above + target / below)
+    return weight, weight * (work.slip[STUCK, row] - force - target / above + target / below)
+
+
+def limited_friction(work, row, target, turns):
+    """(s T, how it falls with v_t, how it falls for a metre of the gap) of a pair with a limit; the
+    last one, by L, only if forces are to turn."""
+    slip, both = work.slip, work.slip[OVERLAP, row] + work.slip[LEFT, row]
+    weight, change = drag(work, row, target)
+    whole = slip[PART, row] * slip[HARDNESS, row]
+    force, slope = slip[RUBBING, row] * slip[LIMIT, row], whole * weight * slip[YIELDS, row]
+    if not turns:
+        return -whole * (force + change), slope, 0.0
+    by_limit = (1.0 - weight) * force
+    change += by_limit * pull(work, row, target) / slip[OVERLAP, row]
+    return -whole * (force + change), slope, -whole * by_limit / both
+
+
+def other_friction(scene, work, row, step, target):
+    """The same of one without."""
+    slip, both = work.slip, work.slip[OVERLAP, row] + work.slip[LEFT, row]
+    force = friction_force(scene, work, row, step)
+    slope, _, by_part = friction_slopes(scene, work, row, step)
+    _, grows, falls = part_of_step(work, row, False)
+    closing = pull(work, row, target)
+    leaving = closing - (slip[LEFT, row] - work.geometry[NOW, row, GAP] - slip[OVERLAP, row])
+    force += by_part * (grows * closing - falls * leaving)
+    return force, slope, by_part * (grows * slip[OVERLAP, row] + falls * slip[LEFT, row]) / both
 
 
 @apart
-def write_forces(scene, work, step, target):
+def write_forces(scene, work, step, target, turns):
     """Forces and derivatives of the pairs in play, δ and f changed as far as their gaps and v_t are
-    not."""
+    not; if they turn, with what that does, which is too large before they fit, and can make systems
+    indefinite: without it they are those of a convex problem."""
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
-            overlap, both = work.slip[OVERLAP, row], work.slip[OVERLAP, row] + work.slip[LEFT, row]
-            work.slip[PART, row] = closed_share(work, row)
+            overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
+            note_friction(scene, work, row, step)
             stiffness = normal_stiffness(scene, work, row, step, overlap)
             normal = normal_force(scene, work, row, step, overlap)
-            normal += stiffness * pull(work, row, target) / both
-            slope, stuck, limit = friction_of(scene, work, row, step)
-            if limit > 0.0:
-                weight, change = drag(work, row, stuck, limit, target)
-                whole = work.slip[PART, row] * stiffness
-                tangential = -whole * (work.slip[RUBBING, row] * limit + change)
-                slope *= whole * weight
-            else:
-                tangential = friction_force(scene, work, row, step)
-                slope = friction_slope(scene, work, row, step)
+            normal += stiffness * pull(work, row, target)
+            tangential, slope, coupled = 0.0, 0.0, 0.0
+            if work.slip[LIMIT, row] > 0.0:
+                tangential, slope, coupled = limited_friction(work, row, target, turns)
+            elif work.slip[YIELDS, row] > 0.0:
+                tangential, slope, coupled = other_friction(scene, work, row, step, target)
             push_pair(work, NOW, row, normal, tangential)
-            add_slopes(scene, work, row, overlap / both * stiffness, slope)
+            works = overlap / (overlap + left) * stiffness
+            add_slopes(scene, work, row, works, slope, coupled)
+            if turns:
+                add_turning(scene, work, row, normal, tangential)
 
 
 def room(share, size, change):
@@ -216,91 +206,94 @@ def room(share, size, change):
     return min(share, -FAR_FROM_WALL * size / change) if change < 0.0 else share
 
 
-def change_friction(scene, work, row, step, target, share):
-    """Change a pair's f, p and q by a share, or less where one would come to 0."""
-    known = work.slip
-    slope, stuck, limit = friction_of(scene, work, row, step)
-    if limit > 0.0:
-        weight, change = drag(work, row, stuck, limit, target)
-        change += weight * slope * rate_along(work, row, CHANGE, tangent_rows(work, row))
-        ahead, behind, force = known[AHEAD, row], known[BEHIND, row], known[RUBBING, row] * limit
-        above, below = limit - force, limit + force
-        more = (target + ahead * change) / above - ahead
-        less = (target - behind * change) / below - behind
-        share = room(room(share, ahead, more), behind, less)
-        share = room(room(share, above, -change), below, change)
+def change_friction(work, row, target, share, go):
+    """The share of the changes of p, q and f that keeps them where they belong, not above the one
+    that is given; if they are to ``go``, they go that far."""
+    known, limit = work.slip, work.slip[LIMIT, row]
+    weight, change = drag(work, row, target)
+    rate = rate_along(work, row, CHANGE, tangent_rows(work, row))
+    stuck = known[YIELDS, row] * rate
+    change += weight * stuck
+    ahead, behind, force = known[AHEAD, row], known[BEHIND, row], known[RUBBING, row] * limit
+    above, below = limit - force, limit + force
+    more = (target + ahead * change) / above - ahead
+    less = (target - behind * change) / below - behind
+    if go:
+        known[STUCK, row] += share * stuck
         known[RUBBING, row] += share * change / limit
         known[AHEAD, row] += share * more
         known[BEHIND, row] += share * less
+        return share
+    share = room(room(share, ahead, more), behind, less)
+    return room(room(share, above, -change), below, change)
 
 
-def change_pair(scene, work, row, step, target, share, go):
-    """The share of the changes of δ and s that keeps them above 0, not above the one that is given;
-    if they are to ``go``, they go that far, and friction with them."""
+def change_pair(work, row, step, target, share, go):
+    """The same of δ and s, and of friction."""
     known = work.slip
     overlap, left = known[OVERLAP, row], known[LEFT, row]
     opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
-    closing = (pull(work, row, target) - overlap * opening) / (overlap + left)
+    closing = pull(work, row, target) - overlap / (overlap + left) * opening
     leaving = opening + closing - (left - work.geometry[NOW, row, GAP] - overlap)
+    if known[LIMIT, row] > 0.0:
+        share = change_friction(work, row, target, share, go)
     if go:
-        change_friction(scene, work, row, step, target, share)
         known[OVERLAP, row] += share * closing
         known[LEFT, row] += share * leaving
         # The limit of friction goes with δ, and p and q the other way, as their products stay.
-        known[AHEAD, row] *= overlap / known[OVERLAP, row]
-        known[BEHIND, row] *= overlap / known[OVERLAP, row]
+        grown = known[OVERLAP, row] / overlap
+        known[LIMIT, row] *= grown
+        known[AHEAD, row] /= grown
+        known[BEHIND, row] /= grown
+        return share
     return room(room(share, overlap, closing), left, leaving)
 
 
 @apart
-def change_pairs(scene, work, step, target, share, go):
-    """The same of all pairs in play."""
+def change_pairs(work, step, target):
+    """Change all pairs in play as the velocities in CHANGE do, as far as they may: the share."""
+    share = 1.0
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
-            least = change_pair(scene, work, row, step, target, share, go)
-            share = share if go else least
+            share = change_pair(work, row, step, target, share, False)
+    for row in range(work.tally[CANDIDATES]):
+        if in_play(work, row):
+            change_pair(work, row, step, target, share, True)
     return share
 
 
-def in_doubt(scene, work, step, usual):
-    """How many pairs have neither δ nor s, or neither how far they slide nor what is left until
-    they do, far below a usual overlap."""
-    count = 0
-    for row in range(work.tally[CANDIDATES]):
-        if in_play(work, row):
-            doubt = min(work.slip[OVERLAP, row], work.slip[LEFT, row])
-            _, _, limit = friction_of(scene, work, row, step)
-            force = work.slip[RUBBING, row] * limit
-            doubt = max(doubt, min(work.slip[AHEAD, row], limit - force))
-            doubt = max(doubt, min(work.slip[BEHIND, row], limit + force))
-            count += 1 if doubt > FOUND * usual else 0
-    return count
+def in_doubt(work, row, least):
+    """Whether a pair has neither δ nor s below a size [m]; or, closed, neither how far it slides
+    nor what is left until it does below that or a small share of L."""
+    known, limit = work.slip, work.slip[LIMIT, row]
+    if min(known[OVERLAP, row], known[LEFT, row]) > least:
+        return True
+    if known[OVERLAP, row] < known[LEFT, row]:
+        return False
+    force, least = known[RUBBING, row] * limit, min(least, SMALL * max(limit, least))
+    sides = max(min(known[AHEAD, row], limit - force), min(known[BEHIND, row], limit + force))
+    return limit > 0.0 and sides > least
+
+
+def is_off(work, row, least):
+    """Whether the gap of a pair is not s − δ, or how far it slides not e − f, by far more than
+    their parts, or than a size [m]."""
+    known = work.slip
+    both = known[OVERLAP, row] + known[LEFT, row]
+    off = known[LEFT, row] - work.geometry[NOW, row, GAP] - known[OVERLAP, row]
+    if abs(off) > SMALL * max(both, least):
+        return True
+    limit, ahead, behind = known[LIMIT, row], known[AHEAD, row], known[BEHIND, row]
+    off = known[STUCK, row] - known[RUBBING, row] * limit - ahead + behind
+    return limit > 0.0 and abs(off) > SMALL * max(limit + ahead + behind, least)
 
 
 @apart
-def find_closed(scene, work, clock, step):
-    """Bring the velocities near those of the step's end; False where that fails."""
-    time = clock[TIME]
-    evaluate_others(scene, work, time, step)
-    flag_close(scene, work)
-    usual, count = begin(scene, work, step)
-    if count == 0:
-        return True
-    gather_clusters(scene, work)
-    share = 0.0
-    for _ in range(MOST_ITERATIONS):
-        target = FALLING if share >= LEAST_WAY else STANDING
-        target *= mean_product(scene, work, step)
-        assemble_rest(scene, work, clock, step)
-        write_forces(scene, work, step, target)
-        if not factorise_euler(scene, work, step):
+def settled(work, least, fitting):
+    """Whether of all pairs it is known if they close and slide, by a size [m]; and, for
+    ``fitting``, if that fits their gaps and rates."""
+    for row in range(work.tally[CANDIDATES]):
+        open_question = in_doubt(work, row, least) or (fitting and is_off(work, row, least))
+        if open_question and in_play(work, row):
             return False
-        if not solve_change(scene, work, step) < math.inf:
-            return False
-        share = change_pairs(scene, work, step, target, 1.0, False)
-        change_pairs(scene, work, step, target, share, True)
-        go_along(work, share)
-        evaluate_others(scene, work, time, step)
-        if share > LEAST_WAY and in_doubt(scene, work, step, usual) <= DOUBTS * count:
-            return True
-    return in_doubt(scene, work, step, usual) <= MOST_DOUBTS * count
+    return True

@@ -5,10 +5,7 @@
 The derivatives are those of the contacts that are closed, stick and slide at the iterate, and
 follow it: with contacts as springs these are the active sets of the complementarity problem that
 hard contacts pose (Moreau 1988, Jean 1999; Christensen, Klarbring, Pang & Strömberg 1998 for the
-method). A full step may close and open contacts by turns for ever; so the way along it ends where
-the forces have done their work, g(α) = Σ r(α)·d = 0, r being what the forces do not balance: the
-minimum of the potential that there is without friction, where Newton's method with such a search
-ends after finitely many steps.
+method). It finds the end alone from where the sets are known; interior.py leads there.
 
 The iterate stands in NOW, the contacts that may close in it flagged as closed; the step's start
 meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
@@ -20,11 +17,10 @@ from flocsim.arrays import (
     CANDIDATES,
     CHANGE,
     CLOSED,
-    DOES,
     EDGE_BODY,
+    FADES,
     FORCE,
     FREE,
-    GAIN,
     GAP,
     GEOMETRY_COLUMNS,
     LEADER_FORCE,
@@ -48,16 +44,10 @@ from flocsim.compiler.composer import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.backward_euler.contact_mean import (
-    acts,
+    FADING,
     add_all_derivatives,
     add_mean_forces,
-    closed_share,
-    end_overlap,
     flag_close,
-    follow,
-    friction_force,
-    go_by,
-    mode_of,
     takes_part,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
@@ -70,24 +60,14 @@ from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.laws import CONTACT_FORCE, has
 
-NEWTON_SHARE = 1e-3
+NEWTON_SHARE = 0.01
 """Newton's method goes on until what is left is below this share of the tolerance."""
 
-GOOD_PACE = 0.1
-"""Factors are used again while the sets are the same and changes shrink by so much at least."""
-
-OVERSHOT = 0.5
-"""A change is cut where the forces are so many times as far from balance along it behind as before,
-the other way."""
-
-CUT_TO = 0.5
-"""It is cut to where they are but so many times as far from balance."""
-
-MOST_CUTS = 12
-"""Places tried along a step."""
+MOST_ITERATIONS = 8
+"""Iterations in which it has to find the end: where it does not by then, the sets are not known."""
 
 
-def begin_step(work):
+def begin_step(work, clock):
     """Keep the start of the step."""
     for body in range(work.motion.shape[1]):
         for axis in range(MOTION_COLUMNS):
@@ -96,7 +76,8 @@ def begin_step(work):
         for column in range(GEOMETRY_COLUMNS):
             work.geometry[TRIAL, row, column] = work.geometry[NOW, row, column]
         work.candidates[row, CLOSED] = OPEN
-        go_by(work, row, end_overlap(work, row), closed_share(work, row))
+        least = FADING * clock[TOLERANCE]
+        work.slip[FADES, row] = max(-work.geometry[NOW, row, GAP], least)
 
 
 def put_back(work):
@@ -167,17 +148,6 @@ def unbalanced(scene, work, body, axis, step):
     return force - momentum_change(scene, work, body, axis, step)
 
 
-def along_change(scene, work, step):
-    """g: what the forces do not balance, along the change that is in CHANGE."""
-    total = 0.0
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
-            for axis in range(3):
-                change = work.motion[CHANGE, body, VELOCITY + axis]
-                total += change * unbalanced(scene, work, body, axis, step)
-    return total
-
-
 def write_load(scene, work, step):
     """What the forces do not balance, of a cluster as a whole in the rows of its first body: forces
     and rates apart, so that what is mutual cancels."""
@@ -207,14 +177,13 @@ def assemble_rest(scene, work, clock, step):
     assemble_others(scene, work, clock[TIME] + step, remaining)
 
 
-def refresh(scene, work, clock, step, coupled):
-    """Factorise anew at the iterate, by ``coupled`` also with how friction goes by the gaps; False
-    where that fails."""
+def refresh(scene, work, clock, step):
+    """Factorise anew at the iterate; False where that fails."""
     flag_close(scene, work)
     gather_clusters(scene, work)
     assemble_rest(scene, work, clock, step)
     if has(scene, CONTACT_FORCE):
-        add_all_derivatives(scene, work, step, coupled)
+        add_all_derivatives(scene, work, step)
     return factorise_euler(scene, work, step)
 
 
@@ -243,95 +212,24 @@ def go_along(work, way):
             work.motion[NOW, body, axis] += way * work.motion[CHANGE, body, axis]
 
 
-@apart
-def search(scene, work, time, step, overshot):
-    """Go along the change until the forces have done their work: the share of it that is gone, −1
-    where no place is found. The whole change will do where they are but ``overshot`` times as far
-    from balance along it as before, the other way."""
-    before = along_change(scene, work, step)
-    go_along(work, 1.0)
-    fits = evaluate_end(scene, work, time, step)
-    at = along_change(scene, work, step) if fits else -math.inf
-    if overshot == math.inf or at >= -overshot * abs(before):
-        return 1.0
-    low, high, share = 0.0, 1.0, 1.0
-    at_low, at_high = before, at
-    for _ in range(MOST_CUTS):
-        middle = 0.5 * (low + high)
-        if 0.0 < at_low < math.inf and -math.inf < at_high < 0.0:
-            # Not too near to either end: the function has kinks.
-            middle = low + (high - low) * at_low / (at_low - at_high)
-            middle = min(max(middle, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
-        go_along(work, middle - share)
-        share = middle
-        fits = evaluate_end(scene, work, time, step)
-        at = along_change(scene, work, step) if fits else -math.inf
-        if abs(at) <= CUT_TO * abs(before):
-            return share
-        if at > 0.0:
-            low, at_low = share, at
-        else:
-            high, at_high = share, at
-    return share if at > -math.inf else -1.0
+def goal_of(scene, work, clock, step):
+    """What a change may be at most where it is the last one [m]."""
+    return max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
 
 
 @apart
-def note_modes(work):
-    """Write down what all pairs do now; whether any does another thing than before."""
-    changed, pairs = False, work.candidates
-    for row in range(work.tally[CANDIDATES]):
-        mode = mode_of(work, row)
-        changed = changed or pairs[row, DOES] != mode
-        pairs[row, DOES] = mode
-    return changed
-
-
-def renew_friction(scene, work, step):
-    """Let the friction of all pairs go by how they are pressed now; whether that changes any."""
-    changed = False
-    for row in range(work.tally[CANDIDATES]):
-        if acts(work, row):
-            before = friction_force(scene, work, row, step)
-            follow(work, row)
-            changed = friction_force(scene, work, row, step) != before or changed
-    return changed
-
-
-@apart
-def solve_end(scene, work, clock, step, most):
+def solve_end(scene, work, clock, step):
     """Find the end of the step, of which begin_step has kept the start, from velocities that are
-    near it; False where it is not found in so many iterations."""
-    time = clock[TIME]
-    if not evaluate_end(scene, work, time, step):
-        return False
-    note_modes(work)
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[GAIN, row] = 1.0
-    before, fresh, renewed, couple = math.inf, False, False, True
-    for _ in range(most):
-        coupled = renewed and couple
-        if not fresh and not refresh(scene, work, clock, step, coupled):
+    near it; False where it is not found."""
+    for _ in range(MOST_ITERATIONS):
+        if not evaluate_end(scene, work, clock[TIME], step):
+            return False
+        if not refresh(scene, work, clock, step):
             return False
         change = solve_change(scene, work, step)
         if not change < math.inf:
             return False
-        goal = max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
-        # Coupled friction has no potential, and rounding may have the last word on the balance.
-        overshot = math.inf if coupled or change <= goal else OVERSHOT
-        share = search(scene, work, time, step, overshot)
-        if share < 0.0:
-            return False
-        pace = change / before if before < math.inf else 0.5
-        small = share == 1.0 and pace < 1.0 and change * pace <= goal * (1.0 - pace)
-        if small and renewed:
-            return True
-        same = not note_modes(work) and share == 1.0
-        couple = couple and (same or not coupled)
-        fresh, before = same and pace < GOOD_PACE, change if same else math.inf
-        renewed = (same or small) and renew_friction(scene, work, step)
-        if small and not renewed:
-            return True
-        fresh = fresh and coupled == (renewed and couple)
-        if renewed and not evaluate_end(scene, work, time, step):
-            return False
+        go_along(work, 1.0)
+        if change <= goal_of(scene, work, clock, step):
+            return evaluate_end(scene, work, clock[TIME], step)
     return False

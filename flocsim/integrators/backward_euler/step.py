@@ -12,12 +12,10 @@ from flocsim.arrays import (
     BUSY,
     CANDIDATES,
     EDGE_BODY,
-    FULL,
     GAP,
     LOOKED_AT,
     NORMAL_X,
     NORMAL_Y,
-    NOTHING_FULL,
     NOW,
     PREVIOUS_STEP,
     RATES_KNOWN,
@@ -37,17 +35,14 @@ from flocsim.arrays import (
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import takes_part
 from flocsim.integrators.backward_euler.estimate import estimate_step, write_rates
-from flocsim.integrators.backward_euler.interior import find_closed
-from flocsim.integrators.backward_euler.newton import begin_step, end_step, put_back, solve_end
+from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
+from flocsim.integrators.backward_euler.path import find_closed
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.events.resolution import bounces
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, memory_of
-
-QUICK, MOST_ITERATIONS = 5, 24
-"""Iterations of Newton's method from the start of the step, and from where the interior-point
-method has come, before a step is given up and made smaller."""
+from flocsim.laws import CONTACT_FORCE, has
 
 FEW = 2
 """Behind a step with so few switches at most, Newton's method is tried alone."""
@@ -71,16 +66,9 @@ def next_across(clock, step, ratio):
 
 def solve_step(scene, work, clock, step):
     """Find the end of the step; False where it is not found."""
-    if clock[BUSY] == 0.0:
-        if solve_end(scene, work, clock, step, QUICK):
-            return True
-        if work.tally[FULL] != NOTHING_FULL:
-            return False
-        put_back(work)
-    clock[BUSY] = 1.0
-    if not find_closed(scene, work, clock, step):
+    if has(scene, CONTACT_FORCE) and not find_closed(scene, work, clock, step):
         return False
-    return solve_end(scene, work, clock, step, MOST_ITERATIONS)
+    return solve_end(scene, work, clock, step)
 
 
 def speed_along(work, row, state):
@@ -115,7 +103,7 @@ def fastest_bounce(scene, work, clock, lasting):
 @apart
 def euler_step(scene, work, clock, step, lasting):
     """One step: (error over tolerance, −1 where it fails; see fastest_bounce)."""
-    begin_step(work)
+    begin_step(work, clock)
     found, bounce = solve_step(scene, work, clock, step), 0.0
     if found:
         estimate_step(scene, work, clock, step)

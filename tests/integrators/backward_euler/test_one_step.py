@@ -10,7 +10,7 @@ from flocsim import Body, Sphere
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators.rhs.error import FREE_SHARE
 from flocsim.swarms.walls import floor
-from tests.helpers.one_step import Stage, newton_alone, newton_from_inside
+from tests.helpers.one_step import Stage, from_anywhere, from_before
 from tests.helpers.swarm_scenes import WATER, R, forces
 
 K_N = 20.0
@@ -54,7 +54,7 @@ def potential_of(stage, bodies, step):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("how", [newton_alone, newton_from_inside])
+@pytest.mark.parametrize("how", [from_before, from_anywhere])
 def test_a_step_ends_at_the_minimum_of_its_potential(seed, how):
     """Springs a ten-thousandth as hard, which a plain minimisation can follow."""
     bodies, step = heap(seed), 1e-4
@@ -73,13 +73,13 @@ def test_a_step_ends_at_the_minimum_of_its_potential(seed, how):
 @pytest.mark.parametrize("friction", ["none", 0.3])
 def test_both_ways_lead_to_the_same_end(friction):
     ends, step = [], 1e-5
-    for how in (newton_alone, newton_from_inside):
+    for how in (from_before, from_anywhere):
         stage = Stage(heap(5), forces(friction=friction), WATER)
         assert stage.end(step, how)
         ends.append(stage.velocity)
     ends = np.array(ends) * [1.0, 1.0, R]
-    # Newton's method ends a thousandth of the tolerance from where it goes.
-    assert step * np.abs(ends[0] - ends[1]).max() < 1e-12
+    # Newton's method ends a hundredth of the tolerance from where it goes at most.
+    assert step * np.abs(ends[0] - ends[1]).max() < 1e-11
     assert step * np.abs(ends[0]).max() > 1e-9
 
 
