@@ -2,8 +2,8 @@
 also the steps across switches that Implicit goes over to by itself.
 
 All pairs of few bodies are watched, their systems are dense (flocsim.arrays: ALL_PAIRS, DENSE), and
-two are never handed over (backward_euler/choice.py: FEWEST), so that none of this is ever reached;
-leaving it out saves what compiling it takes.
+two are not handed over in a System (backward_euler/choice.py: FEWEST), so that none of this is
+reached; leaving it out saves what compiling it takes.
 """
 
 import math

@@ -11,7 +11,7 @@ from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 
 
 def from_before(scene, work, clock, step):
-    """One step from contacts as they are at its start, or from anywhere where that leads nowhere."""
+    """One step from contacts as they are at its start, or else from anywhere."""
     clock[BUSY] = 0.0
     begin_step(work, clock)
     return solve_step(scene, work, clock, step)

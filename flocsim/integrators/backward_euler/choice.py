@@ -1,10 +1,11 @@
 """The rule by which Implicit hands over to backward Euler, and takes back, in System and Swarm.
 
 Steps that end at every switch are right for few contacts. In a bed some contact opens or closes all
-the time, while nothing moves. So, where FEWEST bodies or more are run together and touch:
+the time, while nothing moves. So, where bodies are run together and touch:
 
 - Behind every PROBE steps that end at switches it looks how far they have come: where backward
-  Euler would have passed that time in AHEAD times fewer steps than were tried, it goes on.
+  Euler would have passed that time in AHEAD times fewer steps than were tried, it goes on; where
+  there are fewer bodies than FEWEST, in FAR_AHEAD times fewer, as a pair of a swarm that hums.
 - It gives back where nothing touches any more, where ENOUGH_TRIALS of its steps had fewer than
   FEW_SWITCHES switches each, and where bodies would fly apart again, by more than is allowed.
 
@@ -39,13 +40,14 @@ from flocsim.integrators.rhs.views import lever
 from flocsim.laws import CONTACT_FORCE, has
 
 FEWEST = 3
-"""Bodies, fixed ones among them: two have few contacts, and engines of pairs compile faster."""
+"""Bodies, fixed ones among them: two have few contacts; a System of two leaves all of this out."""
 
 PROBE = 60
 """Steps with located switches between two looks at how far they have come."""
 
-AHEAD = 4.0
-"""Backward Euler must be expected to need so many times fewer steps."""
+AHEAD, FAR_AHEAD = 4.0, 40.0
+"""Backward Euler must be expected to need so many times fewer steps; and of fewer bodies than that.
+"""
 
 ENOUGH_TRIALS, FEW_SWITCHES = 60, 0.25
 """Behind so many trials with fewer switches than that for each, located switches cost no more."""
@@ -67,20 +69,20 @@ def pays(scene, work, clock, trials, passed):
     """Whether backward Euler would have passed that time in far fewer steps than were tried: its
     error of a step is half of that times the change of velocity."""
     steps = 1.0 + passed * largest_change(scene, work) / clock[TOLERANCE]
-    return AHEAD * steps <= trials
+    ahead = AHEAD if work.bodies.shape[0] >= FEWEST else FAR_AHEAD
+    return ahead * steps <= trials
 
 
 def hand_over(scene, work, clock, counts):
     """Hand over to backward Euler, or take back, where that is due."""
-    few = work.bodies.shape[0] < FEWEST or not has(scene, CONTACT_FORCE)
-    if few and clock[ACROSS] == 0.0:
+    if not has(scene, CONTACT_FORCE) and clock[ACROSS] == 0.0:
         return
     tried = counts[STEPS] + counts[REJECTED] + counts[LOCATED]
     trials = tried - counts[LOOKED_TRIED]
     if clock[ACROSS] == 1.0:
         enough = trials >= ENOUGH_TRIALS
         quiet = enough and clock[SWITCHES] < FEW_SWITCHES * trials
-        if few or quiet or least_listed_gap(work) >= 0.0:
+        if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
         elif not enough:
             return

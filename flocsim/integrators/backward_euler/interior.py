@@ -49,8 +49,6 @@ from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
     friction_force,
     friction_slopes,
-    normal_force,
-    normal_stiffness,
     sticking_slopes,
     view_with,
 )
@@ -99,16 +97,22 @@ def part_of_step(work, row, limited):
     return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
 
 
-def note_friction(scene, work, row, step):
-    """Write down of a pair, over its normal stiffness, HARDNESS [N/m]: by how much friction grows
+def press(scene, work, row, step):
+    """(N of a pair of the overlap δ [N], how it grows with that [N/m]).
+
+    Of its friction is written down, over a normal stiffness, HARDNESS [N/m]: by how much it grows
     with v_t, YIELDS [s], what it would be if the pair stuck, STUCK, and at most, LIMIT [m]; 0 where
     nothing limits it, or there is none."""
     slip, overlap, rate = work.slip, work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
-    view = pressed_view(view_with(scene, work, row, step, overlap, 0.0, 0.0), overlap, 0.0)
-    found = contact_derivatives(scene, view)
-    hardness, limit = found[2] + found[4] / step, 0.0
+    view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
+    found, limit = contact_derivatives(scene, view), 0.0
+    stiffness = hardness = found[2] + found[4] / step
     spring, drag = -found[7], -found[9]
     if has(scene, SLIP_LIMIT):
+        if not hardness > 0.0:
+            # The law has clipped what pulls.
+            pressed = contact_derivatives(scene, pressed_view(view, overlap, 0.0))
+            hardness = pressed[2] + pressed[4] / step
         held = slip_limit(scene, view)
         if 0.0 < held < math.inf:
             spring, drag = sticking_slopes(scene, view, held, step)
@@ -118,6 +122,7 @@ def note_friction(scene, work, row, step):
     slip[PART, row], slip[HARDNESS, row], slip[LIMIT, row] = part, hardness, limit
     slip[YIELDS, row] = (spring * part * step + drag) / hardness
     slip[STUCK, row] = spring / hardness * slip[NOW, row] + slip[YIELDS, row] * rate
+    return found[0], stiffness
 
 
 def mean_product(work):
@@ -185,9 +190,7 @@ def write_forces(scene, work, step, target, turns):
     for row in range(work.tally[CANDIDATES]):
         if in_play(work, row):
             overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
-            note_friction(scene, work, row, step)
-            stiffness = normal_stiffness(scene, work, row, step, overlap)
-            normal = normal_force(scene, work, row, step, overlap)
+            normal, stiffness = press(scene, work, row, step)
             normal += stiffness * pull(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
             if work.slip[LIMIT, row] > 0.0:

@@ -36,7 +36,7 @@ from flocsim.integrators.backward_euler.interior import (
     change_pairs,
     in_play,
     mean_product,
-    note_friction,
+    press,
     rate_along,
     settled,
     write_forces,
@@ -119,7 +119,7 @@ def begin_anywhere(scene, work, step, usual, way):
             known = work.slip
             known[OVERLAP, row] = max(-work.geometry[TRIAL, row, GAP], AWAY * usual)
             known[LEFT, row] = max(work.geometry[NOW, row, GAP] + known[OVERLAP, row], AWAY * way)
-            note_friction(scene, work, row, step)
+            press(scene, work, row, step)
             known[RUBBING, row] = 0.0
             known[AHEAD, row] = max(known[STUCK, row], AWAY * usual)
             known[BEHIND, row] = max(-known[STUCK, row], AWAY * usual)
@@ -136,7 +136,7 @@ def begin_as_before(scene, work, step, usual):
             else:
                 known[LEFT, row] = max(work.geometry[NOW, row, GAP], FOUND * usual)
                 known[OVERLAP, row] = target / known[LEFT, row]
-            note_friction(scene, work, row, step)
+            press(scene, work, row, step)
             limit, side = known[LIMIT, row], work.candidates[row, SLIDING]
             if limit > 0.0:
                 share = float(side) if side != 0 else known[STUCK, row] / limit

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from flocsim import Body, Sphere
+from flocsim.arrays import CANDIDATES, GAP, NOW
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators.rhs.error import FREE_SHARE
 from flocsim.swarms.walls import floor
@@ -162,3 +163,29 @@ def test_a_disc_that_slides_begins_to_roll_by_no_more_than_friction():
     slip = stage.velocity[1, 0] + R * stage.velocity[1, 2]
     assert abs(slip) < 1e-2 * abs(stage.velocity[1, 0])
     assert stage.velocity[1, 0] > 1e-4
+
+
+def energy_of(stage, bodies, contact):
+    """Of motion, and of the springs of what touches [J]."""
+    mass = np.array([[body.mass, body.mass, body.inertia] for body in bodies])
+    free = np.array([not body.fixed for body in bodies])
+    work = stage.work
+    rows = np.arange(work.tally[CANDIDATES])
+    overlap = np.maximum(-work.geometry[NOW, rows, GAP], 0.0)
+    slip = np.where(overlap > 0.0, work.slip[NOW, rows], 0.0)
+    springs = contact.k_n * np.sum(overlap**2) + contact.shear * np.sum(slip**2)
+    return 0.5 * (np.sum(mass[free] * stage.velocity[free] ** 2) + springs)
+
+
+@pytest.mark.parametrize("friction", ["none", 0.0, 0.01, 0.4])
+@pytest.mark.parametrize("step", [1e-6, 2e-5])
+def test_energy_never_grows_without_gravity(friction, step):
+    """Whatever opens, closes, sticks or slides in a step."""
+    bodies, contact = heap(3, speed=2e-3), Contact(friction=friction)
+    stage = Stage(bodies, [contact])
+    energy = [energy_of(stage, bodies, contact)]
+    for _ in range(6):
+        stage.step(step)
+        energy.append(energy_of(stage, bodies, contact))
+    assert np.all(np.diff(energy) <= 1e-9 * energy[0])
+    assert energy[-1] < 0.95 * energy[0]
