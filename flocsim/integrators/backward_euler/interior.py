@@ -266,10 +266,11 @@ def change_pairs(work, step, target):
 
 
 def in_doubt(work, row, least):
-    """Whether a pair has neither δ nor s below a size [m]; or, closed, neither how far it slides
-    nor what is left until it does below that or a small share of L."""
+    """Whether a pair has neither δ nor s below a small share of both, or of a size [m]; or, closed,
+    neither how far it slides nor what is left until it does below that or a small share of L."""
     known, limit = work.slip, work.slip[LIMIT, row]
-    if min(known[OVERLAP, row], known[LEFT, row]) > least:
+    both = known[OVERLAP, row] + known[LEFT, row]
+    if min(known[OVERLAP, row], known[LEFT, row]) > SMALL * max(both, least):
         return True
     if known[OVERLAP, row] < known[LEFT, row]:
         return False
@@ -284,7 +285,7 @@ def is_off(work, row, least):
     known = work.slip
     both = known[OVERLAP, row] + known[LEFT, row]
     off = known[LEFT, row] - work.geometry[NOW, row, GAP] - known[OVERLAP, row]
-    if abs(off) > SMALL * max(both, least):
+    if abs(off) > SMALL * max(both, SMALL * least):
         return True
     limit, ahead, behind = known[LIMIT, row], known[AHEAD, row], known[BEHIND, row]
     off = known[STUCK, row] - known[RUBBING, row] * limit - ahead + behind
