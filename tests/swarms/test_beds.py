@@ -126,15 +126,25 @@ def test_friction_keeps_a_heap_from_flattening():
     assert ends[0.0] < 1.01 * R
 
 
-def test_polygons_with_friction_pile_up_as_cheaply_as_those_that_stick():
-    """Pairs that nothing attracts slide one way and the other within a step."""
+@pytest.mark.parametrize("friction", ["none", 0.01, 0.4])
+def test_polygons_pile_up_as_cheaply_as_those_that_stick(friction):
+    """Pairs that nothing attracts slide one way and the other within a step, or bear next to
+    nothing."""
     steps = {}
     for attraction in (True, False):
-        run = pile_of(10, 0.4, attraction, 1e-9).run(3.0, max_steps=20_000)
+        run = pile_of(10, friction, attraction, 1e-9).run(3.0, max_steps=20_000)
         assert run.status == Status.FINISHED
         assert np.abs(run.velocity[-1, :, :2]).max() < 1e-9
         steps[attraction] = run.effort.steps
     assert steps[False] <= 3.0 * steps[True]
+
+
+@pytest.mark.parametrize("friction", ["none", 0.4])
+def test_fifty_polygons_come_to_rest_though_nothing_holds_them(friction):
+    run = pile_of(50, friction, False, 1e-9).run(2.5, max_steps=20_000)
+    assert run.status == Status.FINISHED
+    assert np.abs(run.velocity[-1, :, :2]).max() < 1e-5
+    assert run.effort.steps < 60_000
 
 
 def test_sticking_polygons_settle_though_some_part_by_their_tangential_force():
