@@ -273,7 +273,7 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     SEEN_STEP,  # size of its step [s]
     ACROSS,  # 1 where steps go on across switches, 0 where they end there
     RATES_KNOWN,  # of steps across them: 1 where LAST_RATES are known
-    BUSY,  # 1 where so many contacts switch in a step that Newton's method alone is slow
+    BUSY,  # 1 where so many contacts switch that a step does not begin with them as they were
     SWITCHES,  # how many there were since a method last looked how far it has come
     LOOKED_AT,  # when that was [s]; inf: it is to do so anew
     CYCLE_AT,  # the end of the last cycle of switches [s]

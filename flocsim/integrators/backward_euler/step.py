@@ -45,7 +45,7 @@ from flocsim.integrators.rhs.views import contact_view, memory_of
 from flocsim.laws import CONTACT_FORCE, has
 
 FEW = 2
-"""Behind a step with so few switches at most, Newton's method is tried alone."""
+"""Behind a step with so few switches at most, contacts are taken to be as they were, first."""
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 5.0, 0.1
 """The next step is that much shorter than would just do; bounds of the change."""
