@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from flocsim import geometry as geometry
     from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
-    from flocsim.ensembles.studies.compare import Comparison, compare
+    from flocsim.ensembles.studies.compare import Comparison, SwarmComparison, compare
     from flocsim.ensembles.studies.opened import StudyResults
+    from flocsim.ensembles.studies.opened import open_any as open
     from flocsim.ensembles.studies.study import Study
-    from flocsim.ensembles.studies.sweep import open_any as open
     from flocsim.ensembles.studies.sweep import sweep
     from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape
@@ -41,6 +41,7 @@ HOMES = {
     "State": "trajectories.trajectory",
     "Status": "integrators.base",
     "Swarm": "swarms.swarm",
+    "SwarmComparison": "ensembles.studies.compare",
     "SwarmResults": "io.results.swarm_file",
     "SwarmTrajectory": "swarms.trajectory",
     "Study": "ensembles.studies.study",
@@ -52,7 +53,7 @@ HOMES = {
     "compare": "ensembles.studies.compare",
     "curvilinear_factor": "io.results.curvilinear",
     "floor": "swarms.walls",
-    "open": "ensembles.studies.sweep:open_any",
+    "open": "ensembles.studies.opened:open_any",
     "sweep": "ensembles.studies.sweep",
     "wall": "swarms.walls",
 }
@@ -75,6 +76,7 @@ __all__ = [
     "Study",
     "StudyResults",
     "Swarm",
+    "SwarmComparison",
     "SwarmResults",
     "SwarmTrajectory",
     "SweepResults",

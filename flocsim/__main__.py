@@ -10,7 +10,7 @@ from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 from flocsim.limits import check_memory, is_limited
 
-if {"ensemble", "kernel", "swarm"}.intersection(sys.argv[1:2]):
+if {"ensemble", "kernel", "swarm", "strength"}.intersection(sys.argv[1:2]):
     fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
@@ -21,7 +21,7 @@ from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError
 
-STUDIES = {"ensemble", "kernel", "swarm"}
+STUDIES = {"ensemble", "kernel", "swarm", "strength"}
 """Commands that run studies, also under mpirun."""
 
 ALONE = (

@@ -69,7 +69,10 @@ INNER_ROWS = {
     "ensembles": [
         ["strength"],
         ["cli", "studies"],
-        ["dry_run", "runner", "report", "unfinished", "suspension"],
+        ["runner", "unfinished"],
+        ["kinds"],
+        ["pairs", "swarms"],
+        ["dry_run", "report"],
         ["parallel"],
         ["pilot"],
         ["estimates"],
@@ -79,6 +82,7 @@ INNER_ROWS = {
         ["preflight"],
         ["impact"],
         ["collision"],
+        ["kind"],
         ["config", "chunks"],
     ],
     "io": [

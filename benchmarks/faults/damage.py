@@ -80,7 +80,7 @@ def believed_wrong(folder, study, identity, truth, is_border):
     journal = Journal(folder / "study.h5.journal")
     start = Beginning(RowStore(journal, study.conditions), identity)
     try:
-        take_journal(start)
+        take_journal(start, study)
     except FlocsimError:
         return ""  # refused as a whole
     finally:

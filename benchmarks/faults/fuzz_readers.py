@@ -28,6 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
+from flocsim.ensembles.storage.identity import short
 from flocsim.errors import ConfigError, FileError, FlocsimError
 from tests.helpers import hostile_files
 
@@ -69,7 +70,7 @@ def read_kernel_file(path):
 
 def read_strengths_file(path):
     """Read it, describe it, draw it."""
-    from flocsim.ensembles.strength.distribution import table_of
+    from flocsim.ensembles.estimates.strengths import table_of
     from flocsim.io.plots.strength import over_rate
     from flocsim.io.results.strength_file import read_strengths
 
@@ -147,37 +148,24 @@ class SwarmJournalReader:
     """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
 
     def __init__(self, folder):
-        from flocsim.ensembles.suspension.checks import Form
-        from flocsim.ensembles.suspension.records import Part
-        from flocsim.ensembles.suspension.study import SwarmStudy
-        from flocsim.io.journal.records import SNAPSHOT
-        from flocsim.swarms.progress import Effort
+        from flocsim.ensembles.chunks import chunk_record, kept_record
+        from flocsim.ensembles.swarms.study import SwarmStudy
+        from flocsim.io.journal.records import CHUNK, SNAPSHOT, record_at
         from tests.helpers.swarm_study import swarm_config
 
-        n, self.study = 3, SwarmStudy(swarm_config(folder), flocs=[])
-        self.form = Form(n, 1, len(self.study.stops), self.study.scene.duration)
-        ones = np.ones(n)
-        state = {
-            "motion": np.zeros((n, 6)), "carried": np.zeros((n, 6)), "errors": np.zeros((n, 4)),
-            "steps": ones, "wander": ones, "links": np.array([[2, 1, 2, 1]]),
-            "slips": np.zeros((1, 2)), "time": np.array(0.05), "span": np.array(0.01),
-            "error": np.array(0.0), "effort": np.zeros(6, np.int64),
-        }  # fmt: skip
-        moment = {"motion": np.zeros((n, 6)), "cluster": np.zeros(n, np.int32),
-                  "counts": np.array([1])}  # fmt: skip
-        bodies = {
-            "r_eq": ones, "spheroradius": ones, "mass": ones, "floc": np.zeros(n, np.int32),
-            "count": np.ones(n, np.int64), "points": np.zeros((n, 2)), "box": np.ones(2),
-        }  # fmt: skip
-        end = {"status": "FINISHED", "failed": [], "time": 0.3} | dict.fromkeys(vars_of(Effort), 1)
-        parts = []
+        self.study, self.identity, self.parts = SwarmStudy(swarm_config(folder)), {"seed": 1}, []
+        [condition], key = self.study.conditions, short(self.identity)
         for replicate in range(2):
-            parts += [Part(replicate, "bodies", bodies), Part(replicate, "state", state,
-                                                              {"moments": 1})]  # fmt: skip
-            parts += [Part(replicate, "moment", moment, {"place": k, "error": 0.0, "time": 0.1 * k})
-                      for k in range(4)]  # fmt: skip
-            parts.append(Part(replicate, "end", {}, end))
-        self.parts = [(SNAPSHOT, *part.described()) for part in parts]
+            records = []
+
+            def keep(about, data, counts, replicate=replicate, records=records):
+                encoded = kept_record(condition, replicate, about, data, key)
+                records.append((SNAPSHOT, record_at(encoded, 0).description, data))
+
+            row, _ = self.study.run_task(self.study.places[0], replicate, lambda: False, None, keep)
+            rows = np.array([tuple(row[name] for name in self.study.row.names)], self.study.row)
+            about = record_at(chunk_record(condition, replicate, rows, key), 0).description
+            self.parts += [*records, (CHUNK, about, rows.tobytes())]
 
     def make(self, rng, folder):
         """A hostile journal."""
@@ -185,29 +173,28 @@ class SwarmJournalReader:
 
     def read(self, path):
         """Take what it has, and make results of it where all is there."""
-        from flocsim.ensembles.suspension.assembly import found_in, results_of, table_of
+        from flocsim.ensembles.storage.resume import Beginning, take_journal
+        from flocsim.ensembles.storage.row_store import RowStore
+        from flocsim.ensembles.swarms.kind import results, table_of
         from flocsim.io.journal.journal import Journal
 
         journal = Journal(path)
         try:
             if not journal.is_journal:
                 raise FileError("it is no journal")  # as a run that begins says
-            found, remarks = found_in(journal, 2, self.form)
-            assert all(remark.isprintable() for remark in remarks), remarks
-            for own in found.values():
-                assert own.left is None or np.isfinite(own.left.state["motion"]).all()
-            if all(own.ended for own in found.values()):
-                results, _ = results_of(self.study, found, journal, {})
-                table_of(results)
-            if remarks:
-                raise FileError(remarks[0])  # a part of it was refused
+            store = RowStore(journal, self.study.conditions, self.study.row)
+            start = Beginning(store, self.identity)
+            take_journal(start, self.study)
+            assert all(remark.isprintable() for remark in start.remarks), start.remarks
+            for records in store.parts.values():
+                left = self.study.left_of(records, journal.read)
+                assert left is None or np.isfinite(left.state["motion"]).all()
+            if store.intervals(0) == [(0, 2)]:
+                table_of(results(self.study, start, 2, {}, None, None, print, True))
+            if start.remarks:
+                raise FileError(start.remarks[0])  # a part of it was refused
         finally:
             journal.release()
-
-
-def vars_of(some_class):
-    """The names of an attrs class's fields."""
-    return [field.name for field in some_class.__attrs_attrs__]
 
 
 class JournalReader:
@@ -215,7 +202,6 @@ class JournalReader:
 
     def __init__(self, folder):
         from flocsim.ensembles.config.loader import load_config
-        from flocsim.ensembles.storage.identity import short
         from flocsim.ensembles.study import Study
         from tests.helpers.small_study import write_small
 
@@ -251,7 +237,7 @@ class JournalReader:
         journal = Journal(path)
         try:
             start = Beginning(RowStore(journal, self.study.conditions), self.identity)
-            take_journal(start)
+            take_journal(start, self.study)
             for place in range(len(self.study.conditions)):
                 for first, stop in start.store.intervals(place):
                     rows = {n: start.store.read(place, n, first, stop) for n in ROW.names}

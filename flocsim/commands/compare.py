@@ -5,6 +5,7 @@ from typing import Any
 
 from flocsim.commands import SUMMARIES
 from flocsim.io.results.schema import COMPARED
+from flocsim.io.results.swarm_file import COUNTS
 
 
 def add_parser(subparsers: Any) -> None:
@@ -23,14 +24,19 @@ def add_parser(subparsers: Any) -> None:
         "--probability", default="pr_a", choices=COMPARED,
         help=f"{known} (default: %(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--quantity", default="mean_size", choices=COUNTS,
+        help="of swarms: what is compared, a column of their counts (default: %(default)s)",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     """Print the comparison; the exit code."""
-    from flocsim.ensembles.studies.compare import compare
-    from flocsim.ensembles.studies.opened import open_results
+    from flocsim.ensembles.studies.compare import SwarmComparison, compare
+    from flocsim.ensembles.studies.opened import open_any
 
-    comparison = compare(open_results(args.first), open_results(args.second))
-    print(comparison.table(args.probability))
+    comparison = compare(open_any(args.first), open_any(args.second))
+    of_swarms = isinstance(comparison, SwarmComparison)
+    print(comparison.table(args.quantity if of_swarms else args.probability))
     return 0

@@ -5,11 +5,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flocsim.commands import SUMMARIES
 from flocsim.errors import UsageError
 from flocsim.io.exchange.gsd_file import write_gsd
-from flocsim.io.files import write_file
+from flocsim.io.files import held, write_file
+from flocsim.io.opening import kind_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.plots.swarm import last_known, shape_of
 from flocsim.io.results.curvilinear import CORRECTIONS
 from flocsim.io.results.file import read_results
 from flocsim.io.results.kernel_tables import (
@@ -19,6 +23,7 @@ from flocsim.io.results.kernel_tables import (
     kernel_csv,
     kernel_matrix,
 )
+from flocsim.io.results.swarm_file import FORMAT, read_swarm
 from flocsim.io.trajectory import read_trajectory
 
 SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}
@@ -29,9 +34,10 @@ def add_parser(subparsers: Any) -> None:
         "export",
         help=SUMMARIES["export"],
         description="gsd: the motion that flocsim trajectory --save or Trajectory.save put into a "
-        "file, for OVITO and HOOMD's tools, with lengths in um. (ParaView and xarray open the file "
-        "itself.) Of the results of a kernel study, csv: a table of all pairs of size classes; "
-        "matrix: a square matrix for each mechanism and N, which says what it multiplies.",
+        "file, or that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in "
+        "um. (ParaView and xarray open the file itself.) Of the results of a kernel study, csv: a "
+        "table of all pairs of size classes; matrix: a square matrix for each mechanism and N, "
+        "which says what it multiplies.",
     )
     add = parser.add_argument
     add("format", choices=tuple(SUFFIXES))
@@ -65,10 +71,33 @@ def run(args: argparse.Namespace) -> int:
     if args.format == "csv":
         write_file(path, kernel_csv(kernel_in(args.source)).encode(), rule)
     else:
-        motion = read_trajectory(args.source)
-        write_gsd(path, motion.t, motion.position, motion.velocity, motion.shapes, rule)
+        source = held(args.source)
+        of_swarms = kind_of(source) == FORMAT
+        moved = first_swarm(read_swarm(source)) if of_swarms else motion_in(source)
+        t, position, velocity, shapes = moved
+        write_gsd(path, t, position, velocity, shapes, rule)
     print(path)
     return 0
+
+
+def motion_in(path):
+    """(times, positions, velocities, shapes) of a trajectory file."""
+    motion = read_trajectory(path)
+    return motion.t, motion.position, motion.velocity, motion.shapes
+
+
+def first_swarm(found):
+    """The same of the first swarm of a study; UsageError where bodies have left it."""
+    moments = found.groups["snapshots"]
+    known = slice(last_known(found) + 1)
+    position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
+    if not np.isfinite(position).all():
+        raise UsageError(
+            "bodies have left the first swarm, and a GSD file has the same bodies at all times: "
+            "flocsim plot --animation shows it"
+        )
+    shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
+    return found.scales["time"][known], position, velocity, shapes
 
 
 def named(args):

@@ -16,6 +16,7 @@ from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.equivalent_spheres import sphere_words
+from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
     checked_line,
@@ -27,6 +28,7 @@ from flocsim.ensembles.report import (
 )
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.swarms.kind import SWARMS
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io import trajectory
@@ -41,7 +43,7 @@ from flocsim.io.shapes.library import is_library, read_library, read_settings
 from flocsim.io.terminal import aligned
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
+         "warnings", "trial", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -102,28 +104,41 @@ def text_of(path):
 
 def swarm_text(path):
     """What a results file of a swarm study holds."""
-    from flocsim.ensembles.suspension.assembly import table_of
-
     results = swarm_file.read_swarm(path)
+    facts, came, warnings = swarm_summary(path, results)
+    lines = fact_lines([*facts, *came])
+    lines += [f"warning: {visible(line, '')}" for line in warnings]
+    table = SWARMS.table(results)
+    return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table])
+
+
+def swarm_summary(path, results):
+    """(facts, origin, warnings) of a results file of swarms; FileError where what it says of its
+    run cannot be read."""
+    try:
+        failed = [f"swarm {note['replicate']}: {note['why']}"
+                  for note in stored(results.run, "failed")]  # fmt: skip
+        return (
+            swarm_facts(results), origin(results.run), [*stored(results.run, "warnings"), *failed]
+        )  # fmt: skip
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable results of a swarm: {error}") from error
+
+
+def swarm_facts(results):
+    """[(name, value)] of swarms, also of those that still run."""
     bodies, ends = results.groups["bodies"], results.groups["ends"]
     free = bodies["floc"][0] != swarm_file.WALL
     radii = 1e6 * bodies["r_eq"][:, free]
     width, height = 1e6 * bodies["box"].mean(axis=0)
-    facts = [
+    return [
         ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
          f"{int(ends['finished'].sum())} came to their end"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
         ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
          f"{ends['rejected'].sum()} rejected"),
-        *origin(results.run),
     ]  # fmt: skip
-    try:
-        warnings = stored(results.run, "warnings")
-    except ValueError as error:
-        raise FileError(f"{path} holds no readable results of a swarm: {error}") from error
-    lines = [*fact_lines(facts), *(f"warning: {visible(line, '')}" for line in warnings)]
-    return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table_of(results)])
 
 
 def library_text(path):
@@ -219,33 +234,55 @@ def trajectory_text(path):
 
 
 def sweep_text(path):
-    """What the joined file of a sweep holds: Pr[A] at every value."""
+    """What the joined file of a sweep holds: Pr[A] at every value, the mean size of swarms."""
     found = sweep_file.read_sweep(path)
-    swept, table = found.swept, found.labelled("probabilities")
+    swept = found.swept
     lines = [f"{path}: a sweep", ""]
     for name, each in swept.items():
         unit = "" if each.unit == "1" else f" {each.unit}"
-        values = ", ".join(visible(f"{v:g}" if isinstance(v, float) else str(v), "")
-                           for v in each.values)  # fmt: skip
+        values = ", ".join(visible(shown(value), "") for value in each.values)
         lines.append(f"{visible(each.key, '')} (as {visible(name, '')}): {values}{unit}")
-    rows = [(*swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
+    rows = swarm_sweep_rows(found) if "counts" in found.groups else pair_sweep_rows(found)
+    return "\n".join([*lines, "", *aligned(rows)])
+
+
+def shown(value):
+    """A coordinate as text."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def pair_sweep_rows(found):
+    """Pr[A] of every value and condition, heads first."""
+    table = found.labelled("probabilities")
+    rows = [(*found.swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
     axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
     columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
     for place in np.ndindex(*columns[0].shape):
         names = [axis[k] for axis, k in zip(axes, place, strict=True)]
         n, value, low, high = (column[place] for column in columns)
         told = (f"{value:.3f}", f"[{low:.3f}, {high:.3f}]") if value == value else ("-", "-")
-        words = [visible(f"{each:g}" if isinstance(each, float) else str(each), "")
-                 for each in names]  # fmt: skip
-        rows.append((*words, str(n), *told))
-    return "\n".join([*lines, "", *aligned(rows)])
+        rows.append((*(visible(shown(each), "") for each in names), str(n), *told))
+    return rows
 
 
-def strength_text(path):
-    """What a file of `flocsim strength` holds, also while it is not complete."""
-    from flocsim.ensembles.strength.distribution import table_of
+def swarm_sweep_rows(found):
+    """Clusters at the end at every value, means over swarms, heads first."""
+    table = found.labelled("counts")
+    rows = [(*found.swept, "swarms", "time [s]", "clusters", "mean size", "settling [mm/s]")]
+    axes = [table.axes[name].values.tolist() for name in found.swept]
+    names = ("clusters", "mean_size", "settling")
+    for place in np.ndindex(*map(len, axes)):
+        last = {name: table.columns[name].values[place][:, -1] for name in names}
+        clusters, size, settling = (float(swarm_file.mean(last[name])) for name in names)
+        keys = (visible(shown(axis[k]), "") for axis, k in zip(axes, place, strict=True))
+        rows.append((*keys, str(len(last["clusters"])), shown(float(table.axes["time"].values[-1])),
+                     f"{clusters:.1f}", f"{size:.2f}", f"{1e3 * settling:.4g}"))  # fmt: skip
+    return rows
 
-    found = strength_file.read_strengths(path)
+
+def strength_text(path, found=None):
+    """What a file of `flocsim strength` holds, or the journal of a survey so far."""
+    found = found or strength_file.read_strengths(path)
     told = found.progress if found.complete else f"{found.progress} so far; go on with --resume"
     statuses = Counter(found.column("status").tolist())
     ends = [f"{count} {strength_file.STATUS[code].replace('_', ' ')}"
@@ -254,35 +291,47 @@ def strength_text(path):
     needed = [f"{count} at {tolerance:g} m" for tolerance, count in sorted(used.items())]
     facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
     for name, value in found.about.items():
-        if name not in ("asked", "complete"):
+        if name not in ("asked", "complete", "cpus"):
             facts.append((name.replace("_", " "), str(value)))
     kind = "strengths of bonds" + ("" if found.complete else ", unfinished")
-    return "\n".join([f"{path}: {kind}", "", *fact_lines(facts), "", table_of(found)])
+    table = strengths.table_of(found)
+    return "\n".join([f"{path}: {kind}", "", *fact_lines(facts), "", table])
 
 
 def unfinished_text(found):
     """What a run that has not ended has so far; nothing of it is final."""
     results, last = found.results, found.sessions[-1]
+    if isinstance(results, strength_file.Strengths):
+        return strength_text(found.path, results)
+    of_swarms = isinstance(results, swarm_file.SwarmResults)
+    facts = swarm_facts(results)[:-1] if of_swarms else so_far(found)
+    facts.append(("begun", f"{last['date']} by {last['command']}"))
+    if found.unread:
+        facts.append(("damaged", f"{found.unread} bytes of {found.noun}, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)
+    lines = [f"{found.path}: {found.progress}", "", *fact_lines(facts)]
+    shown = reasons.most_common(MOST_FAILURES)
+    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
+    if of_swarms:
+        return "\n".join([*lines, "", f"{found.progress}:", SWARMS.table(results)])
+    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    marked = f"{found.progress}, with 95 % intervals:"
+    return "\n".join([*lines, *efficiency_block(results), "", marked, table])
+
+
+def so_far(found):
+    """[(name, value)] of the conditions of a study of pairs that still runs."""
+    results = found.results
     planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
     counts = results.probabilities["n_total"]
-    facts = [
+    return [
         ("types", ", ".join(results.types)),
         ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
         ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
         ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
          f"{planned}"),
         ("numerical error", checked_line(results) or "unknown: none was run again yet"),
-        ("begun", f"{last['date']} by {last['command']}"),
     ]  # fmt: skip
-    if found.unread:
-        facts.append(("damaged", f"{found.unread} bytes of rows, left out"))
-    lines = [f"{found.path}: {found.progress}", "", *fact_lines(facts)]
-    shown = reasons.most_common(MOST_FAILURES)
-    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
-    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
-    marked = f"{found.progress}, with 95 % intervals:"
-    return "\n".join([*lines, *efficiency_block(results), "", marked, table])
 
 
 def conditions(results):

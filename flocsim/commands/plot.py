@@ -13,7 +13,7 @@ from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.strength import STRENGTH_FIGURES
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.plots.swarm import SWARM_FIGURES, write_swarm_animation
-from flocsim.io.plots.sweep import SWEEP_FIGURES
+from flocsim.io.plots.sweep import SWARM_SWEEP_FIGURES, SWEEP_FIGURES
 
 STRIP_FRAMES = 7
 
@@ -141,27 +141,37 @@ def read_content(path):
 
     if (journal := journal_of(path)) is not None:
         found = read_unfinished(journal)
-        return found.results, FIGURES, found.progress
+        figures = FIGURES
+        if isinstance(found.results, swarm_file.SwarmResults):
+            figures = swarm_figures(found.results)
+        elif isinstance(found.results, strength_file.Strengths):
+            figures = STRENGTH_FIGURES
+        return found.results, figures, found.progress
     path = held(path)
     kind = kind_of(path)
     if kind == trajectory.KIND:
         moved = trajectory.read_trajectory(path)
         return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
     if kind == sweep_file.FORMAT:
-        return sweep_file.read_sweep(path), SWEEP_FIGURES, ""
+        swept = sweep_file.read_sweep(path)
+        return swept, SWARM_SWEEP_FIGURES if "counts" in swept.groups else SWEEP_FIGURES, ""
     if kind == strength_file.FORMAT:
         strengths = strength_file.read_strengths(path)
         remark = "" if strengths.complete else f"unfinished: {strengths.progress}"
         return strengths, STRENGTH_FIGURES, remark
     if kind == swarm_file.FORMAT:
         found = swarm_file.read_swarm(path)
-        many = len(found.scales["class"]) > 1
-        kept = {name: draw for name, draw in SWARM_FIGURES.items() if many or name != "classes"}
-        return found, kept, ""
+        return found, swarm_figures(found), ""
     if kind != FORMAT and is_library(path):
         return read_library(path), POPULATION_FIGURES, ""
     results = read_results(path, replicates=False)
     return results, FIGURES if results.kernel is None else KERNEL_FIGURES, ""
+
+
+def swarm_figures(found):
+    """{name: function} of the figures that swarms have."""
+    many = len(found.scales["class"]) > 1
+    return {name: draw for name, draw in SWARM_FIGURES.items() if many or name != "classes"}
 
 
 def figure_names(text):

@@ -6,18 +6,20 @@ from typing import Any
 
 from flocsim.commands import SUMMARIES
 from flocsim.commands.reporting.examples import examples_of
-from flocsim.commands.reporting.page import report_page
+from flocsim.commands.reporting.page import report_page, swarm_page
 from flocsim.ensembles.studies.opened import open_results
 from flocsim.errors import UsageError
 from flocsim.io.files import held, write_file
+from flocsim.io.opening import kind_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.own_mark import marked
 from flocsim.io.results.file import read_overview
+from flocsim.io.results.swarm_file import FORMAT, read_swarm
 
 DESCRIPTION = """\
 Write one HTML page that needs no other file: the figures of flocsim plot, the probabilities with
 both errors, warnings, where the results came from, and one replicate of each class (A to D) to
-watch, which is run again for it."""
+watch, which is run again for it. Of swarms: their figures and clusters over time."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -41,12 +43,14 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--output {path}: a page's name must end in .html")
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.results])
-    source = held(args.results)
-    results, totals = read_overview(source)
-    examples = []
-    if not args.no_motion:
-        examples = examples_of(open_results(source, args.folder))
-    page = report_page(str(args.results), results, totals, examples)
+    source, examples = held(args.results), []
+    if kind_of(source) == FORMAT:
+        page = swarm_page(str(args.results), read_swarm(source))
+    else:
+        results, totals = read_overview(source)
+        if not args.no_motion:
+            examples = examples_of(open_results(source, args.folder))
+        page = report_page(str(args.results), results, totals, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:
         if example.reason:

@@ -1,36 +1,23 @@
 """`flocsim strength results.h5 --flow shear`: at what rate a flow opens the bonds of a study."""
 
-import contextlib
-import os
-import signal
-import sys
-import threading
 from argparse import Namespace
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from flocsim.commands import SUMMARIES
+from flocsim.ensembles.cli import run_command
+from flocsim.ensembles.parallel.communicator import launched_rank
+from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import UsageError
-from flocsim.interruption import INTERRUPTED
-from flocsim.io.files import Rule
-from flocsim.io.outputs import (
-    OVERWRITE_HELP,
-    Output,
-    check_outputs,
-    data_rule,
-    extension_rule,
-    figure_rule,
-)
-from flocsim.io.results.strength_file import Strengths, read_strengths, write_strengths
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.terminal import tell
 
 DESCRIPTION = """\
 Put every doublet that a finished study has found bound into a flow of rising rate G, without
 weight or inertia, and find the first rate at which it opens: on a ladder of factors of two, then by
 halving in log G. Prints the distribution of every condition, and writes it and every single doublet
-to one HDF5 file, anew every 20 s and at Ctrl-C, with a figure beside it at the end."""
+to one HDF5 file, with a figure beside it. Runs on ranks and processes, stops and goes on as a study
+does."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -45,57 +32,57 @@ def add_parser(subparsers: Any) -> None:
         help="relative precision of a rate (default: %(default)g)")  # fmt: skip
     add("--jobs", type=int, default=1, metavar="N",
         help="processes on this machine (default: %(default)d)")  # fmt: skip
-    add("--resume", action="store_true",
-        help="go on with what a stopped survey has written, or test more (--count); starts one if "
-        "there is none")  # fmt: skip
+    add("--resume", action="store_const", const="resume", default="new", dest="mode",
+        help="go on with a stopped survey, or test more (--count); starts one if there is "
+        "none")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="default: NAME-strength.h5")
     add("--figure", metavar="FILE", help="default: NAME-strength.png")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    add("--quiet", action="store_true", help="no line for every doublet")
-    parser.set_defaults(run=run)
+    add("--quiet", action="store_true", help="print warnings and errors only")
+    parser.set_defaults(
+        run=run, read=read_survey, heartbeat=SECONDS, dry_run=False, no_pilot=False, parent=None,
+        plan=None,
+    )  # fmt: skip
+
+
+def places(args: Namespace) -> tuple[Path, Path]:
+    """(file, figure) to write."""
+    output = Path(args.output or f"{Path(args.results).stem}-strength.h5")
+    return output, Path(args.figure or output.with_suffix(".png"))
+
+
+def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
+    """What is run, as a config; on the ``first`` rank what it writes is seen to be possible."""
+    from flocsim.ensembles.strength.survey import Bonds, config_of
+    from flocsim.ensembles.studies.opened import open_results
+    from flocsim.io.journal.journal import SUFFIX
+    from flocsim.io.plots.style import checked_format
+
+    output, figure = places(args)
+    if first:
+        checked_format(figure, "--figure")
+        if figure.suffix == output.suffix:
+            raise UsageError(f"--output {output} must not end in {figure.suffix}: .h5 does")
+        rules = data_rule(args.overwrite or args.mode == "resume"), figure_rule(args.overwrite)
+        check_outputs([Output(output, rules[0], SUFFIX, WAYS), Output(figure, rules[1])],
+                      [args.results])  # fmt: skip
+    bonds = Bonds(open_results(args.results), args.flow, args.count, args.precision)
+    return config_of(bonds, str(output))
 
 
 def run(args: Namespace) -> int:
-    """Survey, write as it goes, and print; the exit code."""
-    from flocsim.ensembles.strength.distribution import table_of
-    from flocsim.ensembles.strength.survey import OtherSurvey, survey
-    from flocsim.ensembles.studies.opened import open_results
+    """Survey, write, print, and draw; the exit code."""
     from flocsim.io.plots.strength import over_rate
-    from flocsim.io.plots.style import checked_format, save
+    from flocsim.io.plots.style import save
+    from flocsim.io.results.strength_file import read_strengths
 
-    stem = Path(args.results).stem
-    output = Path(args.output or f"{stem}-strength.h5")
-    figure = Path(args.figure or output.with_suffix(".png"))
-    checked_format(figure, "--figure")
-    if figure.suffix == output.suffix:
-        raise UsageError(f"--output {output} must not end in {figure.suffix}: .h5 does")
-    if args.resume and args.overwrite:
-        raise UsageError("--resume goes on with a file, --overwrite puts it aside: leave out one")
-    rules = data_rule(args.overwrite or args.resume), figure_rule(args.overwrite)
-    check_outputs([Output(output, rules[0], "", WAYS), Output(figure, rules[1])], [args.results])
-    file = Kept(output, data_rule(args.overwrite))
-    known = file.read() if args.resume else None
-    stop = Stop()
-    with stop.listening():
-        try:
-            found = survey(
-                open_results(args.results), args.flow, count=args.count, jobs=args.jobs,
-                precision=args.precision, known=known, keep=stop.unbroken(file.write),
-                tell=(lambda _: None) if args.quiet else tell,
-            )  # fmt: skip
-        except KeyboardInterrupt:
-            tell(f"flocsim: stopped by {stop.name}: {file.words}", sys.stderr)
-            return INTERRUPTED
-        except OtherSurvey as error:
-            raise UsageError(
-                f"{output} cannot be gone on with: {error}; name another output, or add "
-                "--overwrite in the place of --resume"
-            ) from error
-    print(table_of(found))
-    print(os.fspath(output))
-    save(over_rate(found), figure, rules[1])
-    print(os.fspath(figure))
-    return 0
+    code = run_command(args)
+    if code == 0 and launched_rank() == 0:
+        output, figure = places(args)
+        save(over_rate(read_strengths(output)), figure, figure_rule(args.overwrite))
+        if not args.quiet:
+            tell(str(figure))
+    return code
 
 
 WAYS = (
@@ -103,78 +90,3 @@ WAYS = (
     "under another name"
 )
 """What a user can do about a file in the way."""
-
-
-class Kept:
-    """The file of a survey, written anew as it goes: what it holds, whole at any time."""
-
-    def __init__(self, path: Path, rule: Rule) -> None:
-        """``rule``: what becomes of a file that lies there before the first is written."""
-        self.path, self.rule = path, rule
-        self.found: Strengths | None = None
-
-    def read(self) -> Strengths | None:
-        """What the file holds, which from now on may be replaced; None where there is none."""
-        if os.path.lexists(self.path):
-            self.rule = extension_rule(self.path)
-            self.found = read_strengths(self.path)
-        return self.found
-
-    def write(self, found: Strengths) -> None:
-        """Write what has been tested so far; a file of somebody else's is kept."""
-        write_strengths(self.path, found, self.rule)
-        self.found, self.rule = found, extension_rule(self.path)
-
-    @property
-    def words(self) -> str:
-        """What it holds, for a person who has stopped the survey."""
-        if self.found is None:
-            return "no doublet has been tested yet, and nothing has been written"
-        return f"{self.found.progress} are in {self.path}; go on with --resume"
-
-
-class Stop:
-    """Ctrl-C and a batch system's SIGTERM: a KeyboardInterrupt, but while a file is written."""
-
-    def __init__(self) -> None:
-        self.number, self.held = int(signal.SIGINT), False
-        self.late = False
-
-    @property
-    def name(self) -> str:
-        """Name of the signal, "SIGTERM"."""
-        return signal.Signals(self.number).name
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        self.number = number
-        if not self.held:
-            raise KeyboardInterrupt
-        self.late = True
-
-    @contextlib.contextmanager
-    def listening(self) -> Iterator[None]:
-        """Take over the signals."""
-        if threading.current_thread() is not threading.main_thread():
-            yield  # signals are the main thread's
-            return
-        before = {number: signal.signal(number, self) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-
-    def unbroken(self, write: Callable[[Strengths], None]) -> Callable[[Strengths], None]:
-        """``write`` to its end, and only then what a signal has asked for meanwhile."""
-
-        def whole(found: Strengths) -> None:
-            self.held = True
-            try:
-                write(found)
-            finally:
-                self.held = False
-            if self.late:
-                self.late = False
-                raise KeyboardInterrupt
-
-        return whole

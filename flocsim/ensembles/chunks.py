@@ -1,18 +1,21 @@
 """Chunks: runs of replicates of one condition, the unit of handing out, writing and resuming.
 
+A row is what a finished replicate comes to, of the columns of its kind of study; those of pairs
+are ROW. What is kept of an unfinished one goes into records of its own.
+
 Replicates of one condition are kept as intervals: sorted, disjoint pairs [first, stop).
 """
 
 import json
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flocsim.errors import visible
-from flocsim.io.journal.records import CHUNK, encode
+from flocsim.io.journal.records import CHUNK, SNAPSHOT, encode
 from flocsim.io.json_text import matches
-from flocsim.io.results.schema import REPLICATES, ROW_SIZE
+from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384
 """Rows of the longest chunk, 2.3 MB."""
@@ -21,10 +24,6 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 """One replicate: its row of the results file."""
 
 COLUMNS = tuple(REPLICATES)
-SIZES = [ROW[name].itemsize for name in COLUMNS]
-STARTS = {name: sum(SIZES[:place]) for place, name in enumerate(COLUMNS)}
-"""Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
-
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
 """What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
@@ -32,6 +31,9 @@ DESCRIPTION = {
     "type": str, "vertices": int, "delta": float, "first": int, "count": int, "identity": str
 }  # fmt: skip
 """A chunk's, as a pattern."""
+
+KEPT = {"type": str, "vertices": int, "delta": float, "replicate": int, "identity": str}
+"""Of what is kept of an unfinished replicate, likewise."""
 
 LARGEST_REPLICATE = 2**40
 
@@ -47,11 +49,13 @@ class Condition(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """Replicates ``first`` to ``stop`` − 1 of the condition at a place of the study's list."""
+    """Replicates ``first`` to ``stop`` − 1 of the condition at a place of the study's list; where
+    there is one alone, ``left``: where it goes on."""
 
     condition: int
     first: int
     stop: int
+    left: Any = None
 
 
 def chunk_record(
@@ -64,7 +68,15 @@ def chunk_record(
     description = {**condition._asdict(), "first": first, "count": len(rows), "identity": identity}
     if notes:
         description["notes"] = list(notes)
-    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in COLUMNS))
+    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in starts(rows.dtype)))
+
+
+def kept_record(
+    condition: Condition, replicate: int, description: dict, data: bytes, identity: str
+) -> bytes:
+    """The record of what is kept of an unfinished replicate."""
+    about = {**condition._asdict(), "replicate": replicate, "identity": identity}
+    return encode(SNAPSHOT, about | description, data)
 
 
 def condition_of(description: dict) -> Condition:
@@ -96,20 +108,26 @@ def named(description: dict | None) -> str:
     )
 
 
-def fits(description: dict, length: int) -> bool:
+def fits(description: dict, length: int, row: np.dtype = ROW) -> bool:
     """Whether a description is that of a chunk, and its data are as long as it says."""
-    return is_chunk(description) and length == description["count"] * ROW_SIZE
+    return is_chunk(description) and length == description["count"] * row.itemsize
 
 
-def rows_of(data: bytes) -> dict[str, np.ndarray]:
+def rows_of(data: bytes, row: np.dtype = ROW) -> dict[str, np.ndarray]:
     """{column: values} of a chunk's data."""
-    count = len(data) // ROW_SIZE
-    return {name: np.frombuffer(data, ROW[name], count, count * STARTS[name]) for name in COLUMNS}
+    count = len(data) // row.itemsize
+    return {name: np.frombuffer(data, row[name], count, count * starts(row)[name])
+            for name in starts(row)}  # fmt: skip
 
 
-def layout() -> str:
+def starts(row: np.dtype) -> dict[str, int]:
+    """Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
+    return {name: about[1] for name, about in (row.fields or {}).items()}
+
+
+def layout(row: np.dtype = ROW) -> str:
     """The columns of a chunk as text, to tell another version's."""
-    return json.dumps([[name, ROW[name].str] for name in COLUMNS])
+    return json.dumps([[name, row[name].str] for name in starts(row)])
 
 
 def merged(intervals: Iterable[Interval]) -> list[Interval]:

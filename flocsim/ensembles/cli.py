@@ -19,13 +19,13 @@ from flocsim.ensembles.parallel.communicator import (
 )
 from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
-from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, WITHHELD, end_with_parent
+from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
 INTERNAL = 70
 
-UNSHARED = ("quiet", "run", "command")
+UNSHARED = ("quiet", "run", "read", "command")
 """Arguments in which ranks may differ: the others say what is run."""
 
 
@@ -72,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--no-pilot", action="store_true", help="with --dry-run: at once, without the pilot"
     )
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
+    parser.set_defaults(read=read_config)
     # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
     parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--plan", help=argparse.SUPPRESS)
@@ -92,19 +93,18 @@ def overrides(arguments: argparse.Namespace) -> dict:
     return given
 
 
-def checked_config(arguments, sources):
-    """The config, found to make a study whose results can be written where they should go."""
+def read_config(arguments, sources, first):
+    """The config of a study; on the ``first`` rank found to make one whose results can be written
+    where they should go."""
     from flocsim.ensembles.config.loader import load_any_config
-    from flocsim.ensembles.preflight import check_study, inputs_of
+    from flocsim.ensembles.kinds import kind_of
+    from flocsim.ensembles.preflight import inputs_of
 
     config = load_any_config(arguments.config, overrides(arguments), sources)
+    if not first:
+        return config
     refuse_other_kinds(arguments, config)
-    if config.is_swarm:
-        from flocsim.ensembles.suspension.runner import check_swarm
-
-        check_swarm(config)
-    else:
-        check_study(config)
+    kind_of(config).check(config)
     if not arguments.dry_run:
         check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
     return config
@@ -148,7 +148,6 @@ def own_config(comm, arguments):
 
     So an edited file is read before or after the edit, by all.
     """
-    from flocsim.ensembles.config.loader import load_any_config
     from flocsim.ensembles.config.sources import Sources
     from flocsim.ensembles.parallel.agreement import Launch, refuse_other_words
 
@@ -156,7 +155,7 @@ def own_config(comm, arguments):
     if comm.rank == 0:
         launch, sources = None, Sources()
         try:
-            config = checked_config(arguments, sources)
+            config = arguments.read(arguments, sources, True)
             launch = Launch(words, sources)
         finally:
             comm.broadcast(launch)
@@ -168,13 +167,14 @@ def own_config(comm, arguments):
         return None
     refuse_other_words(comm.rank, launch, words)
     try:
-        return load_any_config(arguments.config, overrides(arguments), launch.sources)
+        return arguments.read(arguments, launch.sources, False)
     except ConfigError as error:
         raise ConfigError(f"rank {comm.rank}: {error}") from error
 
 
 def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
+    from flocsim.ensembles.kinds import kind_of
     from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
 
     output = config.output.file
@@ -189,83 +189,38 @@ def study(config, comm, arguments):
     if ended.code == STOPPED:
         if comm.rank == 0:
             who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
-            what = (
-                f"{ended.kept} finished replicates are in {ended.journal}; go on with --resume"
-                if ended.kept
-                else "none of its replicates was finished; begin again with --resume"
-            )
+            what = "none of its replicates was finished; begin again with --resume"
+            if ended.kept or ended.begun:
+                begun = f" and the states of {ended.begun} others" if ended.begun else ""
+                there = f"{ended.kept} finished replicates{begun} are in {ended.journal}"
+                what = f"{there}; go on with --resume"
             tell(f"flocsim: stopped by {who}: {what}", sys.stderr)
         return STOPPED
     if comm.rank > 0:
         return 0
+    kind, found, seconds = kind_of(config), ended.results, ended.wall_time
     if not arguments.quiet:
-        report(ended, output)
-    return verdict(ended.results, output)
-
-
-def verdict(results, output):
-    """0, or the code of an error where not one replicate has come to an outcome, or of rates that
-    are left open: said why."""
-    from flocsim.ensembles.report import has_withheld, undecided_line
-
-    line = undecided_line(results)
-    if not line:
-        return 0
-    table = results.probabilities
-    unknown = table["n_failed"] + table["n_undecided"]
-    none_known = unknown.sum() == table["n_total"].sum()
-    kind = "" if none_known else "warning: "
-    tell(f"flocsim: {kind}{line}; the rows are in {output}", sys.stderr)
-    return INTERNAL if none_known else WITHHELD if has_withheld(results) else 0
-
-
-def report(ended, output):
-    from flocsim.ensembles.report import (
-        checked_line,
-        format_table,
-        kernel_lines,
-        touch_lines,
-    )
-
-    results = ended.results
-    if results.kernel is not None:
-        tell("\n".join(kernel_lines(results.kernel)))
-    else:
-        tell(format_table(results.types, results.vertices, results.delta, results.probabilities))
-    for line in filter(None, [*touch_lines(results), checked_line(results)]):
-        tell(line)
-    total = int(results.probabilities["n_total"].sum())
-    seconds = ended.wall_time
-    tell(f"{output}: {total} replicates, {ended.computed} of them run in {seconds:.1f} s, "
-         f"{ended.computed / seconds:.0f}/s")  # fmt: skip
+        tell(kind.table(found))
+        tell(f"{output}: {kind.total(found)} replicates, {ended.computed} of them run in "
+             f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
+    code, line = kind.verdict(found)
+    if line:
+        tell(f"flocsim: {line}; the rows are in {output}", sys.stderr)
+    return code
 
 
 def run_rank(comm, arguments):
     config, code = agree(comm, arguments)
     if config is None:
         return code
-    if config.is_swarm:
-        return swarm_study(config, comm, arguments)
     if arguments.dry_run:
-        from flocsim.ensembles.dry_run import dry_run
+        from flocsim.ensembles.kinds import kind_of
 
         if comm.rank == 0:
             ranks = max(comm.size, arguments.jobs)
-            tell(dry_run(config, ranks, not arguments.no_pilot))
+            tell(kind_of(config).dry_run(config, ranks, not arguments.no_pilot))
         return 0
     return study(config, comm, arguments)
-
-
-def swarm_study(config, comm, arguments):
-    """Run a study of swarms, or say what it would do; the exit code."""
-    from flocsim.ensembles.suspension.dry_run import dry_run
-    from flocsim.ensembles.suspension.runner import run_swarms
-
-    if arguments.dry_run:
-        if comm.rank == 0:
-            tell(dry_run(config, max(comm.size, arguments.jobs)))
-        return 0
-    return run_swarms(config, comm, arguments.mode, arguments.overwrite, arguments.quiet)
 
 
 def end_all(comm: Communicator, text: str, code: int) -> int:

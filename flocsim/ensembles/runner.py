@@ -8,6 +8,7 @@ import contextlib
 import json
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +16,13 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
-from flocsim.ensembles.chunks import COLUMNS
-from flocsim.ensembles.collision.failures import FAILED, FAILURES
-from flocsim.ensembles.collision.pairings import class_facts, class_words
+from flocsim.ensembles.chunks import Interval, merged
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.doubts import settling_facts, study_doubts
-from flocsim.ensembles.equivalent_spheres import sphere_facts
-from flocsim.ensembles.estimates.capture import kernel_of
-from flocsim.ensembles.estimates.stop_rule import StopRule, borders
-from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
-from flocsim.ensembles.kernels.study import KernelStudy, study_of
-from flocsim.ensembles.parallel.agreement import Facts, disagreement, facts_of
-from flocsim.ensembles.parallel.assembly import assemble, assist
+from flocsim.ensembles.estimates.stop_rule import borders
+from flocsim.ensembles.kind import StudyKind
+from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.parallel.agreement import Facts, disagreement
+from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
     SerialCommunicator,
@@ -47,19 +43,14 @@ from flocsim.ensembles.pilot.choice import (
 from flocsim.ensembles.pilot.trials import Job, try_out
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
-from flocsim.ensembles.storage.identity import arithmetic_digest, identity_of, short
+from flocsim.ensembles.storage.identity import arithmetic_digest, short
 from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
-from flocsim.io.results.file import read_results
-from flocsim.io.results.kernel_group import Kernel
-from flocsim.io.results.row_file import new_row_file
-from flocsim.io.results.schema import Results
 from flocsim.io.terminal import Progress, tell
 
 COMPILING = "compiling what no run on this machine has compiled before …"
@@ -69,14 +60,15 @@ COMPILING = "compiling what no run on this machine has compiled before …"
 class Ended:
     """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well.
 
-    ``kept``: finished replicates that ``journal`` holds, which is seen to be there; ``count``:
-    with how many of each condition the study has ended.
+    ``kept``: finished replicates that ``journal`` holds, which is seen to be there, and ``begun``
+    others of which it has a part; ``count``: with how many of each condition the study has ended.
     """
 
     code: int = 0
-    results: Results | None = None
+    results: Any = None
     computed: int = 0
     kept: int = 0
+    begun: int = 0
     wall_time: float = 0.0
     journal: str = ""
     count: int = -1
@@ -90,10 +82,10 @@ class RankZeroFailed(Exception):
     """What the other ranks have of it: rank 0 says why; the argument is the exit code."""
 
 
-def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Results | None:
-    """Run a config's study in memory; the Results on rank 0, None on the others.
+def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Any:
+    """Run a config's study in memory; its results on rank 0, None on the others.
 
-    ``comm`` has the ranks of the job (default: this process alone). The arrays of the Results are
+    ``comm`` has the ranks of the job (default: this process alone). The arrays of the results are
     the same whatever the number of ranks.
     """
     comm = comm or SerialCommunicator()
@@ -101,9 +93,10 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
         joint = join(config, comm)
         if comm.rank > 0:
             return follow(joint.study, comm).results
-        store = RowStore(MemoryJournal(), joint.study.conditions)
+        study = joint.study
+        store = RowStore(MemoryJournal(), study.conditions, study.row)
         start = Beginning(store, joint.identity, cpus_now=joint.cpus, accuracy=joint.accuracy)
-        return lead(joint.study, start, comm, Progress(joint.study.size, quiet)).results
+        return lead(study, start, comm, progress_of(study, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
 
@@ -128,20 +121,20 @@ def run_to_file(
         resources.callback(journal.release)
         records = recorded_choices(journal) if config.integrator.is_chosen else ()
         joint = join(config, comm, records, quiet)
-        progress = Progress(joint.study.size, quiet)
+        study, progress = joint.study, progress_of(joint.study, quiet)
         with sharing_errors(comm):
             if plan is not None:
                 refuse_other_part(plan, str(output), joint.identity)
             start = begin(
-                joint.study, joint.identity, output, mode, journal, joint.cpus, overwrite,
-                joint.accuracy,
+                study, joint.identity, output, mode, journal, kind_of(config).old_rows, joint.cpus,
+                overwrite, joint.accuracy,
             )  # fmt: skip
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
-        doubts = study_doubts(config, joint.study.flocs)
+        doubts = kind_of(config).doubts(study)
         for remark in [*remarks, *start.remarks, *(f"warning: {line}" for line in doubts)]:
             progress.warn(remark)
-        ended = lead(joint.study, start, comm, progress, output)
+        ended = lead(study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):
             progress.warn(
                 f"{journal.path} has rows beyond what was asked for, and stays: --resume takes "
@@ -159,7 +152,7 @@ class Joint:
     ``accuracy``: the record of a pilot's choice, where there was one.
     """
 
-    study: Study
+    study: StudyKind
     identity: dict
     cpus: list[dict]
     accuracy: dict = attrs.Factory(dict)
@@ -177,7 +170,7 @@ def join(
     """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
-    study = study_of(config, hear(comm, flocs), first_methods(config))
+    study: Any = study_of(config, hear(comm, flocs), first_methods(config))
     own, line = own_facts(study, comm)
     leader = hear(comm, own)
     if own is not None:
@@ -189,6 +182,8 @@ def join(
             more = f" ({len(unlike)} ranks differ)" if len(unlike) > 1 else ""
             raise UsageError(unlike[0] + more)
     cpus = distinct([kind for _, kind in answers or []])
+    with sharing_errors(comm):
+        kind_of(config).prepare(study, comm)
     if not config.integrator.is_chosen:
         return Joint(study, leader.identity, cpus)
     choice = chosen(study, comm, records, quiet)
@@ -196,7 +191,7 @@ def join(
     return Joint(study, identity_of(study), cpus, choice.record)
 
 
-def chosen(study: Study, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:
+def chosen(study: Any, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:
     """The Choice of a study's methods, on every rank: of a record, or of a pilot that all run."""
     if comm.rank > 0:
         while not isinstance(jobs := hear(comm, None), Choice):
@@ -214,7 +209,7 @@ def chosen(study: Study, comm: Communicator, records: Sequence[dict], quiet: boo
     return comm.broadcast(choice)
 
 
-def share_jobs(study: Study, comm: Communicator, jobs: Sequence[Job], leads: bool = False) -> list:
+def share_jobs(study: Any, comm: Communicator, jobs: Sequence[Job], leads: bool = False) -> list:
     """The Trials of a pilot's jobs, of which every rank runs its share; all of them on rank 0.
 
     Rank 0 ``leads``: the others have the jobs from it, and no Trials. StopRequested there where a
@@ -233,7 +228,12 @@ def share_jobs(study: Study, comm: Communicator, jobs: Sequence[Job], leads: boo
     return [shares[place % comm.size][place // comm.size] for place in range(len(jobs))]
 
 
-def own_facts(study: Study, comm: Communicator) -> tuple[Facts | None, str]:
+def facts_of(study: StudyKind) -> Facts:
+    """The Facts of this rank."""
+    return Facts(identity_of(study))
+
+
+def own_facts(study: StudyKind, comm: Communicator) -> tuple[Facts | None, str]:
     """(Facts of this rank, ""), or (None, why there are none); rank 0 speaks for itself."""
     if comm.rank == 0:
         with sharing_errors(comm):
@@ -252,7 +252,7 @@ def hear(comm: Communicator, value: Any) -> Any:
     return value
 
 
-def follow(study: Study, comm: Communicator) -> Ended:
+def follow(study: StudyKind, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
     plan = hear(comm, None)
     if plan.remaining:
@@ -266,7 +266,7 @@ def follow(study: Study, comm: Communicator) -> Ended:
 
 
 def lead(
-    study: Study, start: Beginning, comm: Communicator, progress: Progress,
+    study: StudyKind, start: Beginning, comm: Communicator, progress: Progress,
     output: str | Path | None = None,
 ) -> Ended:  # fmt: skip
     """What rank 0 does: run what is missing, with the others; make the Results.
@@ -279,8 +279,8 @@ def lead(
     remaining = state.schedule.remaining
     key = short(start.identity)
     progress.say(announcement(study, comm.size, study.size - remaining))
-    if classes := class_words(class_facts(study.pairings)):
-        progress.say(classes)
+    if study.remark:
+        progress.say(study.remark)
     comm.broadcast(Plan(remaining, key))
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
@@ -288,7 +288,7 @@ def lead(
         progress.say(COMPILING)
         compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
         progress.say(f"compiled or loaded in {time.monotonic() - began:.1f} s")
-    progress.start(remaining)
+    progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):
         coordinator.start()
@@ -299,7 +299,7 @@ def lead(
         final = state.schedule.final
         kept = start.in_journal()
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, kept)
-        ended.count, ended.journal = final, str(start.journal.path)
+        ended.count, ended.journal, ended.begun = final, str(start.journal.path), len(state.begun)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm, output, progress)
@@ -329,7 +329,7 @@ def compile_in_turn(study, comm, stored=()):
     """
     study.compile(study.kinds[comm.rank :: comm.size])
     comm.barrier()
-    rows = first_rows.packed(study.compile(study.kinds))
+    rows = first_rows.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))
     with sharing_errors(comm):
         if told and (line := first_rows.difference(study, *zip(*told, strict=True), dict(stored))):
@@ -338,23 +338,37 @@ def compile_in_turn(study, comm, stored=()):
         raise RankZeroFailed(go_on.code)
 
 
-def make_state(study: Study, start: Beginning, ranks: int) -> StudyState:
+def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     """The StudyState of what is missing, for so many ranks."""
     replicates, stop = study.config.replicates, study.config.stop
-    found = start.found(replicates)
-    failed = sum(
-        int(np.sum(start.store.read(place, "outcome", *interval) == FAILED))
-        for place, intervals in enumerate(found)
-        for interval in intervals
-    )
-    return StudyState(
-        Schedule.of(found, looks(borders(stop, replicates), start.at_least), ranks),
+    found, failed = start.found(replicates), 0
+    for place, intervals in enumerate(found):
+        for each in intervals:
+            read = partial(read_rows, start.store, place, each)
+            failed += int(np.sum(study.has_failed(read)))
+    done = [merged([*each, *study.unneeded(place)]) for place, each in enumerate(found)]
+    state = StudyState(
+        Schedule.of(done, looks(borders(stop, replicates), start.at_least), ranks,
+                    study.most_rows),
         start.store,
-        StopRule(stop, start.store),
-        allowed=stop.failed * study.size,
+        kind_of(study.config).enough(study, start.store),
+        allowed=study.allowed,
         failed=failed,
         notes=start.notes,
-    )
+        pieces=study.pieces,
+        left_of=lambda records: study.left_of(records, start.journal.read),
+    )  # fmt: skip
+    for task, records in start.store.parts.items():
+        place, replicate = task
+        there = any(first <= replicate < end for first, end in found[place])
+        if replicate < replicates and not there:
+            state.begun[task] = sum(study.counts_part(each.description) for each in records)
+    return state
+
+
+def read_rows(store: RowStore, place: int, interval: Interval, name: str) -> np.ndarray:
+    """A column of some replicates of a condition."""
+    return store.read(place, name, *interval)
 
 
 def looks(borders: list[int], least: int) -> list[int]:
@@ -363,58 +377,21 @@ def looks(borders: list[int], least: int) -> list[int]:
 
 
 def make_results(
-    study: Study, start: Beginning, state: StudyState, ended: Ended, comm: Communicator,
+    study: StudyKind, start: Beginning, state: StudyState, ended: Ended, comm: Communicator,
     output: str | Path | None, progress: Progress,
-) -> Results:  # fmt: skip
-    """The Results of a finished study; written to ``output``, by all ranks, where there is one."""
-    count, in_memory = state.schedule.final, output is None
+) -> Any:  # fmt: skip
+    """The results of a finished study; written to ``output``, by all ranks, where there is one."""
+    count, kind, in_memory = state.schedule.final, kind_of(study.config), output is None
     if output and (old := start.store.old) is not None and start.is_covered(count):
         if (tuple(old.places), old.count) == (study.conditions, count):
-            return read_results(output, replicates=False)  # as it is: nothing has been added
+            return kind.read(output)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
-    reader = Reader(start.store, (*study.shape[:3], count))
     run = facts(study, start, state.notes, ended, comm.size)
-    kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
-    if output is None:
-        sums = sums_of(reader.codes, len(study.conditions), 0, count)
-        rows = reader.arrays(COLUMNS) if in_memory else None
-        return results_of(study, count, sums, run, rows, kernel)
-    nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
-    # Its tables have no values yet, but their places: where the rows go follows from them.
-    draft = results_of(study, count, nothing, run, kernel=kernel)
-    with new_row_file(output, draft, start.replacing) as file:
-        sums, digests = assemble(reader, file, comm, progress.warn)
-        results = results_of(study, count, sums, run, kernel=kernel)
-        file.complete(results, digests)
-    return results
-
-
-def results_of(
-    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
-    kernel: Kernel | None = None,
-) -> Results:  # fmt: skip
-    """The Results of so many replicates of each condition from their Sums."""
-    config = study.config
-    probabilities, pooled, differences = tables_of(sums)
-    return Results(
-        types=config.scene.names,
-        vertices=np.array(config.shapes.vertices),
-        delta=np.array(config.scene.delta),
-        replicates=replicates,
-        probabilities=probabilities,
-        run=run,
-        failures=FAILURES,
-        flocs=tuple(floc.name for floc in study.flocs),
-        pooled=pooled,
-        differences=differences,
-        count=count,
-        radii=study.radii,
-        kernel=kernel,
-    )
+    return kind.results(study, start, count, run, comm, output, progress.warn, in_memory)
 
 
 def facts(study, start, notes, ended, ranks):
-    config, identity = study.config, start.identity
+    config, identity, kind = study.config, start.identity, kind_of(study.config)
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
@@ -431,17 +408,16 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         "preset": config.preset or "",
-        "size_classes": storable(json.dumps(class_facts(study.pairings))),
-        "warnings": storable(json.dumps(study_doubts(config, study.flocs))),
-        "settling": storable(json.dumps(settling_facts(config, study.flocs))),
-        "equivalent_spheres": storable(json.dumps(sphere_facts(config, study.flocs))),
+        "warnings": storable(json.dumps(kind.doubts(study))),
+        **{k: storable(v) if isinstance(v, str) else v for k, v in kind.facts(study).items()},
     }
 
 
-def announcement(study: Study, ranks: int, existing: int = 0) -> str:
-    types, vertices, delta, replicates = study.shape
-    line = (
-        f"{study.size} replicates: {types} types x {vertices} numbers of vertices x {delta} "
-        f"displacements x {replicates}, on {ranks} rank{'s' if ranks > 1 else ''}"
-    )
+def progress_of(study: StudyKind, quiet: bool) -> Progress:
+    """What tells how far a study is."""
+    return Progress(study.size * study.pieces, quiet, noun=study.noun)
+
+
+def announcement(study: StudyKind, ranks: int, existing: int = 0) -> str:
+    line = f"{study.title}, on {ranks} rank{'s' if ranks > 1 else ''}"
     return line + (f"; {existing} of them exist already" if existing else "")

@@ -1,29 +1,26 @@
 """A study: all conditions of a config, and any one replicate of them by its number."""
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import product
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
 from flocsim.ensembles.collision.draw import CHECKED, Draw
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
-from flocsim.ensembles.collision.failures import FAILED, NO_FLOC
+from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
-from flocsim.ensembles.collision.pairings import Pairing, pairings_of
+from flocsim.ensembles.collision.pairings import Pairing, class_facts, class_words, pairings_of
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
+from flocsim.io.results.checks import check_rows
 from flocsim.io.results.schema import NOT_APPLICABLE, RADII
-
-Kind = tuple[int, int]
-"""Place of a collision type, and N: they stand for all that runs the same compiled code."""
 
 
 def methods_of(config: Config) -> dict[str, Integrator]:
@@ -43,7 +40,7 @@ def flocs_of(config: Config) -> list[Floc]:
 
 
 @attrs.define(eq=False)
-class Study:
+class Study(StudyKind):
     """Every replicate of a config. All that is random follows from (seed, replicate).
 
     ``flocs`` are grown or read unless given; ``pairings`` say who meets whom in every collision
@@ -84,21 +81,15 @@ class Study:
         return other
 
     @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """(types, vertices, delta, replicates): how many there are of each."""
-        scene = self.config.scene
-        counts = (len(scene.names), len(self.config.shapes.vertices), len(scene.delta))
-        return (*counts, self.config.replicates)
-
-    @property
     def radii(self) -> dict[str, np.ndarray]:
         """{r_i, r_j: (types,)} [m] that stand for the collision types."""
         columns = zip(*(each.radii for each in self.pairings), strict=True)
         return {name: np.array(values) for name, values in zip(RADII, columns, strict=True)}
 
     @property
-    def size(self) -> int:
-        return int(np.prod(self.shape))
+    def remark(self) -> str:
+        """The size classes, where measured flocs are in any."""
+        return class_words(class_facts(self.pairings))
 
     def numbers(self, replicate: int) -> np.ndarray:
         """The random numbers of a replicate in [0, 1), see draws."""
@@ -170,18 +161,6 @@ class Study:
             self.drivers[kind] = made.compose(observer=encounter.observer)
         return self.drivers[kind]
 
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """All conditions, in the order of the results file."""
-        scene, vertices = self.config.scene, self.config.shapes.vertices
-        return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
-
-    @property
-    def places(self) -> tuple[tuple[int, int, float], ...]:
-        """(place of the collision type, N, share of δ_max) of every condition."""
-        scene, vertices = self.config.scene, self.config.shapes.vertices
-        return tuple(product(range(len(scene.names)), vertices, scene.delta))
-
     def run(
         self, condition: int, vertices: int, share: float, replicate: int,
         halted: Callable[[], bool] | None = None,
@@ -218,7 +197,7 @@ class Study:
         return None if row is None else {name: row[column] for name, column in CHECKED.items()}
 
     @property
-    def kinds(self) -> list[Kind]:
+    def kinds(self) -> list[Code]:
         """What stands for the kinds of compiled code that the study needs."""
         vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
         first: dict[type, int] = {}
@@ -226,9 +205,24 @@ class Study:
             first.setdefault(type(self.methods[name]), place)
         return [(place, n) for place in first.values() for n in vertices]
 
-    def compile(self, kinds: Iterable[Kind]) -> dict[Kind, dict | None]:
+    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile, or load from the disk, what these kinds need, by running it.
 
         {kind: row of the first replicate at the first displacement}.
         """
         return {kind: self.run(*kind, self.config.scene.delta[0], 0) for kind in kinds}
+
+    def run_task(
+        self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
+        keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """One replicate, whatever goes wrong in it."""
+        return run_safely(self, place, replicate, halted)
+
+    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
+        """ValueError for rows that no run can have given."""
+        check_rows(column, len(FAILURES), len(self.flocs))
+
+    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Which rows are of failed replicates."""
+        return column("outcome") == FAILED

@@ -1,7 +1,7 @@
 """Labelled arrays as a Dataset of xarray or a DataFrame of pandas, where these are installed."""
 
 import importlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -85,6 +85,44 @@ class Labelled:
         for place in np.ndindex(*map(len, words)):
             parts = [str(labels[at]) for labels, at in zip(words, place, strict=True)]
             yield "_".join([name, *parts]), values[(..., *place)].reshape(lengths).ravel()
+
+
+class Tables:
+    """Results of named groups of arrays.
+
+    A subclass gives `labelled(group)` and ``indices``, {group: axes along which its rows lie}, the
+    first being the one that is meant where none is named; ``word``: what groups are called.
+    """
+
+    indices: Mapping[str, Sequence[str]]
+    word = "group"
+
+    def labelled(self, group: str) -> Labelled:
+        """The arrays of a group with their axes; UsageError for an unknown one."""
+        raise NotImplementedError
+
+    def known(self, group: str | None) -> str:
+        """The name of a group; UsageError for an unknown one."""
+        name = next(iter(self.indices)) if group is None else group
+        if name not in self.indices:
+            known = ", ".join(self.indices)
+            raise UsageError(f"{self.word} must be one of {known}, found {group!r}")
+        return name
+
+    def to_xarray(self, group: str | None = None) -> Dataset:
+        """A group as an xarray Dataset, with units, meanings and flags.
+
+        UsageError where xarray is not installed (``pip install 'flocsim[tables]'``).
+        """
+        return self.labelled(self.known(group)).to_xarray()
+
+    def to_pandas(self, group: str | None = None) -> DataFrame:
+        """A group as a pandas DataFrame, a row for each place along its axes, codes as words.
+
+        UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
+        """
+        name = self.known(group)
+        return self.labelled(name).to_pandas(self.indices[name])
 
 
 def worded(pandas, column, values):

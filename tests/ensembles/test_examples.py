@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.suspension.runner import check_swarm
+from flocsim.ensembles.swarms.kind import check_swarm
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library

@@ -4,8 +4,13 @@ import math
 
 import numpy as np
 
-from flocsim.ensembles.strength.distribution import strengths_of
-from flocsim.ensembles.strength.opening import FAILED, HOLDS, OPENED, OPENS_AT_LEAST, Opening
+from flocsim.ensembles.estimates.strengths import (
+    FAILED,
+    HOLDS,
+    OPENED,
+    OPENS_AT_LEAST,
+    strengths_of,
+)
 from flocsim.io.results.kernel_group import KERNEL, Kernel
 
 AXES = ("I", "III"), np.array([1, 16]), np.array([0.0, 0.5])
@@ -27,12 +32,14 @@ def some_kernel():
 
 def mixed(complete=True):
     """One doublet of each kind in one condition."""
-    openings = [
-        Opening(1.0, 2.0, OPENED, 9, 1e-11), Opening(math.nan, 0.5, OPENS_AT_LEAST, 1, 1e-11),
-        Opening(64.0, math.nan, HOLDS, 21, 1e-10), Opening(4.0, math.nan, FAILED, 3, 1e-9),
-    ]  # fmt: skip
-    places = np.array([[1, 0, 1, k, 2] for k in range(4)])
+    columns = {
+        "type": [1] * 4, "vertices": [0] * 4, "delta": [1] * 4, "replicate": range(4),
+        "bond": [2] * 4, "holds": [1.0, math.nan, 64.0, 4.0], "opens": [2.0, 0.5, *[math.nan] * 2],
+        "status": [OPENED, OPENS_AT_LEAST, HOLDS, FAILED], "runs": [9, 1, 21, 3],
+        "tolerance": [1e-11, 1e-11, 1e-10, 1e-9],
+    }  # fmt: skip
+    columns = {name: np.array(values) for name, values in columns.items()}
     bound = np.zeros((2, 2, 2), dtype=np.int64)
     bound[1, 0, 1] = 6
     about = {"flow": "shear", "precision": 0.005, "asked": 4, "complete": complete}
-    return strengths_of(AXES, bound, places, openings, about)
+    return strengths_of(AXES, bound, columns, about)

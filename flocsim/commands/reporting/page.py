@@ -2,21 +2,28 @@
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from flocsim.commands.info import summary
+from flocsim.commands.info import summary, swarm_summary
+from flocsim.commands.plot import swarm_figures
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
 from flocsim.commands.reporting.motion import SCRIPT, motion_of
 from flocsim.ensembles.report import EFFICIENCY, efficiency_rows
+from flocsim.ensembles.swarms.assembly import table_rows
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import METADATA, house_style
 from flocsim.io.results.file import Totals
 from flocsim.io.results.schema import CLASSES, POOLED_PROBABILITIES, PROBABILITIES, Results
+from flocsim.io.results.swarm_file import SwarmResults
 
 MOST_FAILURES = 20
+Section = tuple[str, str, str]
+"""Anchor, heading and HTML."""
+
 SHOWN = {
     "pr_inside": "Pr[inside]", "pr_a": "Pr[A]", "pr_sticks": "Pr[A, sticks]",
     "pr_hangs": "Pr[A, hangs]",
@@ -40,7 +47,7 @@ def report_page(path: str, results: Results, totals: Totals, examples: Sequence[
         shown += [f"and {more} more in run/failed"] if more > 0 else []
         content = list_of(said.warnings, "warnings") + list_of(shown, "failed")
         sections.append(("warnings", "Warnings", content))
-    sections.append(("figures", "Figures", figures_of(results)))
+    sections.append(("figures", "Figures", figures_of(FIGURES, results)))
     sections.append(("tables", "Probabilities", tables_of(results)))
     if examples:
         motions = "\n".join(map(motion_of, examples))
@@ -50,24 +57,40 @@ def report_page(path: str, results: Results, totals: Totals, examples: Sequence[
             "Red rings: outlines overlap there.</p>"
         )
         sections.append(("motion", "In motion", f"{told}<div class='motions'>{motions}</div>"))
-    config = str(results.run.get("config", ""))
-    came = facts_of(said.origin)
-    if config:
-        lines = "\n".join(map(text, config.splitlines()))
-        came += f"<h3>Config</h3><pre>{lines}</pre>"
-    sections.append(("provenance", "Where it came from", came))
+    sections.append(provenance_of(results.run, said.origin))
     return page_of(f"{path}: results of a collision ensemble", sections, SCRIPT)
 
 
-def figures_of(results: Results) -> str:
-    """All figures of `flocsim plot`, that of everything first."""
-    names = sorted(FIGURES, key=lambda name: name != "overview")
-    return "\n".join(figure_of(name, results) for name in names)
+def swarm_page(path: str, results: SwarmResults) -> str:
+    """The HTML of a results file of swarms."""
+    facts, came, warnings = swarm_summary(path, results)
+    sections = [("results", "What was run, and what came out", facts_of(facts))]
+    if warnings:
+        sections.append(("warnings", "Warnings", list_of(warnings, "warnings")))
+    sections.append(("figures", "Figures", figures_of(swarm_figures(results), results)))
+    heads, *rows = table_rows(results)
+    sections.append(("tables", "Clusters over time, means over swarms", table_of(heads, rows)))
+    sections.append(provenance_of(results.run, came))
+    return page_of(f"{path}: results of a swarm study", sections, SCRIPT)
 
 
-def figure_of(name: str, results: Results) -> str:
+def provenance_of(run: Mapping[str, Any], origin: Sequence[tuple[str, str]]) -> Section:
+    """The section on where results came from."""
+    config, came = str(run.get("config", "")), facts_of(origin)
+    if config:
+        lines = "\n".join(map(text, config.splitlines()))
+        came += f"<h3>Config</h3><pre>{lines}</pre>"
+    return "provenance", "Where it came from", came
+
+
+def figures_of(figures: Mapping[str, Callable[..., Any]], results: Any) -> str:
+    """Figures of `flocsim plot`, that of everything first."""
+    names = sorted(figures, key=lambda name: name != "overview")
+    return "\n".join(figure_of(name, figures[name], results) for name in names)
+
+
+def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:
     """A figure of `flocsim plot` inside the page, its caption being the help of it."""
-    draw = FIGURES[name]
     picture = io.BytesIO()
     with house_style():
         draw(results).savefig(picture, format="svg", metadata=METADATA["svg"])

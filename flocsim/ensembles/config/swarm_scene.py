@@ -162,6 +162,16 @@ class SwarmScene:
             )
 
     @property
+    def names(self) -> tuple[str]:
+        """The one collision type of its conditions, as other scenes have several."""
+        return ("swarm",)
+
+    @property
+    def delta(self) -> tuple[float]:
+        """Its one displacement: there is none."""
+        return (0.0,)
+
+    @property
     def interval(self) -> float:
         """Time between two snapshots [s]."""
         return self.duration / SNAPSHOTS if isinstance(self.every, str) else self.every

@@ -13,8 +13,6 @@ import attrs
 
 from flocsim.compiler.processor import versions
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.storage.identity import identity_of
-from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 
 MOST_DIFFERENCES = 3
@@ -50,11 +48,6 @@ class Facts:
     def values(self) -> dict[str, Any]:
         """All that has to be the same on all ranks, by name."""
         return self.versions | self.identity
-
-
-def facts_of(study: Study) -> Facts:
-    """The Facts of this rank."""
-    return Facts(identity_of(study))
 
 
 def refuse_other_words(rank: int, launch: Launch, words: Mapping[str, Any]) -> None:

@@ -13,9 +13,20 @@ import attrs
 
 from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
-from flocsim.ensembles.parallel.messages import Assignment, ChunkResult, Dismissal, Halt, Request
+from flocsim.ensembles.parallel.messages import (
+    Assignment,
+    ChunkResult,
+    Dismissal,
+    Going,
+    Halt,
+    Kept,
+    Request,
+)
 from flocsim.ensembles.parallel.study_state import Phase, StudyState
 from flocsim.interruption import stop_requested
+
+GOING_SECONDS = 1.0
+"""Seconds between two messages of a rank that say how far it is."""
 
 FAREWELL = 5.0
 """Seconds in which the other ranks leave by themselves, once the study is given up."""
@@ -26,13 +37,13 @@ class Coordinator:
     """Rank 0's: takes in results and hands out chunks, its own and those of all other ranks.
 
     A thread serves the others where MPI has threads; elsewhere rank 0 does between two of its own
-    replicates. ``report(remaining)`` tells the user. Of the other ranks ``present`` have not been
-    dismissed yet, ``computing`` have a chunk and no Halt, ``waiting`` want a chunk.
+    replicates. ``report(missing, going)`` tells the user. Of the other ranks ``present`` have not
+    been dismissed yet, ``computing`` have a chunk and no Halt, ``waiting`` want a chunk.
     """
 
     comm: Communicator
     state: StudyState
-    report: Callable[[int], object]
+    report: Callable[..., object]
     present: int = attrs.field(init=False)
     computing: set[int] = attrs.Factory(set)
     waiting: list[int] = attrs.Factory(list)
@@ -94,7 +105,14 @@ class Coordinator:
                 self.state.interrupt()
             if result is not None:
                 self.state.take_in(result)
-                self.report(self.state.schedule.remaining)
+                self.report(self.state.missing)
+
+    def tell(self, message: Kept | Going) -> None:
+        """Take in what a rank says of the replicate that it is at."""
+        with self.lock:
+            if isinstance(message, Kept):
+                self.state.keep(message)
+            self.report(self.state.missing, message.words if isinstance(message, Going) else "")
 
     def next_chunk(self):
         with self.lock:
@@ -112,6 +130,9 @@ class Coordinator:
         """Take in what has come from the other ranks and answer them; whether anything has."""
         before = len(self.waiting)
         for rank, request in self.comm.messages():
+            if isinstance(request, Kept | Going):
+                self.tell(request)
+                continue
             self.computing.discard(rank)
             self.waiting.append(rank)
             self.take_in(request.result, request.interrupted)
@@ -141,6 +162,15 @@ class RemoteCoordinator:
 
     comm: Communicator
     halted: bool = False
+    said: float = attrs.Factory(time.monotonic)
+
+    def tell(self, message: Kept | Going) -> None:
+        """Say something of the replicate at hand; how far it is, now and then."""
+        if isinstance(message, Going):
+            if time.monotonic() - self.said < GOING_SECONDS:
+                return
+            self.said = time.monotonic()
+        self.comm.send(0, message)
 
     def exchange(self, result: ChunkResult | None) -> Chunk | None:
         """Hand in what is done; the next Chunk, or None where there is none."""

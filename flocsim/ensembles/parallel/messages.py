@@ -4,6 +4,7 @@ rank 0 → another rank         the flocs and the Facts of its study (or ExitCod
 every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
 rank 0 → another rank         Plan, once (or ExitCode, where the study cannot begin)
                               Assignment or Dismissal, in answer to a Request
+every other rank → rank 0     Kept and Going, while it works, where replicates take long
                               Halt, while it works, when its chunk is of no use any more
                               ExitCode, after its Dismissal, when all is written
 """
@@ -35,6 +36,24 @@ class ChunkResult:
     data_start: int
     failed: int = 0
     notes: tuple[dict, ...] = ()
+
+
+@attrs.frozen
+class Kept:
+    """What is kept of an unfinished replicate of the condition at a place, as a record of the
+    journal; whether progress counts it."""
+
+    condition: int
+    replicate: int
+    record: bytes
+    counts: bool
+
+
+@attrs.frozen
+class Going:
+    """How far a rank's replicate is, in words."""
+
+    words: str
 
 
 @attrs.frozen

@@ -46,22 +46,24 @@ class Schedule:
     """What is to be run, and what is being run, on ``size`` ranks.
 
     ``remaining``: replicates that are missing; ``final``: with how many of each condition the
-    study has ended, −1 while it goes on.
+    study has ended, −1 while it goes on; ``most``: of a chunk.
     """
 
     size: int
     stages: list[Stage]
     remaining: int = 0
     final: int = -1
+    most: int = MOST_ROWS
 
     @classmethod
     def of(
-        cls, done: Sequence[Sequence[Interval]], borders: Sequence[int], size: int
-    ) -> "Schedule":
+        cls, done: Sequence[Sequence[Interval]], borders: Sequence[int], size: int,
+        most: int = MOST_ROWS,
+    ) -> "Schedule":  # fmt: skip
         """The Schedule of what is missing.
 
         ``done``: of every condition the intervals that exist already; ``borders``: where stages
-        end, [100, 125, …].
+        end, [100, 125, …]; ``most``: replicates of a chunk.
         """
         stages = []
         for first, stop in zip([0, *borders[:-1]], borders, strict=True):
@@ -70,14 +72,14 @@ class Schedule:
             todo = [(place, *gap) for place, each in places for gap in each[::-1]]
             count = sum(map(total, gaps))
             stages.append(Stage(first, stop, todo, count, count))
-        return cls(size, stages, sum(stage.unfinished for stage in stages))
+        return cls(size, stages, sum(stage.unfinished for stage in stages), most=most)
 
     def take(self) -> Chunk | None:
         """The next Chunk, None where all is handed out."""
         stage = next((stage for stage in self.stages if stage.todo), None)
         if stage is None:
             return None
-        count = min(MOST_ROWS, max(1, stage.waiting // (SHARE * self.size)))
+        count = min(self.most, max(1, stage.waiting // (SHARE * self.size)))
         condition, first, stop = stage.todo.pop()
         if stop - first > count:
             stage.todo.append((condition, first + count, stop))

@@ -4,17 +4,19 @@ Nothing here sends a message or waits: the same calls give the same state.
 """
 
 import enum
+from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 import attrs
 
 from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.collision.failures import describe_note
-from flocsim.ensembles.parallel.messages import ChunkResult
+from flocsim.ensembles.parallel.messages import ChunkResult, Kept
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
-from flocsim.io.journal.records import data_digest
+from flocsim.io.journal.records import data_digest, record_at
 
 MOST_NOTES = 1000
 """Notes on failed replicates that are kept."""
@@ -39,7 +41,9 @@ class StudyState:
 
     ``is_enough(replicates)``: whether the study may end with so many of each condition;
     ``allowed``: how many may fail; ``failed``, ``notes``: how many have, and what is known of
-    them; ``computed``: how many this run has taken in.
+    them; ``computed``: how many this run has taken in. ``pieces`` of a replicate are what progress
+    counts, ``begun`` has how many are there of unfinished ones; ``left_of(records)``: where a
+    replicate goes on of which these were kept.
     """
 
     schedule: Schedule
@@ -50,13 +54,33 @@ class StudyState:
     notes: list[dict] = attrs.Factory(list)
     computed: int = 0
     phase: Phase = Phase.RUNNING
+    pieces: int = 1
+    begun: Counter[tuple[int, int]] = attrs.Factory(Counter)
+    left_of: Callable[[list], Any] = lambda records: None
+
+    @property
+    def missing(self) -> int:
+        """How many pieces are."""
+        return self.schedule.remaining * self.pieces - self.begun.total()
 
     @property
     def is_running(self) -> bool:
         return self.phase is Phase.RUNNING
 
     def next_chunk(self) -> Chunk | None:
-        return self.schedule.take() if self.is_running else None
+        chunk = self.schedule.take() if self.is_running else None
+        if chunk is None or not (records := self.store.parts.get(chunk[:2])):
+            return chunk
+        return chunk._replace(left=self.left_of(records))
+
+    def keep(self, kept: Kept) -> None:
+        """Write down what was kept of an unfinished replicate."""
+        if self.phase is Phase.GIVEN_UP:
+            return
+        offset = self.store.journal.append(kept.record)
+        task = kept.condition, kept.replicate
+        self.store.parts[task].append(record_at(kept.record, offset))
+        self.begun[task] += kept.counts
 
     def take_in(self, result: ChunkResult) -> None:
         """Write a ChunkResult down, and see whether that is enough.
@@ -66,10 +90,12 @@ class StudyState:
         if self.phase is Phase.GIVEN_UP:
             return
         if result.count:
-            condition, first, _ = result.chunk
+            condition, first = result.chunk[:2]
             offset = self.store.journal.append(result.record) + result.data_start
             digest = data_digest(result.record)
             self.store.add(condition, first, first + result.count, offset, digest)
+            for replicate in range(first, first + result.count) if self.begun else ():
+                self.begun.pop((condition, replicate), None)
         self.computed += result.count
         self.schedule.give_back(result.chunk, result.count)
         self.failed += result.failed

@@ -9,56 +9,56 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition
+from flocsim.ensembles.kind import Code, StudyKind
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.study import Kind, Study
 
-Rows = dict[Kind, bytes]
-"""{kind: the row of its first replicate at the first displacement}."""
+Rows = dict[Code, bytes]
+"""{kind of code: what is compared of the row of its first replicate at the first displacement}."""
 
 
-def packed(rows: Mapping[Kind, dict | None]) -> Rows:
-    """The rows of Study.compile as bytes."""
+def packed(study: StudyKind, rows: Mapping[Code, dict | None]) -> Rows:
+    """The rows of StudyKind.compile as bytes."""
     return {
-        kind: np.array(tuple(row[name] for name in COLUMNS), ROW).tobytes()
-        for kind, row in rows.items() if row is not None
+        code: b"".join(np.array(row[name], study.row[name]).tobytes() for name in study.compared)
+        for code, row in rows.items() if row is not None
     }  # fmt: skip
 
 
-def stored_rows(study: Study, store: RowStore) -> Rows:
+def stored_rows(study: StudyKind, store: RowStore) -> Rows:
     """The same rows as a journal or an older results file has them, where it does."""
-    scene, found = study.config.scene, {}
-    for kind in study.kinds:
-        condition = Condition(scene.names[kind[0]], kind[1], scene.delta[0])
+    found: dict[Code, dict | None] = {}
+    for code in study.kinds:
+        condition, replicate = study.first_of(code)
         place = store.conditions.index(condition)
-        if any(first == 0 < stop for first, stop in store.intervals(place)):
-            values = (store.read(place, name, 0, 1)[0] for name in COLUMNS)
-            found[kind] = np.array(tuple(values), ROW).tobytes()
-    return found
+        if any(first <= replicate < stop for first, stop in store.intervals(place)):
+            found[code] = {name: store.read(place, name, replicate, replicate + 1)[0]
+                           for name in study.compared}  # fmt: skip
+    return packed(study, found)
 
 
-def difference(study: Study, ranks: Sequence[Rows], arithmetic: Sequence[str], stored: Rows) -> str:
+def difference(
+    study: StudyKind, ranks: Sequence[Rows], arithmetic: Sequence[str], stored: Rows
+) -> str:
     """What was computed otherwise, in one line; "" for nothing.
 
     ``ranks`` and ``arithmetic``: the Rows of all ranks, and how they round (arithmetic_digest).
     """
-    scene = study.config.scene
     for rank, each in enumerate(arithmetic):
         if each != arithmetic[0]:
             return (
                 f"rank {rank} rounds sin, exp and the like otherwise than rank 0 (another kind of "
                 "processor, another C library or numpy): give the job machines of one kind"
             )
-    for kind in study.kinds:
-        name, n = scene.names[kind[0]], kind[1]
-        which = f"replicate 0 of type {name}, N = {n}, delta {scene.delta[0]:g}"
+    for code in study.kinds:
+        (name, n, share), replicate = study.first_of(code)
+        which = f"replicate {replicate} of type {name}, N = {n}, delta {share:g}"
         for rank, rows in enumerate(ranks):
-            if rows.get(kind) != ranks[0].get(kind):
+            if rows.get(code) != ranks[0].get(code):
                 return (
                     f"{which} comes out otherwise on rank {rank} than on rank 0: give the job "
                     "machines of one kind, or leave out what is random in a force of your own"
                 )
-        if kind in stored and stored[kind] != ranks[0].get(kind):
+        if code in stored and stored[code] != ranks[0].get(code):
             return (
                 f"{which} comes out otherwise here than it is in the file: go on where the run was "
                 "begun, or begin anew by --restart"

@@ -21,6 +21,7 @@ import numpy as np
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.config.schema import SETTLING
+from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import point_columns
@@ -48,9 +49,9 @@ list against all that a replicate imports."""
 PACKAGE = Path(__file__).parents[2]
 
 
-def machine_facts() -> dict:
+def machine_facts(names: Sequence[str] = PHYSICS) -> dict:
     """What all studies of this process follow from: flocsim's code, and how the machine rounds."""
-    return {"code": physics_digest(), "arithmetic": arithmetic_digest()}
+    return {"code": physics_digest(names=names), "arithmetic": arithmetic_digest()}
 
 
 def identity_of(study: Study, machine: dict | None = None) -> dict:
@@ -58,21 +59,28 @@ def identity_of(study: Study, machine: dict | None = None) -> dict:
 
     ``machine``: the machine_facts, where they are known.
     """
+    facts = config_facts(study, ("scene", "shapes", "bodies", "fluid", "zone"))
+    facts |= machine or machine_facts()
+    facts["integrator.check_share"] = study.config.integrator.check_share
+    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
+    return json.loads(json.dumps(facts))
+
+
+def config_facts(study: StudyKind, tables: Sequence[str]) -> dict:
+    """What the config of a study of any kind says: these tables, the method, the forces."""
     config = study.config
-    facts = {"seed": config.seed} | (machine or machine_facts())
-    for table in ("scene", "shapes", "bodies", "fluid", "zone"):
+    facts: dict = {"seed": config.seed}
+    for table in tables:
         facts |= settings(table, getattr(config, table))
     if config.shapes.own is not None:
         facts |= settings("shapes", config.shapes.own)
         facts["shapes.class"] = config.shapes.label
     facts |= method_facts(study)
     facts["integrator.max_steps"] = config.integrator.max_steps
-    facts["integrator.check_share"] = config.integrator.check_share
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
         facts |= settings(f"forces.{name}", force)
-    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
-    return json.loads(json.dumps(facts))
+    return facts
 
 
 def method_facts(study):

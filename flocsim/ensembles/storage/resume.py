@@ -8,13 +8,15 @@ import contextlib
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import attrs
 
 from flocsim.ensembles.chunks import (
+    KEPT,
     Condition,
     Interval,
     condition_of,
@@ -24,22 +26,19 @@ from flocsim.ensembles.chunks import (
     rows_of,
     total,
 )
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.kind import OldRows, StudyKind
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
 from flocsim.ensembles.storage.stored_json import is_session, stored
-from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
-from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.journal.records import CHUNK, SESSION, SNAPSHOT, encode
+from flocsim.io.json_text import matches
 from flocsim.io.opening import UNREADABLE
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.provenance import now
-from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import BLOCK, opened, scalar_of
-from flocsim.io.results.schema import as_words
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
@@ -51,6 +50,8 @@ WAYS = (
 """What a user can do about a file in the place of the results."""
 
 MOST_DIFFERENCES = 5
+BLOCK = 262_144
+"""Rows of a results file that are looked at together."""
 HISTORY = ("date", "command")
 """What is kept of a run that contributed to a results file."""
 
@@ -61,13 +62,13 @@ class Beginning:
 
     ``remarks`` are for the user; ``notes`` are those on failed replicates among the found ones;
     ``history`` has date and command of the runs before. ``cpus_now`` are the kinds of CPU that
-    this run computes on, ``cpus_found`` those that the found rows are of; ``flocs``: how many flocs
-    its rows may be of; ``replacing`` says what becomes of a file at the place of the results when
-    they are written. ``rule`` is the rule that ends the study early, as the journal has it;
-    ``unasked`` says what rows the journal has of other conditions, and ``farthest`` how far it has
-    them of these (those beyond the end of a run with the same rule left out): they are not to go
-    with it. ``at_least``: replicates that each condition has in the results file already.
-    ``accuracy``: the record of a pilot's choice, where there was one.
+    this run computes on, ``cpus_found`` those that the found rows are of; ``replacing`` says what
+    becomes of a file at the place of the results when they are written. ``rule`` is the rule that
+    ends the study early, as the journal has it; ``unasked`` says what rows the journal has of other
+    conditions, and ``farthest`` how far it has them of these (those beyond the end of a run with
+    the same rule left out): they are not to go with it. ``at_least``: replicates that each
+    condition has in the results file already. ``accuracy``: the record of a pilot's choice, where
+    there was one.
     """
 
     store: RowStore
@@ -82,7 +83,6 @@ class Beginning:
     accuracy: dict = attrs.Factory(dict)
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
-    flocs: int = 0
     replacing: Rule = keep
     resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
@@ -96,6 +96,7 @@ class Beginning:
         old = self.store.old
         return (
             old is not None
+            and old.whole
             and count <= old.count
             and all(condition in old.places for condition in self.store.conditions)
         )
@@ -154,49 +155,39 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 
 
 def begin(
-    study: Study,
-    identity: dict,
-    output: str | Path,
-    mode: str,
-    journal: Journal,
-    cpus: Sequence[dict] = (),
-    overwrite: bool = False,
+    study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
+    old_rows: Callable[..., OldRows], cpus: Sequence[dict] = (), overwrite: bool = False,
     accuracy: dict | None = None,
-) -> Beginning:
+) -> Beginning:  # fmt: skip
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
-    ``journal``: as `claim` gave it; ``accuracy``: the record of a pilot's choice. Raises UsageError
+    ``journal``: as `claim` gave it; ``old_rows`` of the Kind; ``accuracy``: the record of a pilot's
+    choice. Raises UsageError
     where what lies there is of another config, of other shapes or other physics, has rows that this
     study would drop, or is anything but results of this study to be extended; with ``overwrite``
     that is set aside.
     """
-    start = Beginning(RowStore(journal, study.conditions), identity, cpus_now=list(cpus))
-    start.rule, start.flocs, start.accuracy = rule_of(study), len(study.flocs), accuracy or {}
+    start = Beginning(RowStore(journal, study.conditions, study.row), identity)
+    start.cpus_now, start.rule, start.accuracy = list(cpus), rule_of(study), accuracy or {}
     start.resources.callback(journal.release)
+
+    def take_rows() -> None:
+        take_results(start, study, output, old_rows)
+
     try:
-        take_journal(start)
-        take_place(start, output, mode, overwrite)
+        take_journal(start, study)
+        take_place(start, output, mode, overwrite, take_rows)
         refuse_fewer(start, output, study.config.replicates)
         session = {
-            "identity": identity, "short": short(identity), "layout": layout(), "date": now(),
-            "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": start.rule,
-            "accuracy": start.accuracy, "asked": asked_of(study),
+            "identity": identity, "short": short(identity), "layout": layout(study.row),
+            "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
+            "rule": start.rule, "accuracy": start.accuracy, "asked": study.asked(),
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
         start.resources.close()
         raise
     return start
-
-
-def asked_of(study: Study) -> dict:
-    """What a study consists of, for those who look into its journal."""
-    config = study.config
-    return {
-        "types": list(config.scene.names),
-        "vertices": list(config.shapes.vertices), "delta": list(config.scene.delta),
-        "replicates": config.replicates,
-    }  # fmt: skip
 
 
 def recorded_choices(journal: Journal) -> list[dict]:
@@ -211,12 +202,14 @@ def check_free(output: str | Path) -> None:
         raise in_the_way(output, WAYS)
 
 
-def take_place(start: Beginning, output: str | Path, mode: str, overwrite: bool) -> None:
-    """Use the results of this study that are to be extended; nothing else may lie there."""
+def take_place(
+    start: Beginning, output: str | Path, mode: str, overwrite: bool, take: Callable[[], None]
+) -> None:
+    """``take`` the results of this study that are to be extended; nothing else may lie there."""
     if os.path.lexists(ordinary_target(output)) and mode == RESUME:
         try:
             replacing = extension_rule(output)
-            take_results(start, output)
+            take()
             start.replacing = replacing
             return
         except (FileError, UsageError) as error:
@@ -258,7 +251,7 @@ def spelled(condition):
     return f"type {condition.type}, N = {condition.vertices}, delta {condition.delta:g}"
 
 
-def take_journal(start: Beginning) -> None:
+def take_journal(start: Beginning, study: StudyKind) -> None:
     """Find the chunks in the journal; UsageError where they are those of another study."""
     journal: Any = start.journal
     sessions = [record.description for record in journal.records if record.kind == SESSION]
@@ -267,7 +260,7 @@ def take_journal(start: Beginning) -> None:
     start.history += [{key: each[key] for key in HISTORY} for each in sessions]
     for description in sessions:
         refuse_other(start, journal.path, description["identity"])
-        if description["layout"] != layout():
+        if description["layout"] != layout(study.row):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
     known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
     places = {condition: place for place, condition in enumerate(start.store.conditions)}
@@ -275,8 +268,10 @@ def take_journal(start: Beginning) -> None:
     for record in journal.records:
         if record.kind == SESSION:
             session = record.description
-        elif record.kind == CHUNK and fits(record.description, record.length):
-            take_chunk(start, record, known, places, session)
+        elif record.kind == SNAPSHOT:
+            take_part(start, study, record, known, places)
+        elif record.kind == CHUNK and fits(record.description, record.length, study.row):
+            take_chunk(start, study, record, known, places, session)
         elif record.kind == CHUNK:
             start.remarks.append(
                 f"{journal.path}: {named(record.description)}: it is not as flocsim writes it: "
@@ -287,6 +282,21 @@ def take_journal(start: Beginning) -> None:
             f"{journal.path}: damaged from byte {each.start} to {each.stop} "
             f"({named(each.description)}); what is missing is computed again"
         )
+
+
+def take_part(start, study, record, known, places):
+    """Note what was kept of an unfinished replicate, if it can be of this study."""
+    about = record.description
+    try:
+        if not matches(about, KEPT) or about["identity"] not in known:
+            raise ValueError("nothing vouches for what was kept of a replicate")
+        place = places.get(condition_of(about))
+        study.check_part(about, start.journal.read(record.offset, record.length))
+    except ValueError as error:
+        start.remarks.append(f"{start.journal.path}: {error}: it is left out")
+        return
+    if place is not None:
+        start.store.parts[place, about["replicate"]].append(record)
 
 
 ELSEWHERE = "name another output"
@@ -303,7 +313,7 @@ def refuse_other(start, path, stored, remedy=REMEDY):
         raise UsageError(f"{path} is of another study: {shown}{more}; {remedy}")
 
 
-def take_chunk(start, record, known, places, session):
+def take_chunk(start, study, record, known, places, session):
     """Note where a chunk's rows lie, if they are of a condition of this study.
 
     ``session``: the description of the run that wrote it.
@@ -318,13 +328,16 @@ def take_chunk(start, record, known, places, session):
     if place is None:
         start.unasked.append(condition_of(about))
         return
-    rows = rows_of(start.journal.read(record.offset, record.length))
+    rows, first = (
+        rows_of(start.journal.read(record.offset, record.length), study.row),
+        about["first"],
+    )
     try:
-        check_rows(rows.__getitem__, len(FAILURES), start.flocs)
+        study.check_rows(rows.__getitem__)
+        study.check_whole(rows, start.store.parts.get((place, first), []))
     except ValueError as error:
         start.remarks.append(f"{start.journal.path}: {named(about)}: {error}: computed again")
         return
-    first = about["first"]
     start.store.add(place, first, first + about["count"], record.offset, record.digest)
     start.notes += about.get("notes", [])
     start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])
@@ -333,49 +346,43 @@ def take_chunk(start, record, known, places, session):
         start.farthest = max(start.farthest, first + about["count"])
 
 
-def take_results(start, output):
+def take_results(start, study, output, old_rows):
     """Use the rows of an older results file; FlocsimError if they are not of this study."""
     before = stamp(os.fspath(output))
-    file = start.resources.enter_context(opened(output))
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
-    if "identity" not in run:
-        raise UsageError(f"{output} does not say what it was made from: {ELSEWHERE}")
     try:
+        old = old_rows(output, start.resources)
+        run, count = old.run, old.count
+        if "identity" not in run:
+            raise UsageError(f"{output} does not say what it was made from: {ELSEWHERE}")
         refuse_other(start, output, stored(run, "identity"), ELSEWHERE)
         found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
-        rows, places, count = old_rows(start, file)
+        check_old(study, old)
     except UNREADABLE as error:
         if isinstance(error, FlocsimError):
             raise
         raise FileError(f"{output} holds no readable results: {error}; {ELSEWHERE}") from error
     for place, condition in enumerate(start.store.conditions):
-        if condition in places and count:
-            start.store.add(place, 0, count, -1)
-    start.store.old = OldTable(rows, places, os.fspath(output), count, before)
+        if condition in old.places and count:
+            for interval in [(0, count)] if old.there is None else old.there[condition]:
+                start.store.add(place, *interval, -1)
+    whole = old.there is None
+    start.store.old = OldTable(
+        old.columns, old.places, os.fspath(output), count, before, old.more, whole
+    )
     start.notes += found["failed"]
     start.cpus_found = distinct([*found["cpus"], *start.cpus_found])
     earlier = {key: run[key] for key in HISTORY if key in run}
     start.history = [*found["history"], earlier, *start.history]
 
 
-def old_rows(start, file):
-    """(table of replicates, {Condition: place in it}, replicates of each) of a results file.
+def check_old(study: StudyKind, old: OldRows) -> None:
+    """ValueError for rows of a results file that no run can have given."""
+    for condition in study.conditions:
+        for first in range(0, old.count if condition in old.places else 0, BLOCK):
+            part = (*old.places[condition], slice(first, first + BLOCK))
+            study.check_rows(partial(values_of, old.columns, part))
 
-    Raises ValueError for rows that no run can have given.
-    """
-    rows = file["replicates"]
-    if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
-        raise ValueError("its codes of failures have other words")
-    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
-    places = {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
-    count = len(rows["replicate"])
-    for condition in start.store.conditions:
-        for first in range(0, count if condition in places else 0, BLOCK):
-            part = (*places[condition], slice(first, first + BLOCK))
-            check_rows(lambda name, part=part: rows[name][part], len(FAILURES), start.flocs)
-    return rows, places, count
+
+def values_of(columns, part, name):
+    """Some values of a column."""
+    return columns[name][part]

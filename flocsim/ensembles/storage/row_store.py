@@ -4,17 +4,17 @@ Nothing is believed of a journal but what the digest says that this run wrote or
 """
 
 import os
-from collections import OrderedDict
+from collections import OrderedDict, defaultdict
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, STARTS, Condition, Interval, merged, missing
+from flocsim.ensembles.chunks import ROW, Condition, Interval, merged, missing, starts
 from flocsim.errors import FileError
+from flocsim.io.journal.records import Record
 from flocsim.io.pieces import digest_of
-from flocsim.io.results.schema import ROW_SIZE
 
 ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8"), ("digest", "V16")])
 """A run of rows: its replicates, where its data begin in the journal (−1: it is in the old file),
@@ -30,14 +30,17 @@ class OldTable:
     """The table of replicates of a results file that is open: dataset by name.
 
     ``places``: Condition → its place in the arrays; ``path``: of the file; ``count``: replicates of
-    each; ``before``: what `stamp` said of the file before its checksum was found right.
+    each; ``before``: what `stamp` said of the file before its checksum was found right; ``more``:
+    what else its kind of study takes from it; ``whole``: whether it has all replicates of these.
     """
 
     datasets: Mapping[str, Any]
-    places: Mapping[Condition, tuple[int, int, int]]
+    places: Mapping[Condition, tuple[int, ...]]
     path: str = ""
     count: int = 0
     before: tuple | None = None
+    more: Any = None
+    whole: bool = True
 
     def read(self, condition: Condition, name: str, first: int, stop: int) -> np.ndarray:
         """Values of a column; FileError where the open file has been written to meanwhile."""
@@ -65,12 +68,16 @@ def stamp(path: str) -> tuple | None:
 class RowStore:
     """Finds rows by condition and replicate. Few bytes per chunk, none per row.
 
-    ``journal``: a Journal, a MemoryJournal or a ReadOnlyJournal.
+    ``journal``: a Journal, a MemoryJournal or a ReadOnlyJournal; ``row``: the type of a row;
+    ``parts``: {(place of the condition, replicate): records of what was kept of it unfinished}.
     """
 
     journal: Any
     conditions: tuple[Condition, ...]
+    row: np.dtype = ROW
     old: OldTable | None = None
+    parts: dict[tuple[int, int], list[Record]] = attrs.Factory(lambda: defaultdict(list))
+    starts: dict[str, int] = attrs.field(init=False)
     entries: list[np.ndarray] = attrs.field(init=False)
     counts: list[int] = attrs.field(init=False)
     held: "OrderedDict[int, bytes]" = attrs.field(init=False, factory=OrderedDict)
@@ -78,6 +85,7 @@ class RowStore:
     held_size: int = 0
 
     def __attrs_post_init__(self):
+        self.starts = starts(self.row)
         self.entries = [np.empty(4, ENTRY) for _ in self.conditions]
         self.counts = [0] * len(self.conditions)
 
@@ -107,7 +115,7 @@ class RowStore:
 
         FileError where a chunk is not what was written.
         """
-        values = np.empty(stop - first, ROW[name])
+        values = np.empty(stop - first, self.row[name])
         known = self.known(place) if known is None else known
         for start, end, offset, digest in near(known, first, stop).tolist():
             low, high = max(start, first), min(end, stop)
@@ -116,9 +124,7 @@ class RowStore:
                     assert self.old is not None, "rows of an older file, which is open"
                     part = self.old.read(self.conditions[place], name, low, high)
                 else:
-                    data = self.checked(offset, (end - start) * ROW_SIZE, digest)
-                    begin = (end - start) * STARTS[name] + (low - start) * ROW[name].itemsize
-                    part = np.frombuffer(data, ROW[name], high - low, begin)
+                    part = self.column(name, (start, end), offset, digest, (low, high))
                 values[low - first : high - first] = part
         return values
 
@@ -139,18 +145,19 @@ class RowStore:
             if offset < 0:
                 assert self.old is not None, "rows of an older file, which is open"
                 condition = self.conditions[place]
-                yield low, {name: self.old.read(condition, name, low, high) for name in COLUMNS}
+                yield low, {name: self.old.read(condition, name, low, high) for name in self.starts}
             else:
-                data = self.checked(offset, (end - start) * ROW_SIZE, digest)
-                yield low, {
-                    name: np.frombuffer(
-                        data, ROW[name], high - low,
-                        (end - start) * STARTS[name] + (low - start) * ROW[name].itemsize,
-                    )
-                    for name in COLUMNS
-                }  # fmt: skip
+                chunk = (start, end), offset, digest
+                yield low, {name: self.column(name, *chunk, (low, high)) for name in self.starts}
         if missing(merged(reached), first, stop):
             raise FileError(f"{self.journal.path} does not have all rows: run it again by --resume")
+
+    def column(self, name, chunk, offset, digest, wanted):
+        """The values of a column that a chunk in the journal has of the wanted replicates."""
+        (start, end), (low, high), kind = chunk, wanted, self.row[name]
+        data = self.checked(offset, (end - start) * self.row.itemsize, digest)
+        begin = (end - start) * self.starts[name] + (low - start) * kind.itemsize
+        return np.frombuffer(data, kind, high - low, begin)
 
     def checked(self, offset, length, digest):
         """The data of a chunk, as they were written; the last ones are held."""

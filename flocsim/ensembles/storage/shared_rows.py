@@ -75,7 +75,7 @@ class OldColumns:
     ending: bytes
     offsets: Mapping[str, int]
     shape: tuple[int, ...]
-    places: Mapping[Condition, tuple[int, int, int]]
+    places: Mapping[Condition, tuple[int, ...]]
     written: tuple | None
 
     def opened(self, resources: contextlib.ExitStack) -> OldTable:

@@ -11,6 +11,7 @@ import numpy as np
 from flocsim.arrays import PairView
 from flocsim.body import Body, Fluid
 from flocsim.constants import MINIMUM_GAP
+from flocsim.ensembles.estimates.strengths import FAILED, HOLDS, OPENED, OPENS_AT_LEAST
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import laws_of
@@ -49,8 +50,9 @@ ended by then. The first is far below the gap at which attraction gives way, and
 hundred steps. Edges that slide over each other near the rate at which they open may bounce by
 1e-15 m, tens of thousands of times; coarser steps go over that (docs/strength.md)."""
 
-OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(4)
-"""What was found: see io.results.strength_file.STATUS."""
+
+class Halted(Exception):
+    """Somebody wants a doublet to be given up."""
 
 
 @attrs.frozen
@@ -182,15 +184,20 @@ class Doublet:
             return None
         return watch.opened
 
-    def opening(self, precision: float = 5e-3) -> Opening:
+    def opening(
+        self, precision: float = 5e-3, halted: Callable[[], bool] = lambda: False
+    ) -> Opening:
         """The first rate of the ladder at which it opens, then by halves of the logarithm to a
         relative ``precision``.
 
-        A doublet may hold again at higher rates: it is the first rung that counts.
+        A doublet may hold again at higher rates: it is the first rung that counts. ``halted()``,
+        looked at before every rate, ends it: Halted.
         """
         used = []
 
         def opens_at(rate: float) -> bool | None:
+            if halted():
+                raise Halted
             found, tolerance = self.answer(rate)
             used.append(tolerance)
             return found

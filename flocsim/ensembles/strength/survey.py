@@ -1,39 +1,45 @@
-"""All bound doublets of a results file, each put into flows of rising rates."""
+"""Strengths as a kind of study: a replicate is a bound doublet of a results file, run in flows."""
 
-import contextlib
 import hashlib
 import json
-import os
-import time
-from collections.abc import Callable, Generator, Iterator
-from functools import partial
+import math
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import attrs
 import numpy as np
 
+from flocsim.ensembles.chunks import Condition, Interval, missing
+from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
+from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
+from flocsim.ensembles.kind import Code, Going, Keep, Kind, OldRows, Place, StudyKind
+from flocsim.ensembles.kinds import KINDS
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
-from flocsim.ensembles.strength.distribution import strengths_of
-from flocsim.ensembles.strength.opening import FLOWS, Doublet, Opening
-from flocsim.ensembles.strength.processes import dealt
-from flocsim.ensembles.studies.opened import StudyResults, open_results
+from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
+from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
 from flocsim.fields import is_number, is_whole
 from flocsim.io.provenance import now, package_version
-from flocsim.io.results.schema import AGGREGATED, OUTCOMES
-from flocsim.io.results.strength_file import STATUS, Strengths
-
-KEEP_SECONDS = 20.0
-"""Seconds after which what has been tested is kept again, as soon as a doublet is done."""
+from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.strength_file import (
+    ROW,
+    STATUS,
+    Strengths,
+    check_opened,
+    read_strengths,
+    write_strengths,
+)
 
 TESTING = ("ensembles/strength/opening.py",)
 """The code by which a doublet is tested; that by which it is run is part of the study's identity,
 without which no replicate is run again."""
 
-
-class OtherSurvey(UsageError):
-    """What is to be gone on with is of another study, flow, precision or flocsim."""
+AGREED = ("flow", "precision", "study", "study_digest", "flocsim_version", "code")
+"""What two surveys have to agree on, so that one can go on with the doublets of the other."""
 
 
 class Bound(NamedTuple):
@@ -55,128 +61,175 @@ def bound_doublets(results: StudyResults) -> Iterator[Bound]:
         yield Bound(first, second, third, replicate, int(bonds[tuple(place)]))
 
 
-def chosen_of(found: list[Bound], count: int | None) -> list[Bound]:
-    """The first ``count`` of every condition; all for None."""
-    taken: dict[tuple[int, ...], int] = {}
-    chosen = []
-    for each in found:
-        taken[each[:3]] = taken.get(each[:3], 0) + 1
-        if count is None or taken[each[:3]] <= count:
-            chosen.append(each)
-    return chosen
+@attrs.frozen(eq=False)
+class Bonds:
+    """What stands in the place of [scene]: the bound doublets of ``results`` in a ``flow``, a key
+    of FLOWS; ``count`` of every condition, all for None; ``precision`` of a rate."""
+
+    results: StudyResults
+    flow: str = "shear"
+    count: int | None = None
+    precision: float = 5e-3
+    kind: ClassVar[str] = "strength"
+    found: list[Bound] = attrs.field(init=False)
+
+    def __attrs_post_init__(self):
+        if self.flow not in FLOWS:
+            raise UsageError(f"flow must be one of {', '.join(FLOWS)}, found {self.flow!r}")
+        if self.count is not None and (not is_whole(self.count) or self.count < 1):
+            raise UsageError(f"count must be a whole number from 1, found {self.count!r}")
+        if not is_number(self.precision) or not 1e-9 <= self.precision <= 1.0:
+            raise UsageError(f"precision must lie between 1e-9 and 1, found {self.precision!r}")
+        found = list(bound_doublets(self.results))
+        if not found:
+            raise UsageError(
+                f"{self.results.path} holds no bound doublet (class {' or '.join(AGGREGATED)}): "
+                "there is no bond to test"
+            )
+        object.__setattr__(self, "found", found)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The collision types."""
+        return tuple(self.results.types)
+
+    @property
+    def delta(self) -> tuple[float, ...]:
+        """The displacements."""
+        return tuple(float(each) for each in self.results.delta)
 
 
-def checked(results: StudyResults, flow: Any, count: Any, precision: Any, jobs: Any) -> list[Bound]:
-    """The bound doublets of a file; UsageError for none, and for what cannot be asked."""
-    if flow not in FLOWS:
-        raise UsageError(f"flow must be one of {', '.join(FLOWS)}, found {flow!r}")
-    if count is not None and (not is_whole(count) or count < 1):
-        raise UsageError(f"count must be a whole number from 1, found {count!r}")
-    if not is_number(precision) or not 1e-9 <= precision <= 1.0:
-        raise UsageError(f"precision must lie between 1e-9 and 1, found {precision!r}")
-    if not is_whole(jobs) or jobs < 1:
-        raise UsageError(f"jobs must be a whole number from 1, found {jobs!r}")
-    found = list(bound_doublets(results))
-    if not found:
-        raise UsageError(
-            f"{results.path} holds no bound doublet (class {' or '.join(AGGREGATED)}): there is no "
-            "bond to test"
-        )
-    return found
+def config_of(scene: Any, output: str = "strength.h5") -> Config:
+    """What the machine runs: the config of the study, with bonds in the place of collisions."""
+    return attrs.evolve(
+        scene.results.config, scene=scene, replicates=scene.results.count, stop=StopConfig(),
+        integrator=IntegratorConfig(), output=OutputConfig(file=output),
+    )  # fmt: skip
 
 
-def survey(
-    results: StudyResults, flow: str = "shear", *, count: int | None = None,
-    precision: float = 5e-3, jobs: int = 1, known: Strengths | None = None,
-    tell: Callable[[str], None] = lambda _: None, keep: Callable[[Strengths], None] | None = None,
-    every: float = KEEP_SECONDS,
-) -> Strengths:  # fmt: skip
-    """The rates at which the bound doublets of a study open in a flow.
+@attrs.define(eq=False)
+class StrengthStudy(StudyKind):
+    """Every bound doublet of a file as a replicate, its number that of the file."""
 
-    ``flow``: a key of FLOWS; ``count`` of every condition, all by default; ``precision`` of a rate;
-    ``jobs``: processes of this machine, on which no number depends; ``known``: what an earlier
-    survey of the same has found, which is not tested again. ``tell`` takes a line about each;
-    ``keep`` what has been tested so far, whenever a doublet is done ``every`` [s] or more after the
-    last time, at the end, and where anything, such as a KeyboardInterrupt, ends it early.
-    UsageError where the file holds no bound doublet, and where its replicates cannot be run again;
-    OtherSurvey where ``known`` is of something else.
-    """
-    found = checked(results, flow, count, precision, jobs)
-    chosen = set(chosen_of(found, count))
-    about = about_of(results, flow, precision)
-    openings = {} if known is None else taken_over(known, about, found)
-    wanted = [each for each in found if each in openings or each in chosen]
-    about |= {"asked": len(wanted), "date": now() if known is None else known.about.get("date")}
+    config: Config
+    flocs: list = attrs.Factory(list)
+    bonds: dict[tuple[int, int], int] = attrs.field(init=False)
+    wanted: dict[int, list[int]] = attrs.field(init=False)
+    rows: dict[Code, dict[str, Any]] = attrs.field(init=False, factory=dict)
+    row: ClassVar[np.dtype] = ROW
+    compared: ClassVar[tuple[str, ...]] = tuple(ROW.fields or ())
+    most_rows: ClassVar[int] = 1
+    noun: ClassVar[str] = "doublets"
 
-    def so_far() -> Strengths:
-        tested = [each for each in found if each in openings]
-        complete = len(tested) == len(wanted)
-        shape = len(results.types), len(results.vertices), len(results.delta)
-        bound = np.zeros(shape, dtype=np.int64)
-        np.add.at(bound, tuple(np.array([each[:3] for each in found]).T), 1)
-        axes = results.types, results.vertices, results.delta
-        rows = [openings[each] for each in tested]
-        return strengths_of(axes, bound, np.array(tested), rows, about | {"complete": complete})
+    def __attrs_post_init__(self):
+        shape = self.shape[:3]
+        self.bonds = {
+            (int(np.ravel_multi_index(each[:3], shape)), each.replicate): each.bond
+            for each in self.scene.found
+        }
+        self.wanted = {place: [] for place in range(math.prod(shape))}
+        for place, replicate in self.bonds:
+            if self.scene.count is None or len(self.wanted[place]) < self.scene.count:
+                self.wanted[place].append(replicate)
 
-    todo = [each for each in wanted if each not in openings]
-    kept_at, unkept = time.monotonic(), 0
-    try:
-        # Closed at once, not when it is collected: its processes are to end before anything else.
-        with contextlib.closing(answers(results, flow, precision, todo, jobs)) as tested:
-            for each, opening in tested:
-                openings[each] = opening
-                unkept += 1
-                name, n, delta = results.types[each.type], *conditions(results, each)
-                tell(f"{len(openings)} of {len(wanted)}: type {name}, N = {n}, delta {delta:g}, "
-                     f"replicate {each.replicate}: {in_words(opening)}")  # fmt: skip
-                if keep is not None and time.monotonic() - kept_at >= every:
-                    keep(so_far())
-                    kept_at, unkept = time.monotonic(), 0
-    except BaseException:
-        if keep is not None and unkept:
-            keep(so_far())
-        raise
-    if keep is not None:
-        keep(so_far())
-    return so_far()
+    @property
+    def scene(self) -> Any:
+        """The Bonds."""
+        return self.config.scene
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.wanted.values()))
+
+    @property
+    def allowed(self) -> float:
+        """The file says which have failed."""
+        return math.inf
+
+    @property
+    def title(self) -> str:
+        """The study in a few words."""
+        return f"{self.size} bound doublets of {self.scene.results.path} in {self.scene.flow}"
+
+    def unneeded(self, place: int) -> list[Interval]:
+        """Replicates that are not bound, or not asked for."""
+        each = [(replicate, replicate + 1) for replicate in self.wanted[place]]
+        return missing(each, 0, self.config.replicates)
+
+    @property
+    def kinds(self) -> list[Code]:
+        """The first doublet stands for all."""
+        place, _ = self.first
+        return [self.places[place][:2]]
+
+    @property
+    def first(self) -> tuple[int, int]:
+        """(place of the condition, replicate) of the first that is wanted."""
+        return next((place, each[0]) for place, each in self.wanted.items() if each)
+
+    def first_of(self, code: Code) -> tuple[Condition, int]:
+        """What stands for a kind of code."""
+        place, replicate = self.first
+        return self.conditions[place], replicate
+
+    def asked(self) -> dict[str, Any]:
+        """What the study consists of, with how many of each condition are bound."""
+        counts = np.zeros(len(self.wanted), int)
+        np.add.at(counts, [place for place, _ in self.bonds], 1)
+        return super().asked() | {
+            "strength": {"bound": counts.tolist(), "wanted": self.size, "about": about_of(self)}
+        }
+
+    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+        """Test the first doublet, once."""
+        place, replicate = self.first
+        for code in kinds:
+            self.rows[code] = self.rows.get(code) or self.tested(self.places[place], replicate)
+        return {code: self.rows[code] for code in kinds}
+
+    def tested(
+        self, place: Place, replicate: int, halted: Callable[[], bool] = lambda: False
+    ) -> dict[str, Any]:
+        """The row of a doublet: it is run again until it is bound, and then in flows."""
+        index = self.places.index(place)
+        if self.rows and (index, replicate) == self.first:
+            return next(iter(self.rows.values()))
+        name, n, delta = self.conditions[index]
+        start = self.scene.results.replicate(replicate, name, n, delta)
+        opening = Doublet(start, self.scene.flow).opening(self.scene.precision, halted)
+        return attrs.asdict(opening) | {"bond": self.bonds[index, replicate]}
+
+    def run_task(
+        self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
+        keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """The row of a doublet; it is told in words."""
+        try:
+            row = self.tested(place, replicate, halted)
+        except Halted:
+            return None, None
+        name, n, delta = self.conditions[self.places.index(place)]
+        words = in_words(Opening(**{each: row[each] for each in row if each != "bond"}))
+        if going is not None:
+            going(f"type {name}, N = {n}, delta {delta:g}, replicate {replicate}: {words}")
+        note = {"type": name, "vertices": n, "delta": delta, "replicate": replicate, "why": words}
+        return row, note if row["status"] == FAILED else None
+
+    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
+        """ValueError for rows that no run can have given."""
+        check_opened(column)
+
+    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Which doublets have a run that failed."""
+        return column("status") == FAILED
 
 
-def answers(
-    results: StudyResults, flow: str, precision: float, todo: list[Bound], jobs: int
-) -> Generator[tuple[Bound, Opening]]:
-    """(doublet, Opening) of each, in whatever order several processes have them."""
-    if jobs == 1 or len(todo) < 2:
-        for each in todo:
-            yield each, opening_of(results, each, flow, precision)
-        return
-    given = results.source, os.fspath(results.folder), flow, precision
-    yield from dealt(tester, given, todo, jobs)
-
-
-def tester(
-    path: os.PathLike, folder: str, flow: str, precision: float
-) -> Callable[[Bound], Opening]:
-    """What a process does: the Opening of each doublet of a file that it is asked for."""
-    return partial(opened_again, open_results(path, folder), flow, precision)
-
-
-def opened_again(results: StudyResults, flow: str, precision: float, each: Bound) -> Opening:
-    """`opening_of` with the doublet last."""
-    return opening_of(results, each, flow, precision)
-
-
-def opening_of(results: StudyResults, each: Bound, flow: str, precision: float) -> Opening:
-    """Run a doublet of a file again until it is bound, and then in flows."""
-    n, delta = conditions(results, each)
-    start = results.replicate(each.replicate, results.types[each.type], n, delta)
-    return Doublet(start, flow).opening(precision)
-
-
-def about_of(results: StudyResults, flow: str, precision: float) -> dict[str, Any]:
-    """What two surveys have to agree on, so that one can go on with the doublets of the other."""
+def about_of(study: StrengthStudy, machine: dict | None = None) -> dict[str, Any]:
+    """What two surveys have to agree on."""
+    scene = study.scene
     return {
-        "flow": flow, "precision": precision, "study": Path(results.path).name,
-        "study_digest": digest_of(results), "flocsim_version": package_version("flocsim"),
+        "flow": scene.flow, "precision": scene.precision, "study": Path(scene.results.path).name,
+        "study_digest": digest_of(scene.results), "flocsim_version": package_version("flocsim"),
         "code": physics_digest(names=TESTING),
     }  # fmt: skip
 
@@ -194,36 +247,46 @@ def digest_of(results: StudyResults) -> str:
     return found.hexdigest()
 
 
-UNLIKE = {
-    "study": "it is of the study {there}, not of {here}",
-    "study_digest": "the study {study} holds other data than the one that it is of",
-    "flow": "its flow is {there}, not {here}",
-    "precision": "its precision is {there}, not {here}",
-    "flocsim_version": "it was made by flocsim {there}, and this is {here}",
-    "code": "flocsim has changed how it tests doublets",
-}
-"""What is to agree → words where it does not."""
+def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+    """The doublets of an earlier survey, in arrays of all replicates."""
+    found = read_strengths(output)
+    axes = [found.conditions.axes[name].values.tolist() for name in AXES]
+    at = tuple(found.column(name) for name in (*AXES, "replicate"))
+    count = int(at[3].max(initial=-1)) + 1
+    if len(set(zip(*at, strict=True))) < len(at[0]) or np.any(at[3] < 0):
+        raise ValueError("it has a doublet twice")
+    columns = {}
+    for name in ROW.fields or ():
+        blank = NOT_APPLICABLE if name == "bond" else 0
+        columns[name] = np.full((*map(len, axes), count), blank, ROW[name])
+        columns[name][at] = found.column(name)
+    places = {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for t, name in enumerate(axes[0])
+        for v, n in enumerate(axes[1])
+        for d, share in enumerate(axes[2])
+    }
+    there: dict[Condition, list[Interval]] = {condition: [] for condition in places}
+    by_place = {place: condition for condition, place in places.items()}
+    for t, v, d, replicate in zip(*(each.tolist() for each in at), strict=True):
+        there[by_place[t, v, d]].append((replicate, replicate + 1))
+    run = {"identity": json.dumps({name: found.about.get(name) for name in AGREED})}
+    run |= {name: str(found.about[name]) for name in ("date", "cpus") if name in found.about}
+    return OldRows(run, columns, places, count, found, there)
 
 
-def taken_over(known: Strengths, about: dict[str, Any], found: list[Bound]) -> dict[Bound, Opening]:
-    """The Openings of an earlier survey; OtherSurvey where it is not of the same."""
-    for name, words in UNLIKE.items():
-        if known.about.get(name) != about[name]:
-            there = known.about.get(name, "unknown")
-            raise OtherSurvey(words.format(there=there, here=about[name], study=about["study"]))
-    columns = [known.column(name).tolist() for name in Bound._fields]
-    places = [Bound(*row) for row in zip(*columns, strict=True)]
-    fields = [each.name for each in attrs.fields(Opening)]
-    rows = zip(*(known.column(name).tolist() for name in fields), strict=True)
-    openings = {each: Opening(*row) for each, row in zip(places, rows, strict=True)}
-    if len(openings) < len(places) or not set(openings) <= set(found):
-        raise OtherSurvey("it has doublets that the study does not have, or one of them twice")
-    return openings
-
-
-def conditions(results: StudyResults, each: Bound) -> tuple[int, float]:
-    """(N, δ) of a doublet."""
-    return int(results.vertices[each.vertices]), float(results.delta[each.delta])
+def results(
+    study: StrengthStudy, start: Beginning, count: int, run: dict, comm: Communicator,
+    output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
+) -> Strengths:  # fmt: skip
+    """The Strengths of all that was tested, in the order of the study."""
+    store, bound = start.store, np.array(study.asked()["strength"]["bound"])
+    about = start.identity | {"complete": True, "cpus": run["cpus"]}
+    about["date"] = store.old.more.about.get("date") if store.old else now()
+    found = strengths_in(store, bound.reshape(study.shape[:3]), about, study.bonds)
+    if output is not None:
+        write_strengths(output, found, start.replacing)
+    return found
 
 
 def in_words(opening: Opening) -> str:
@@ -237,3 +300,14 @@ def in_words(opening: Opening) -> str:
     if word == "holds_at_most_rate":
         return f"holds up to {opening.holds:.4g} 1/s, the highest rate {runs}"
     return f"a run failed behind {opening.holds:.4g} 1/s {runs}"
+
+
+STRENGTHS = Kind(
+    make=lambda config, flocs=None, methods=None: StrengthStudy(config),
+    flocs=lambda config: [], identity=about_of, code=TESTING, check=lambda config: None,
+    prepare=lambda study, comm: None, doubts=lambda study: [], facts=lambda study: {},
+    old_rows=old_rows, results=results, read=read_strengths, table=table_of,
+    total=lambda found: len(found.column("status")), verdict=lambda found: (0, ""),
+    dry_run=lambda config, ranks, pilot: StrengthStudy(config).title,
+)  # fmt: skip
+KINDS[Bonds] = STRENGTHS

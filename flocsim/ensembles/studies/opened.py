@@ -24,16 +24,23 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.files import held
-from flocsim.io.labelled import DataFrame, Dataset, Labelled
+from flocsim.io.labelled import Labelled, Tables
+from flocsim.io.opening import kind_of
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
+from flocsim.io.results import strength_file, swarm_file, sweep_file
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import GROUPS, Results
+from flocsim.io.results.strength_file import Strengths, read_strengths
+from flocsim.io.results.swarm_file import SwarmResults, read_swarm
+from flocsim.io.results.sweep_file import SweepResults, read_sweep
 from flocsim.trajectories.trajectory import Trajectory
 
+INDICES = {name: group.index for name, group in GROUPS.items()}
 
-class StudyResults:
+
+class StudyResults(Tables):
     """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
 
     ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
@@ -41,6 +48,8 @@ class StudyResults:
     same of every single collision, read when asked for; ``kernel`` the rates of a kernel study,
     None in others; ``run`` where it came from.
     """
+
+    indices = INDICES
 
     def __init__(self, results: Results, source: str | os.PathLike, folder: Path) -> None:
         self.results, self.source, self.folder = results, source, folder
@@ -81,29 +90,11 @@ class StudyResults:
 
     def labelled(self, group: str = "probabilities") -> Labelled:
         """The arrays of a group of the file with their axes; UsageError for an unknown one."""
-        if group not in GROUPS:
-            raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
+        group = self.known(group)
         arrays: Mapping[str, np.ndarray] = getattr(self, group)
         if not arrays:
             raise UsageError(f"{self.path} has no group {group}: it was written without")
         return self.results.labelled(group, arrays)
-
-    def to_xarray(self, group: str = "probabilities") -> Dataset:
-        """A group of the file as an xarray Dataset, with units, meanings and flags.
-
-        ``group``: "probabilities", "pooled", "differences" or "replicates". UsageError where
-        xarray is not installed (``pip install 'flocsim[tables]'``).
-        """
-        return self.labelled(group).to_xarray()
-
-    def to_pandas(self, group: str = "probabilities") -> DataFrame:
-        """A group as a pandas DataFrame, a row for each condition (or replicate), codes as words.
-
-        The radii of the types are columns.
-
-        UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
-        """
-        return self.labelled(group).to_pandas(GROUPS[group].index)
 
     def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
         """One of the figures of `flocsim plot`, as a matplotlib Figure.
@@ -170,3 +161,20 @@ def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = Non
     source = held(path)
     found = read_results(source, replicates=False)
     return StudyResults(found, source, Path(path).parent if folder is None else Path(folder))
+
+
+def open_any(
+    path: str | os.PathLike, folder: str | os.PathLike | None = None
+) -> StudyResults | SweepResults | SwarmResults | Strengths:
+    """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked.
+
+    ``folder``: where the config of a study lay, its shape library and its own modules (default:
+    where the results lie). FileError for a file that is absent, damaged, or of another kind.
+    """
+    source = held(path)
+    kind = kind_of(source)
+    if kind == swarm_file.FORMAT:
+        return read_swarm(source)
+    if kind == strength_file.FORMAT:
+        return read_strengths(source)
+    return read_sweep(source) if kind == sweep_file.FORMAT else open_results(source, folder)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.pilot.choice import first_methods
-from flocsim.ensembles.storage.identity import identity_of, machine_facts
+from flocsim.ensembles.storage.identity import machine_facts
 from flocsim.ensembles.storage.plan import (
     AXES,
     NAME,
@@ -32,23 +32,19 @@ from flocsim.ensembles.storage.plan import (
     read_plan,
     write_plan,
 )
-from flocsim.ensembles.storage.resume import asked_of
-from flocsim.ensembles.studies.opened import StudyResults, open_results
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.studies.opened import StudyResults, open_any
 from flocsim.ensembles.studies.study import WAYS, Study
-from flocsim.ensembles.study import flocs_of
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number
-from flocsim.io.files import held
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
-from flocsim.io.opening import kind_of
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
 from flocsim.io.results.schema import GROUPS, RADII
-from flocsim.io.results.swarm_file import FORMAT as SWARM_FORMAT
-from flocsim.io.results.swarm_file import SwarmResults, read_swarm
+from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.results.sweep_file import (
-    FORMAT,
     JOINED,
+    OF_SWARMS,
     SweepResults,
     Swept,
     read_sweep,
@@ -57,6 +53,11 @@ from flocsim.io.results.sweep_file import (
 
 MOST_PARTS = 10_000
 FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
+OF_FORM = ("times", "bounds")
+"""What parts of a sweep of swarms have in common besides."""
+
+Part = StudyResults | SwarmResults
+
 NO_PHYSICS = ("output", "stop")
 """Keys, and tables, that cannot be swept: they are dimensions already, or no physics."""
 
@@ -143,31 +144,38 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
     All of the study's modules and libraries were read once, for all parts (`Study.with_`).
     """
     plan: Plan = {}
-    machine = machine_facts()
+    machine: dict = {}
     drawn: tuple[Any, list] = None, []
     for path, part in parts.items():
         config = part.config
         if drawn[0] != (config.shapes, config.seed):
             drawn = (config.shapes, config.seed), flocs_of(config)
         study = study_of(config, drawn[1], first_methods(config))
-        facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(asked_of(study)))}
+        machine = machine or machine_facts(kind_of(config).code)
+        facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(study.asked()))}
         if config.integrator.is_chosen:  # a pilot has yet to say by what method each type is run
             facts = {k: v for k, v in facts.items() if not k.endswith(".integrator")}
         plan[path.name] = facts
-        first = next(iter(plan.values()))["asked"]
-        for axis in AXES:
-            if facts["asked"][axis] != first[axis]:
+        first, own = next(iter(plan.values()))["asked"], facts["asked"]
+        axes = {axis: (first[axis], own[axis]) for axis in AXES}
+        if config.is_swarm:
+            axes |= {axis: (first["swarm"][axis], own["swarm"][axis]) for axis in OF_FORM}
+            axes["replicates"] = [first["replicates"]], [own["replicates"]]
+        for axis, (there, here) in axes.items():
+            if there != here:
                 raise UsageError(
-                    f"the parts of a sweep cannot be joined: {axis} are {listed(first[axis])} in "
-                    f"the first, {listed(facts['asked'][axis])} in {path}; run them one by one"
+                    f"the parts of a sweep cannot be joined: {axis} are {listed(there)} in the "
+                    f"first, {listed(here)} in {path}; run them one by one"
                 )
     return plan
 
 
-def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> StudyResults:
+def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Part:
     """The results at a part's path; UsageError where they are not what was planned, or cannot
     become so by more rows (``whole``: where they have less)."""
-    found = open_results(path, study.path.parent)
+    found = open_any(path, study.path.parent)
+    if not isinstance(found, Part):
+        raise UsageError(f"{path} is no part of a sweep: name another output")
     if wrong := apart(facts_in(found), planned, whole):
         raise UsageError(
             f"{path} is no part of this sweep: {wrong}; ask for what it holds, or name another "
@@ -176,8 +184,12 @@ def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> St
     return found
 
 
-def facts_in(results: StudyResults) -> Facts:
+def facts_in(results: Part) -> Facts:
     """What a results file says that it is."""
+    if isinstance(results, SwarmResults):
+        asked = {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))],
+                 "delta": [0.0], "replicates": len(results.scales["replicate"])}  # fmt: skip
+        return stored(results.run, "identity") | {"asked": asked}
     axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
     return results.stored("identity") | {"asked": axes | {"replicates": results.count}}
 
@@ -191,7 +203,8 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     lengths = [len(values) for values in over.values()]
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        clash = lasts.count(last) > 1 or any(last in group.index for group in GROUPS.values())
+        taken = [*GROUPS.values(), *OF_SWARMS.values()]
+        clash = lasts.count(last) > 1 or any(last in group.index for group in taken)
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))
         found = [value_of(configs[stride * place], key) for place in range(lengths[axis])]
@@ -221,12 +234,13 @@ def value_of(config: Config, key: str) -> tuple[Any, str]:
     return getattr(owner, field.name, None), field.metadata.get("unit") or "1"
 
 
-def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, Labelled]:
+def joined(swept: dict[str, Swept], parts: Sequence[Part]) -> dict[str, Labelled]:
     """The groups of all parts with the swept keys as first axes."""
+    of_swarms = isinstance(parts[0], SwarmResults)
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in JOINED:
+    for group in OF_SWARMS if of_swarms else JOINED:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):
@@ -237,21 +251,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[StudyResults]) -> dict[str, 
 
         columns = {name: stacked("columns", name) for name in labelled[0].columns}
         # Sizes may follow from what is swept, as from the limits of measured flocs.
-        axes = labelled[0].axes | {name: stacked("axes", name) for name in RADII}
+        sizes = () if of_swarms else RADII
+        axes = labelled[0].axes | {name: stacked("axes", name) for name in sizes}
         found[group] = Labelled(coordinates | axes, columns)
     return found
-
-
-def open_any(
-    path: str | os.PathLike, folder: str | os.PathLike | None = None
-) -> StudyResults | SweepResults | SwarmResults:
-    """What a file of `flocsim ensemble`, `flocsim swarm` or `flocsim sweep` holds, checked.
-
-    ``folder``: where the config of a study lay, its shape library and its own modules (default:
-    where the results lie). FileError for a file that is absent, damaged, or of another kind.
-    """
-    source = held(path)
-    kind = kind_of(source)
-    if kind == SWARM_FORMAT:
-        return read_swarm(source)
-    return read_sweep(source) if kind == FORMAT else open_results(source, folder)

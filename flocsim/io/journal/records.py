@@ -31,7 +31,7 @@ MOST_WASTE = 2**28
 """Bytes that are read behind marks that turn out to be none, beside twice the file's own."""
 
 SESSION, CHUNK, SNAPSHOT = 1, 2, 3
-"""Kinds: what a run was started with; rows of finished replicates; a swarm at a moment."""
+"""Kinds: what a run was started with; rows of finished replicates; what is kept of others."""
 
 
 @attrs.frozen
@@ -67,6 +67,13 @@ def encode(kind: int, description: dict[str, Any], data: bytes = b"") -> bytes:
 def data_digest(record: bytes) -> bytes:
     """The checksum of the data of an encoded record, as its head says it."""
     return HEAD.unpack_from(record)[4]
+
+
+def record_at(record: bytes, offset: int) -> Record:
+    """The Record of an encoded one that begins at ``offset`` of a file."""
+    _, kind, words, length, expected, _ = HEAD.unpack_from(record)
+    start = HEAD.size + words
+    return Record(kind, json.loads(record[HEAD.size : start]), offset + start, length, expected)
 
 
 def kind_of(record: bytes) -> int:

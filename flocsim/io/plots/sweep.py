@@ -18,10 +18,12 @@ from flocsim.io.plots.style import (
     dodge,
     graded_colours,
     house_style,
+    new_figure,
     plain,
     set_probability_axis,
     type_titles,
 )
+from flocsim.io.results.swarm_file import mean
 from flocsim.io.results.sweep_file import SweepResults
 
 PREFIXED = ("m", "s", "J", "N", "V")
@@ -94,4 +96,32 @@ def line_words(axes):
     return found
 
 
+def over_time(results: SweepResults) -> Figure:
+    """Of swarms: mean size, number, settling of clusters over time, a line for each value."""
+    table, names = results.labelled("counts"), list(results.swept)
+    times = table.axes["time"].values
+    words = line_words([(name, table.axes[name].values.tolist()) for name in names])
+    colours = graded_colours(len(words))
+    with house_style():
+        figure = new_figure(9.2, 2.6)
+        panels = figure.subplots(1, len(SHOWN))
+        for axes, (name, factor, label) in zip(panels, SHOWN, strict=True):
+            values = table.columns[name].values
+            lines = mean(np.moveaxis(values, -2, 0)).reshape(-1, len(times))
+            for line, word, colour in zip(lines, words, colours, strict=True):
+                axes.plot(times, factor * line, color=colour, label=word)
+            axes.set_xlabel("time [s]")
+            axes.set_title(label, fontsize=8.0)
+        panels[-1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0),
+                          title=", ".join(plain(name) for name in names))  # fmt: skip
+        return figure
+
+
+SHOWN = (
+    ("mean_size", 1.0, "bodies of a body's cluster"), ("clusters", 1.0, "clusters"),
+    ("settling", 1e3, "settling [mm/s]"),
+)  # fmt: skip
+"""Columns of the counts, factors to the units of their labels."""
+
 SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": against_key}
+SWARM_SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": over_time}

@@ -12,6 +12,7 @@ there is so far.
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from flocsim.io.files import Rule, keep
 from flocsim.io.groups import Group, check_format, declared, write_groups
 from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.json_text import read_json
-from flocsim.io.labelled import Labelled
+from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.opening import opened_file
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
@@ -46,6 +47,10 @@ DOUBLETS = {
     "tolerance": ("f8", "m", "largest tolerance that one of its runs needed; NaN: unknown"),
 }
 """Columns (doublet,): {name: (type, units, long name)}."""
+
+ROW = np.dtype([(name, kind if kind == "u1" else f"<{kind}")
+                for name, (kind, _, _) in list(DOUBLETS.items())[4:]])  # fmt: skip
+"""What a tested doublet comes to: the columns but for where it stands."""
 
 COUNTS = {
     "n_bound": ("i8", "1", "doublets found bound"),
@@ -73,13 +78,17 @@ GROUPS = {
 }
 
 
+INDICES = {name: group.index for name, group in GROUPS.items()}
+
+
 @attrs.frozen(eq=False)
-class Strengths:
+class Strengths(Tables):
     """What `flocsim strength` has found: ``about``, how; the two groups of its file as Labelled."""
 
     about: dict[str, Any]
     doublets: Labelled
     conditions: Labelled
+    indices = INDICES
 
     @property
     def complete(self) -> bool:
@@ -92,6 +101,11 @@ class Strengths:
         asked = self.about.get("asked")
         of = f" of {asked}" if isinstance(asked, int) else ""
         return f"{len(self.column('status'))}{of} doublets"
+
+    def labelled(self, group: str = "doublets") -> Labelled:
+        """The arrays of "doublets" or "conditions"; UsageError for another group."""
+        found: Labelled = getattr(self, self.known(group))
+        return found
 
     def column(self, name: str) -> np.ndarray:
         """A column of the doublets (k,)."""
@@ -146,5 +160,12 @@ def check_places(columns, shape):
     for name, length in zip(AXES, shape, strict=True):
         if np.any((columns[name] < 0) | (columns[name] >= length)):
             raise ValueError(f"a doublet is of no {name} of the file")
-    if np.any(columns["status"] >= len(STATUS)):
+    check_opened(columns.__getitem__)
+
+
+def check_opened(column: Callable[[str], np.ndarray]) -> None:
+    """ValueError for doublets that no run can have come to; ``column(name)`` of ROW."""
+    if np.any(column("status") >= len(STATUS)):
         raise ValueError("a doublet has an unknown status")
+    if not np.isin(column("bond"), FLAGS["bond"][0]).all() or np.any(column("runs") < 0):
+        raise ValueError("a doublet has an unknown bond")

@@ -16,12 +16,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
 from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
 from flocsim.io.hdf5.expected import hold_against
-from flocsim.io.labelled import Labelled
+from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.opening import opened_file
 
 FORMAT = "flocsim swarm"
@@ -136,14 +135,18 @@ GROUPS = {
 }  # fmt: skip
 
 
+INDICES = {name: group.index for name, group in GROUPS.items()}
+
+
 @attrs.frozen(eq=False)
-class SwarmResults:
+class SwarmResults(Tables):
     """What a swarm study has found: ``scales`` {axis: values}, ``groups`` {group: {column: array}}
     as in GROUPS, ``run`` scalars."""
 
     scales: dict[str, np.ndarray]
     groups: dict[str, dict[str, np.ndarray]]
     run: dict[str, Any]
+    indices = INDICES
 
     def __repr__(self) -> str:
         shape = self.groups["snapshots"]["cluster"].shape
@@ -151,17 +154,8 @@ class SwarmResults:
 
     def labelled(self, group: str = "counts") -> Labelled:
         """A group's arrays with their axes; UsageError for an unknown one."""
-        if group not in GROUPS:
-            raise UsageError(f"group must be one of {', '.join(GROUPS)}, found {group!r}")
-        return GROUPS[group].labelled({**self.scales, **self.groups[group]})
-
-    def to_xarray(self, group: str = "counts") -> Any:
-        """A group as an xarray Dataset."""
-        return self.labelled(group).to_xarray()
-
-    def to_pandas(self) -> Any:
-        """The counts as a pandas DataFrame, a row for every replicate and time."""
-        return self.labelled().to_pandas(MOMENTS)
+        name = self.known(group)
+        return GROUPS[name].labelled({**self.scales, **self.groups[name]})
 
 
 def mean(values: np.ndarray) -> np.ndarray:

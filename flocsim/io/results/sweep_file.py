@@ -13,19 +13,20 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import Group, check_format, scalar_of, write_groups
 from flocsim.io.hdf5.expected import Declared, hold_against
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.json_text import matches, read_json
-from flocsim.io.labelled import Column, DataFrame, Dataset, Labelled
+from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.opening import opened_file
+from flocsim.io.results import swarm_file
 from flocsim.io.results.schema import GROUPS, LAST_AXES
 
 FORMAT = "flocsim sweep"
 SCHEMA_VERSION = 1
-JOINED = ("probabilities", "pooled")
+JOINED = {name: GROUPS[name] for name in ("probabilities", "pooled")}
+OF_SWARMS = {"counts": swarm_file.GROUPS["counts"]}
 """Groups of results that are joined."""
 
 
@@ -49,7 +50,7 @@ class Swept:
 
 
 @attrs.frozen(eq=False)
-class SweepResults:
+class SweepResults(Tables):
     """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
     ``plan`` (JSON) says what each of its parts is."""
 
@@ -58,19 +59,15 @@ class SweepResults:
     groups: dict[str, Labelled]
     plan: str = ""
 
+    @property
+    def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
+        """{group: axes of its rows}, the swept keys first."""
+        known = JOINED | OF_SWARMS
+        return {name: [*self.swept, *known[name].index] for name in self.groups}
+
     def labelled(self, group: str) -> Labelled:
-        """The arrays of a group; UsageError for an unknown one."""
-        if group not in self.groups:
-            raise UsageError(f"group must be one of {', '.join(self.groups)}, found {group!r}")
-        return self.groups[group]
-
-    def to_xarray(self, group: str = "probabilities") -> Dataset:
-        """A group, "probabilities" or "pooled", with the swept keys as its first dimensions."""
-        return self.labelled(group).to_xarray()
-
-    def to_pandas(self, group: str = "probabilities") -> DataFrame:
-        """The same as a DataFrame, a row for each value and condition."""
-        return self.labelled(group).to_pandas((*self.swept, *GROUPS[group].index))
+        """The arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
+        return self.groups[self.known(group)]
 
     def __repr__(self) -> str:
         over = ", ".join(f"{each.key}: {len(each.values)} values" for each in self.swept.values())
@@ -95,12 +92,14 @@ def read_sweep(path: str | os.PathLike) -> SweepResults:
         about = read_json(str(file.attrs["swept"]), {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept names no keys")
-        declared = {name: joined_group(name, about, nodes) for name in JOINED}
+        joined = OF_SWARMS if "counts" in nodes else JOINED
+        declared = {name: joined_group(name, about, nodes) for name in joined}
         wanted = {name: group.arrays for name, group in declared.items()}
-        lengths = {axis: len(words) for axis, words in LAST_AXES.items()}
-        hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, JOINED, lengths)
+        known = {} if joined is OF_SWARMS else LAST_AXES  # both have classes
+        lengths = {axis: len(words) for axis, words in known.items()}
+        hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, list(joined), lengths)
         groups = {name: group.labelled(group.read(file[name])) for name, group in declared.items()}
-        first = groups["probabilities"].axes
+        first = next(iter(groups.values())).axes
         swept = {
             name: Swept(each["key"], first[name].values.tolist(), each["unit"])
             for name, each in about.items()
@@ -111,7 +110,7 @@ def read_sweep(path: str | os.PathLike) -> SweepResults:
 
 def joined_group(name: str, about: Mapping[str, dict], nodes: Mapping[str, Node]) -> Group:
     """A group of results along the swept keys, {dimension: {key, unit}}, as well."""
-    one = GROUPS[name]
+    one = (JOINED | OF_SWARMS)[name]
 
     def along(declared):
         return {

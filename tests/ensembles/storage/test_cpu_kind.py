@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from flocsim.compiler.processor import cpu_kind
-from flocsim.ensembles import runner
+from flocsim.ensembles import pairs, runner
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.cpu_kind import (
@@ -121,7 +121,7 @@ def test_a_journal_resumed_on_another_kind_says_so_and_records_both(tmp_path, mo
     (tmp_path / "r.h5").unlink()
     with monkeypatch.context() as patch:
         # All is in the journal, and the results file cannot be written.
-        patch.setattr(runner, "new_row_file", lambda *words: 1 / 0)
+        patch.setattr(pairs, "new_row_file", lambda *words: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run_on(tmp_path, patch, HERE, NEW)
     with open(journal_path(tmp_path / "r.h5"), "rb") as file:

@@ -60,8 +60,8 @@ def changed(row):
 def test_a_rank_whose_first_row_differs_is_named(tmp_path):
     study = small_study(tmp_path, SPHERES)
     rows = study.compile(study.kinds)
-    other = packed({(0, 1): changed(rows[0, 1])})
-    rows = packed(rows)
+    other = packed(study, {(0, 1): changed(rows[0, 1])})
+    rows = packed(study, rows)
     assert len(rows[0, 1]) == ROW.itemsize
     assert difference(study, [rows, rows], "aa", {}) == difference(study, [rows], "a", rows) == ""
     line = difference(study, [rows, rows, other], "aaa", {})
@@ -104,4 +104,4 @@ def test_stored_rows_are_those_of_the_file(tmp_path):
         run_to_file(more, SerialCommunicator(), output, RESUME)
     table = read_results(output).replicates
     row = np.array(tuple(table[name][0, 0, 0, 0] for name in COLUMNS), ROW)
-    assert seen == [{(0, 1): row.tobytes()}] == [packed(study.compile([(0, 1)]))]
+    assert seen == [{(0, 1): row.tobytes()}] == [packed(study, study.compile([(0, 1)]))]

@@ -41,7 +41,7 @@ def taken(reader, folder, records):
     journal = Journal(path)
     try:
         start = Beginning(RowStore(journal, reader.study.conditions), reader.identity)
-        take_journal(start)
+        take_journal(start, reader.study)
         return start, sum(stop - first for each in start.found(2**50) for first, stop in each)
     finally:
         journal.release()

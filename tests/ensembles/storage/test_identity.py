@@ -23,6 +23,8 @@ NOT_PHYSICS = {
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/hdf5/": "reads flocs, and these are compared themselves",
+    "ensembles/kind.py": "what the machine asks of studies",
+    "io/results/checks.py": "what is believed of files",
     "io/json_text.py": "reads flocs, and these are compared themselves",
     "io/opening.py": "reads flocs, and these are compared themselves",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from flocsim.ensembles import cli, runner
+from flocsim.ensembles import cli, pairs
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
@@ -94,7 +94,7 @@ def stop_at_the_end(monkeypatch, folder):
         raise FileError("no space left")
 
     with monkeypatch.context() as patch:
-        patch.setattr(runner, "new_row_file", fail)
+        patch.setattr(pairs, "new_row_file", fail)
         with pytest.raises(SharedError):
             go(folder)
 
@@ -105,14 +105,14 @@ def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
 ):
     if mode == RESUME:
         go(tmp_path)
-    original = runner.new_row_file
+    original = pairs.new_row_file
 
     def appear(path, *more):
         (tmp_path / "moving").write_bytes(b"of another program")
         (tmp_path / "moving").replace(path)
         return original(path, *more)
 
-    monkeypatch.setattr(runner, "new_row_file", appear)
+    monkeypatch.setattr(pairs, "new_row_file", appear)
     with pytest.raises(SharedError, match=r"r\.h5 .*(exists already|is there by now)"):
         go(tmp_path, mode, replicates=5)
     assert (tmp_path / "r.h5").read_bytes() == b"of another program"

@@ -13,6 +13,7 @@ from flocsim.ensembles.parallel.study_state import StudyState, TooManyFailures
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
+from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.interruption import STOPPED
 from flocsim.io.journal.records import encode
@@ -124,7 +125,7 @@ def test_another_study_is_refused(request, tmp_path, whole, change, said, finish
 
 
 def test_other_physics_are_refused(stopped, monkeypatch):
-    monkeypatch.setattr(identity, "physics_digest", lambda: "edited")
+    monkeypatch.setattr(identity, "physics_digest", lambda **names: "edited")
     with pytest.raises(SharedError, match="flocsim's own code has changed"):
         go_on(stopped)
 
@@ -262,14 +263,14 @@ def test_a_results_file_tells_of_all_runs_that_it_took(tmp_path, whole):
 
 def failing(monkeypatch, *replicates):
     """Let these replicates raise."""
-    original = runner.Study.run
+    original = Study.run
 
     def run(study, condition, vertices, share, replicate, **more):
         if replicate in replicates:
             raise ZeroDivisionError("in a force of one's own")
         return original(study, condition, vertices, share, replicate, **more)
 
-    monkeypatch.setattr(runner.Study, "run", run)
+    monkeypatch.setattr(Study, "run", run)
 
 
 def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(
@@ -301,13 +302,13 @@ def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path,
 
 
 def test_a_number_that_is_none_counts_as_a_failure(tmp_path, monkeypatch):
-    original = runner.Study.run
+    original = Study.run
 
     def run(study, condition, vertices, share, replicate, **more):
         row = original(study, condition, vertices, share, replicate, **more)
         return row | {"t_end": float("nan")} if replicate == 2 else row
 
-    monkeypatch.setattr(runner.Study, "run", run)
+    monkeypatch.setattr(Study, "run", run)
     go_on(tmp_path, NEW)
     results = read_results(tmp_path / "r.h5")
     assert results.probabilities["n_failed"].sum() == 4

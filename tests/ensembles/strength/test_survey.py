@@ -1,5 +1,6 @@
-"""All bound doublets of a file: which are tested, their distribution, the file, and the command."""
+"""Strengths as a kind of study: which doublets are tested, their distribution, file and command."""
 
+import json
 import math
 import signal
 from pathlib import Path
@@ -10,25 +11,36 @@ import pytest
 
 from flocsim import __main__ as program
 from flocsim.commands import plot
-from flocsim.commands.strength import Stop
+from flocsim.commands.strength import places
+from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, table_of
+from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.runner import SharedError, run, run_to_file
 from flocsim.ensembles.strength import survey as module
-from flocsim.ensembles.strength.distribution import quantiles_of, table_of
-from flocsim.ensembles.strength.opening import OPENED, Opening
-from flocsim.ensembles.strength.survey import Bound, bound_doublets, survey
+from flocsim.ensembles.strength.opening import Opening
+from flocsim.ensembles.strength.survey import (
+    Bonds,
+    Bound,
+    StrengthStudy,
+    bound_doublets,
+    config_of,
+    in_words,
+)
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.strength import over_rate
 from flocsim.io.results.strength_file import QUANTILES, read_strengths, write_strengths
 from tests.helpers.small_rates import AXES, mixed
+from tests.helpers.small_study import small_config
 
 
 class FakeResults:
     """A results file of 2 × 2 × 2 conditions of three replicates, run again by nobody."""
 
     types, vertices, delta = AXES
-    path, source, folder = "study.h5", "study.h5", "."
+    path, source, folder, count = "study.h5", "study.h5", ".", 3
 
-    def __init__(self, seed=1):
-        self.seed = seed
+    def __init__(self, folder, seed=1):
+        over = {"shapes": {"vertices": [1, 16]}}
+        self.seed, self.config = seed, small_config(folder, over)
         outcome = np.full((2, 2, 2, 3), 4)
         outcome[0, 0, 0] = (0, 1, 2)
         outcome[1, 1, 1] = (0, 0, 0)
@@ -43,24 +55,33 @@ class FakeResults:
         return {"seed": self.seed}
 
 
+def opening_of(start):
+    """What is found of a doublet: it opens at 100/s times one more than its replicate."""
+    rate = 100.0 * (1 + start[0])
+    return Opening(0.99 * rate, rate, OPENED, 20, 1e-11)
+
+
 @pytest.fixture
-def fake(monkeypatch):
-    """Doublets that open at 100/s times one more than their replicate."""
+def fake(monkeypatch, tmp_path):
+    """The results, and doublets that nobody runs."""
 
     def doublet(start, flow):
-        rate = 100.0 * (1 + start[0])
-        return SimpleNamespace(
-            opening=lambda precision: Opening(0.99 * rate, rate, OPENED, 20, 1e-11)
-        )
+        return SimpleNamespace(opening=lambda precision, halted: opening_of(start))
 
     monkeypatch.setattr(module, "Doublet", doublet)
-    results = FakeResults()
-    monkeypatch.setattr("flocsim.ensembles.studies.opened.open_results", lambda _: results)
-    return results
+    return FakeResults(tmp_path)
 
 
-def test_the_bound_ones_are_those_of_classes_a_and_c():
-    found = list(bound_doublets(FakeResults()))
+def survey(results, output="", mode="new", overwrite=False, **given):
+    """The Strengths that a survey finds, in memory or in a file."""
+    config = config_of(Bonds(results, **given), str(output or "s.h5"))
+    if not output:
+        return run(config)
+    return run_to_file(config, SerialCommunicator(), output, mode, overwrite=overwrite).results
+
+
+def test_the_bound_ones_are_those_of_classes_a_and_c(fake):
+    found = list(bound_doublets(fake))
     assert found == [
         Bound(0, 0, 0, 0, 1),
         Bound(0, 0, 0, 2, 3),
@@ -68,19 +89,33 @@ def test_the_bound_ones_are_those_of_classes_a_and_c():
     ]
 
 
-def test_every_one_is_run_again_and_told(fake):
-    said = []
-    found = survey(fake, tell=said.append)
+def test_every_one_is_run_again(fake):
+    found = survey(fake)
     assert fake.asked == [
         (0, "I", 1, 0.0),
         (2, "I", 1, 0.0),
         *((k, "III", 16, 0.5) for k in range(3)),
     ]
     assert found.column("opens").tolist() == [100.0, 300.0, 100.0, 200.0, 300.0]
+    assert found.column("bond").tolist() == [1, 3, 1, 1, 1]
     assert found.table("n_bound")[0, 0, 0] == found.table("n_tested")[0, 0, 0] == 2
     assert found.table("rate")[1, 1, 1, 2] == 200.0
     assert np.isnan(found.table("rate")[0, 1]).all()
-    assert said[1] == "2 of 5: type I, N = 1, delta 0, replicate 2: opens at 300 1/s (20 runs)"
+    assert found.complete and found.progress == "5 of 5 doublets"
+
+
+def test_what_is_found_is_told_and_failures_are_noted(fake, monkeypatch):
+    study, said = StrengthStudy(config_of(Bonds(fake))), []
+    row, note = study.run_task((0, 1, 0.0), 2, lambda: False, going=said.append)
+    assert row["opens"] == 300.0 and note is None
+    assert said == ["type I, N = 1, delta 0, replicate 2: opens at 300 1/s (20 runs)"]
+    failed = Opening(4.0, math.nan, FAILED, 3, 1e-9)
+    monkeypatch.setattr(
+        module, "Doublet", lambda *words: SimpleNamespace(opening=lambda *_: failed)
+    )
+    row, note = study.run_task((0, 1, 0.0), 0, lambda: False)
+    assert note["why"] == in_words(failed) == "a run failed behind 4 1/s (3 runs)"
+    assert note["replicate"] == 0
 
 
 def test_a_count_takes_the_first_of_every_condition(fake):
@@ -92,7 +127,7 @@ def test_a_count_takes_the_first_of_every_condition(fake):
 @pytest.mark.parametrize(
     ("given", "words"),
     [({"flow": "rain"}, "flow must be one of shear, extension"), ({"count": 0}, "count must be"),
-     ({"precision": 0.0}, "precision must lie between"), ({"jobs": 0}, "jobs must be")],
+     ({"precision": 0.0}, "precision must lie between")],
 )  # fmt: skip
 def test_bad_input_is_refused(fake, given, words):
     with pytest.raises(UsageError, match=words):
@@ -104,7 +139,7 @@ def test_bad_input_is_refused(fake, given, words):
 
 def same(one, other):
     """Whether two surveys have found the same of the same."""
-    left_out = {"date"}
+    left_out = {"date", "cpus"}
     for group in ("doublets", "conditions"):
         for name, column in getattr(one, group).columns.items():
             np.testing.assert_array_equal(column.values, getattr(other, group).columns[name].values)
@@ -113,97 +148,55 @@ def same(one, other):
     return True
 
 
-def stopped(results, after, **given):
-    """What has been kept of a survey that Ctrl-C has stopped after so many doublets."""
-    kept, run_again = [], results.replicate
-
-    def replicate(*place):
-        if len(results.asked) == after:
-            raise KeyboardInterrupt
-        return run_again(*place)
-
-    results.replicate = replicate
-    with pytest.raises(KeyboardInterrupt):
-        survey(results, keep=kept.append, **given)
-    results.replicate = run_again
-    results.asked.clear()
-    return kept
-
-
-def test_what_is_tested_is_kept_as_it_goes(fake):
-    kept = []
-    found = survey(fake, keep=kept.append, every=0.0)
-    assert [int(each.table("n_tested").sum()) for each in kept] == [1, 2, 3, 4, 5, 5]
-    assert [each.complete for each in kept] == [False] * 4 + [True] * 2
-    assert kept[1].progress == "2 of 5 doublets" and kept[1].table("n_bound").sum() == 5
-    assert same(kept[-1], found)
-    few = []
-    survey(fake, keep=few.append)
-    assert len(few) == 1  # at the end: that took no 20 s
-
-
-@pytest.mark.parametrize("after", [1, 2, 4])
-def test_a_survey_that_was_stopped_goes_on_to_the_same(fake, after):
-    whole = survey(FakeResults())
-    [kept] = stopped(fake, after)
-    assert len(kept.column("status")) == after and not kept.complete
-    said = []
-    assert same(survey(fake, known=kept, tell=said.append), whole)
-    assert len(fake.asked) == 5 - after and said[0].startswith(f"{after + 1} of 5: ")
-
-
-def test_what_is_there_stays_and_more_is_tested(fake):
-    few = survey(fake, count=1)
+def test_what_is_there_stays_and_more_is_tested(fake, tmp_path):
+    output = tmp_path / "s.h5"
+    few = survey(fake, output, count=1)
     assert few.complete and few.progress == "2 of 2 doublets"
-    more = survey(fake, known=few)
-    assert same(more, survey(FakeResults())) and more.about["date"] == few.about["date"]
+    fake.asked.clear()
+    more = survey(fake, output, "resume")
+    assert len(fake.asked) == 4  # with the first, which has to come out as before
+    assert same(more, survey(fake)) and more.about["date"] == few.about["date"]
+    assert same(read_strengths(output), more)
     # Less is not asked for by a smaller count.
     fake.asked.clear()
-    assert same(survey(fake, known=more, count=1), more) and not fake.asked
+    assert same(survey(fake, output, "resume", count=1), more) and not fake.asked
+
+
+def test_a_file_that_was_written_unfinished_is_gone_on_with(fake, tmp_path):
+    """As earlier versions did every 20 s."""
+    output = tmp_path / "s.h5"
+    few = survey(fake, output, count=1)
+    few.about.update(complete=False, asked=5)
+    write_strengths(tmp_path / "t.h5", few)
+    assert same(survey(fake, tmp_path / "t.h5", "resume"), survey(fake))
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"flow": "extension"}, "its flow is extension, not shear"),
-     ({"precision": 0.1}, "its precision is 0.1, not 0.005"),
-     ({"study": "other.h5"}, "it is of the study other.h5, not of study.h5"),
-     ({"study_digest": "0"}, "the study study.h5 holds other data"),
-     ({"flocsim_version": "0.0"}, "it was made by flocsim 0.0, and this is"),
-     ({"code": None}, "flocsim has changed how it tests doublets")],
+    [({"flow": "extension"}, 'flow is "extension" in the file, "shear" now'),
+     ({"precision": 0.1}, "precision is 0.1 in the file, 0.005 now"),
+     ({"study": "other.h5"}, 'study is "other.h5" in the file, "study.h5" now'),
+     ({"study_digest": "0"}, 'study_digest is "0" in the file'),
+     ({"flocsim_version": "0.0"}, 'flocsim_version is "0.0" in the file'),
+     ({"code": None}, "flocsim's own code has changed")],
 )  # fmt: skip
-def test_no_survey_goes_on_with_another_one(fake, change, words):
+def test_no_survey_goes_on_with_another_one(fake, tmp_path, change, words):
     known = survey(fake, count=1)
     known.about.update(change)
-    with pytest.raises(UsageError, match=words):
-        survey(fake, known=known)
+    write_strengths(tmp_path / "s.h5", known)
+    before = (tmp_path / "s.h5").read_bytes()
+    with pytest.raises(SharedError, match=words):
+        survey(fake, tmp_path / "s.h5", "resume")
+    assert (tmp_path / "s.h5").read_bytes() == before
 
 
-def test_data_of_another_study_are_seen(fake):
-    known = survey(fake, count=1)
-    for other in (FakeResults(seed=2), FakeResults(), FakeResults()):
-        if other.seed == 1:
-            other.replicates["outcome"][0, 1, 1, 2] = 2
-        with pytest.raises(UsageError, match="holds other data"):
-            survey(other, known=known)
-    known.doublets.columns["replicate"].values[0] = 1
-    with pytest.raises(UsageError, match="doublets that the study does not have"):
-        survey(FakeResults(), known=known)
-
-
-def test_rows_are_in_the_order_of_the_study_whoever_is_done_first(fake, monkeypatch):
-    asked = []
-
-    def backwards(begin, given, tasks, jobs):
-        asked.append((given, jobs))
-        for each in reversed(tasks):
-            yield each, module.opening_of(fake, each, *given[2:])
-
-    monkeypatch.setattr(module, "dealt", backwards)
-    kept = []
-    found = survey(fake, jobs=3, keep=kept.append, every=0.0)
-    assert asked == [(("study.h5", ".", "shear", 0.005), 3)]
-    assert kept[1].column("replicate").tolist() == [1, 2]
-    assert same(found, survey(FakeResults()))
+def test_data_of_another_study_are_seen(fake, tmp_path):
+    survey(fake, tmp_path / "s.h5", count=1)
+    other = FakeResults(tmp_path)
+    other.replicates["outcome"][0, 1, 1, 2] = 2
+    for found in (FakeResults(tmp_path, seed=2), other):
+        with pytest.raises(SharedError, match="study_digest is"):
+            survey(found, tmp_path / "s.h5", "resume")
 
 
 def test_quantiles_count_what_holds_as_never():
@@ -266,107 +259,88 @@ def test_the_figure_shows_the_share_that_has_opened():
     assert any(np.allclose(line.get_ydata(), [1 / 3, 2 / 3]) for line in lines)
 
 
-def run(folder, *words):
-    return program.main(["strength", str(folder / "study.h5"), *map(str, words)])
+@pytest.fixture
+def command(fake, tmp_path, monkeypatch):
+    """Runs the command in a folder where study.h5 is the fake one."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.h5").write_bytes(b"never read here")
+    monkeypatch.setattr("flocsim.ensembles.studies.opened.open_results", lambda _: fake)
+    return lambda *words: program.main(["strength", "study.h5", *map(str, words)])
 
 
 def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
-    fake, tmp_path, monkeypatch, capsys
+    fake, command, tmp_path, capsys
 ):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.h5").write_bytes(b"never read here")
-    assert run(tmp_path, "--quiet") == 0
+    assert command() == 0
     assert "III" in capsys.readouterr().out
-    assert read_strengths("study-strength.h5").about["flow"] == "shear"
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names >= {"study-strength.h5", "study-strength.png"} and len(names) == 4
+    found = read_strengths("study-strength.h5")
+    assert found.about["flow"] == "shear" and "features" in json.loads(found.about["cpus"])[0]
     assert plot.read_content("study-strength.h5")[1].keys() == {"strength"}
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()
-    assert run(tmp_path, "--flow", "extension") == 2
+    assert command("--flow", "extension") == 2
     assert not fake.asked and "exists already" in capsys.readouterr().err
     assert (tmp_path / "study-strength.h5").read_bytes() == before
-    assert run(tmp_path, "--flow", "extension", "--overwrite", "--quiet") == 0
+    assert command("--flow", "extension", "--overwrite", "--quiet") == 0
     assert (tmp_path / "study-strength.1.h5").read_bytes() == before
     assert read_strengths("study-strength.h5").about["flow"] == "extension"
-    assert run(tmp_path, "-o", "study.h5", "--overwrite") == 2
+    assert command("-o", "study.h5", "--overwrite") == 2
     assert "which is read" in capsys.readouterr().err
+    assert command("--jobs", "0") == 2
 
 
-def test_a_command_that_is_stopped_before_any_is_tested_writes_nothing(
-    fake, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.h5").write_bytes(b"never read here")
-
-    def interrupted(*place):
-        raise KeyboardInterrupt
-
-    fake.replicate = interrupted
-    assert run(tmp_path) == 130
-    assert "nothing has been written" in "".join(capsys.readouterr())
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["study.h5"]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
-    fake, tmp_path, monkeypatch, capsys, number
+    fake, command, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.h5").write_bytes(b"never read here")
+    from flocsim.ensembles.parallel import coordinator
+    from flocsim.interruption import Interruption
+
+    stop = Interruption()
+    for name in ("flocsim.ensembles.runner", "flocsim.ensembles.cli"):
+        monkeypatch.setattr(f"{name}.INTERRUPTION", stop)
+    monkeypatch.setattr(coordinator, "stop_requested", lambda: stop.requested)
     run_again = fake.replicate
 
     def third_stopped(*place):
         if len(fake.asked) == 2:
-            signal.raise_signal(number)
+            stop.note(signal.SIGTERM)
         return run_again(*place)
 
     fake.replicate = third_stopped
-    assert run(tmp_path) == 130
+    assert command() == 75
     told = capsys.readouterr().err
-    assert f"stopped by {signal.Signals(number).name}: 2 of 5 doublets are in " in told
-    assert "study-strength.h5; go on with --resume" in told
-    part = read_strengths("study-strength.h5")
-    assert part.table("n_tested").sum() == 2 and not part.complete
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["study-strength.h5", "study.h5"]
-    fake.replicate = run_again
-    # Without --resume it is in the way, and another flow does not go on with it.
-    before = Path("study-strength.h5").read_bytes()
-    assert run(tmp_path) == 2
-    assert "go on with it by --resume" in capsys.readouterr().err
-    assert run(tmp_path, "--resume", "--flow", "extension") == 2
+    assert "stopped by SIGTERM: 3 finished replicates are in " in told
+    assert "study-strength.h5.journal; go on with --resume" in told
+    assert not Path("study-strength.h5").exists()
+    assert program.main(["info", "study-strength.h5"]) == 0
+    assert "3 of 5 doublets so far; go on with --resume" in capsys.readouterr().out
+    assert program.main(["plot", "study-strength.h5"]) == 0
+    fake.replicate, stop.signal = run_again, 0
+    before = Path("study-strength.h5.journal").read_bytes()
+    assert command() == 2 and command("--resume", "--flow", "extension") == 2
     told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert "cannot be gone on with: its flow is shear, not extension; name another" in told
-    assert run(tmp_path, "--resume", "--overwrite") == 2
-    assert Path("study-strength.h5").read_bytes() == before
-    fake.asked.clear()
-    assert run(tmp_path, "--resume") == 0
-    assert len(fake.asked) == 3
-    assert same(read_strengths("study-strength.h5"), survey(FakeResults()))
-    names = ["study-strength.h5", "study-strength.png", "study.h5"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    assert "holds an unfinished run: go on with it by --resume" in told
+    assert 'flow is "shear" in the file, "extension" now' in told and told.count("\n") == 2
+    assert Path("study-strength.h5.journal").read_bytes() == before
+    assert command("--resume") == 0
+    assert same(read_strengths("study-strength.h5"), survey(FakeResults(tmp_path)))
+    assert not Path("study-strength.h5.journal").exists()
     # A finished one has nothing left to test.
     fake.asked.clear()
-    assert run(tmp_path, "--resume") == 0 and not fake.asked
+    assert command("--resume") == 0 and not fake.asked
 
 
-def test_a_signal_waits_until_the_file_is_whole():
-    stop, said = Stop(), []
-
-    def write(found):
-        signal.raise_signal(signal.SIGTERM)
-        said.append(found)
-
-    with stop.listening(), pytest.raises(KeyboardInterrupt):
-        stop.unbroken(write)("all of it")
-    assert said == ["all of it"] and stop.name == "SIGTERM"
-
-
-def test_resume_begins_where_there_is_nothing(fake, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.h5").write_bytes(b"never read here")
-    assert run(tmp_path, "--resume", "--quiet") == 0
+def test_resume_begins_where_there_is_nothing(command):
+    assert command("--resume", "--quiet") == 0
     assert read_strengths("study-strength.h5").complete
     # A file of something else is no strengths, and stays.
     Path("other.h5").write_bytes(b"mine")
-    assert run(tmp_path, "--resume", "-o", "other.h5") == 74
+    assert command("--resume", "-o", "other.h5") != 0
     assert Path("other.h5").read_bytes() == b"mine"
+
+
+def test_names_follow_from_the_study():
+    args = SimpleNamespace(results="a/b.h5", output=None, figure=None)
+    assert places(args) == (Path("b-strength.h5"), Path("b-strength.png"))

@@ -1,15 +1,14 @@
 """Whether what a journal says of a swarm can be: it may have been written by anyone."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import GRAZES, OPEN
-from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
+from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
-from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
 from flocsim.swarms.arrays import (
     AT_EDGE,
@@ -29,20 +28,40 @@ LARGEST = 2**53
 
 @attrs.frozen
 class Form:
-    """What a study's records look like: how many bodies, size classes and snapshots, and for how
-    long it goes [s]."""
+    """What a study's records look like: how many bodies; radii [m] between the size classes; times
+    [s] of the snapshots; axes along which its box repeats itself."""
 
     bodies: int
-    classes: int
-    moments: int
-    duration: float
+    bounds: tuple[float, ...]
+    times: tuple[float, ...]
+    periodic: str
+
+    @property
+    def classes(self) -> int:
+        """Number of size classes."""
+        return len(self.bounds) + 1
+
+    @property
+    def moments(self) -> int:
+        """Number of snapshots."""
+        return len(self.times)
+
+    def asked(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {
+            "bodies": self.bodies, "bounds": list(self.bounds), "times": list(self.times),
+            "periodic": self.periodic,
+        }  # fmt: skip
+
+
+FORM = {"bodies": int, "bounds": [float], "times": [float], "periodic": str}
+"""Form.asked, as a pattern of `flocsim.io.json_text`."""
 
 
 def check_part(part: Part, form: Form) -> None:
     """ValueError where a Part is none of a study of this Form."""
-    {BODIES: check_bodies, MOMENT: check_moment, STATE: check_state, END: check_end}.get(
-        part.of, refuse
-    )(part, form)
+    checks = {BODIES: check_bodies, MOMENT: check_moment, STATE: check_state}
+    checks.get(part.of, refuse)(part, form)
 
 
 def refuse(part: Part, form: Form) -> None:
@@ -119,7 +138,7 @@ def check_state(part: Part, form: Form) -> None:
         demand(np.all(part.arrays[name] > 0.0), name)
     methods = part.arrays["methods"]
     demand(np.all((methods == 0.0) | (methods == 1.0)), "methods")
-    demand(0.0 <= part.arrays["time"] <= form.duration and part.arrays["span"] > 0.0, "time")
+    demand(0.0 <= part.arrays["time"] <= form.times[-1] and part.arrays["span"] > 0.0, "time")
     gone, returns = part.arrays["gone"], part.arrays["returns"]
     demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")
     bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
@@ -130,13 +149,9 @@ def check_state(part: Part, form: Form) -> None:
     demand(part.facts["moments"] >= 1, "moments")
 
 
-def check_end(part: Part, form: Form) -> None:
-    shaped(part, {})
-    facts = part.facts
-    status = facts.get("status")
-    demand(isinstance(status, str) and status in Status.__members__, "status")
-    demand(all(is_count(facts.get(name)) for name in EFFORT), "effort")
-    demand(is_number(facts.get("time")), "time")
-    failed = facts.get("failed")
-    demand(isinstance(failed, list), "failed")
-    demand(all(is_count(each, form.bodies - 1) for each in failed or []), "failed")
+def check_ends(column: Callable[[str], np.ndarray]) -> None:
+    """ValueError for rows of replicates that no run can have given; ``column(name)`` of ENDS."""
+    demand(np.all((column("finished") >= 0) & (column("finished") <= 1)), "finished")
+    demand(np.all(np.isfinite(column("end_time")) & (column("end_time") >= 0.0)), "end_time")
+    for name in ("steps", "rejected", "body_steps", "windows"):
+        demand(np.all(column(name) >= 0), name)

@@ -5,19 +5,19 @@ description lists. The last state of a replicate is what it goes on from.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.io.journal.records import SNAPSHOT, Record, encode
+from flocsim.io.journal.records import Record
 from flocsim.io.json_text import matches
 
-BODIES, MOMENT, STATE, END = "bodies", "moment", "state", "end"
-"""Kinds of a replicate's records."""
+BODIES, MOMENT, STATE = "bodies", "moment", "state"
+"""What a replicate's records are of."""
 
-LISTED = {"replicate": int, "of": str, "arrays": [[object]]}
+LISTED = {"of": str, "arrays": [[object]]}
 KINDS = {"f8": np.float64, "i8": np.int64, "i4": np.int32}
 
 
@@ -25,7 +25,6 @@ KINDS = {"f8": np.float64, "i8": np.int64, "i4": np.int32}
 class Part:
     """One record of a replicate: what it is ``of``, further ``facts``, and its ``arrays``."""
 
-    replicate: int
     of: str
     arrays: dict[str, np.ndarray]
     facts: dict[str, Any] = attrs.Factory(dict)
@@ -35,13 +34,60 @@ class Part:
         listed = [
             [name, array.dtype.str[1:], list(array.shape)] for name, array in self.arrays.items()
         ]
-        description = {"replicate": self.replicate, "of": self.of, "arrays": listed}
         data = b"".join(np.ascontiguousarray(each).tobytes() for each in self.arrays.values())
-        return description | {"facts": told(self.facts)}, data
+        return {"of": self.of, "arrays": listed, "facts": told(self.facts)}, data
 
-    def encoded(self) -> bytes:
-        """The record as the journal has it."""
-        return encode(SNAPSHOT, *self.described())
+
+Read = Callable[[int, int], bytes]
+"""Bytes of the journal: (offset, length)."""
+
+
+@attrs.frozen(eq=False)
+class Left:
+    """Where a replicate was left: how many snapshots it has, and the state of its Progress."""
+
+    moments: int
+    state: dict[str, np.ndarray]
+
+
+@attrs.define(eq=False)
+class Found:
+    """What a journal has of a replicate: records of its bodies, of its snapshots by place, and of
+    its last state."""
+
+    bodies: Record | None = None
+    moments: dict[int, Record] = attrs.Factory(dict)
+    state: Record | None = None
+
+    @classmethod
+    def of(cls, records: Iterable[Record]) -> "Found":
+        """What these records are, which were checked."""
+        found = cls()
+        for record in records:
+            about = record.description
+            if about["of"] == MOMENT:
+                found.moments[about["facts"]["place"]] = record
+            else:
+                setattr(found, about["of"], record)
+        return found
+
+    def left(self, read: Read) -> Left | None:
+        """Where it goes on; None where it begins anew."""
+        if self.state is None or self.bodies is None:
+            return None
+        state = part_in(self.state, read)
+        count = state.facts["moments"]
+        return Left(count, state.arrays) if self.has(count) else None
+
+    def has(self, moments: int) -> bool:
+        """Whether its bodies and first snapshots are there."""
+        return self.bodies is not None and all(place in self.moments for place in range(moments))
+
+
+def part_in(record: Record | None, read: Read) -> Part:
+    """The Part of a record that is there."""
+    assert record is not None, "a replicate that is read has its bodies"
+    return part_of(record.description, read(record.offset, record.length))
 
 
 def told(facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,10 +98,9 @@ def told(facts: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def part_of(record: Record, data: bytes) -> Part:
-    """The Part of a record of the journal; ValueError where it is none."""
-    about = record.description
-    if record.kind != SNAPSHOT or not matches(about, LISTED):
+def part_of(about: dict[str, Any], data: bytes) -> Part:
+    """The Part of a record of the journal, by its description; ValueError where it is none."""
+    if not matches(about, LISTED):
         raise ValueError("a record is of another form")
     arrays, place = {}, 0
     for listed in about["arrays"]:
@@ -72,7 +117,7 @@ def part_of(record: Record, data: bytes) -> Part:
     facts = about.get("facts", {})
     if not isinstance(facts, dict):
         raise ValueError("a record is of another form")
-    return Part(about["replicate"], about["of"], arrays, facts)
+    return Part(about["of"], arrays, facts)
 
 
 def checked_listing(listed: Sequence[Any]) -> tuple[str, str, tuple[int, ...]]:

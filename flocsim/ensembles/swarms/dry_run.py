@@ -1,13 +1,15 @@
 """What a study of swarms would do, without doing it."""
 
+import attrs
 import numpy as np
 
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.suspension.runner import largest_pair
-from flocsim.ensembles.suspension.study import SwarmStudy, scene_of
+from flocsim.ensembles.swarms.study import SwarmStudy, scene_of
 from flocsim.explain import force_lines, scale_lines
 from flocsim.io.terminal import duration
 from flocsim.plausibility.reynolds import settled
+from flocsim.swarms.swarm import Swarm
+from flocsim.system import System
 
 BODY_BYTES = 8 * 6 + 4
 """Bytes of a body in a snapshot."""
@@ -49,3 +51,10 @@ def dry_run(config: Config, ranks: int) -> str:
         "nothing was run (--dry-run)",
     ]
     return "\n".join(lines)
+
+
+def largest_pair(swarm: Swarm) -> System:
+    """A System of the two largest bodies, for what is said of a swarm."""
+    bodies = sorted((body for body in swarm.bodies if not body.fixed),
+                    key=lambda body: -body.shape.equivalent_radius)[:2]  # fmt: skip
+    return attrs.evolve(swarm.system, bodies=bodies)

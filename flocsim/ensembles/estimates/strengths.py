@@ -1,14 +1,16 @@
 """Rates of single doublets → counts and quantiles of every condition, and their table."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.strength.opening import FAILED, HOLDS, OPENED, OPENS_AT_LEAST, Opening
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.results.schema import AXES
 from flocsim.io.results.strength_file import (
     QUANTILES,
+    ROW,
+    STATUS,
     Strengths,
     labelled_conditions,
     labelled_doublets,
@@ -27,29 +29,27 @@ def quantiles_of(opens: np.ndarray, holding: int) -> np.ndarray:
     return np.quantile(ordered, QUANTILES, method="inverted_cdf")
 
 
+OPENED, OPENS_AT_LEAST, HOLDS, FAILED = range(len(STATUS))
+"""What was found of a doublet."""
+
+
 def strengths_of(
-    axes: tuple[Sequence[str], np.ndarray, np.ndarray], bound: np.ndarray, places: np.ndarray,
-    openings: Sequence[Opening], about: dict[str, Any],
+    axes: tuple[Sequence[str], np.ndarray, np.ndarray], bound: np.ndarray,
+    columns: dict[str, np.ndarray], about: dict[str, Any],
 ) -> Strengths:  # fmt: skip
     """The Strengths of tested doublets.
 
     ``axes``: types, N and δ of the study; ``bound``: how many it found bound of each condition;
-    ``places`` (k, 5): type, N, δ, replicate and bond of every doublet tested, with its Opening.
+    ``columns`` (k,): all of DOUBLETS.
     """
-    columns = dict(zip((*AXES, "replicate", "bond"), places.T, strict=True))
-    status = np.array([each.status for each in openings])
-    opens = np.array([each.opens for each in openings])
-    columns |= {
-        "holds": np.array([each.holds for each in openings]), "opens": opens, "status": status,
-        "runs": np.array([each.runs for each in openings]),
-        "tolerance": np.array([each.tolerance for each in openings]),
-    }  # fmt: skip
+    status, opens = columns["status"], columns["opens"]
+    places = np.column_stack([columns[name] for name in AXES])
     shape = bound.shape
     counts = {name: np.zeros(shape, dtype=np.int64)
               for name in ("n_tested", "n_opened", "n_holding", "n_failed")}  # fmt: skip
     rate = np.full((*shape, len(QUANTILES)), np.nan)
     for place in np.ndindex(shape):
-        rows = np.all(places[:, :3] == place, axis=1)
+        rows = np.all(places == place, axis=1)
         opened = rows & np.isin(status, (OPENED, OPENS_AT_LEAST))
         holding = int(np.sum(rows & (status == HOLDS)))
         counts["n_tested"][place], counts["n_opened"][place] = rows.sum(), opened.sum()
@@ -58,6 +58,30 @@ def strengths_of(
         rate[place] = quantiles_of(opens[opened], holding)
     conditions = labelled_conditions(axes, {"n_bound": bound, **counts, "rate": rate})
     return Strengths(about, labelled_doublets(columns), conditions)
+
+
+def strengths_in(
+    store: RowStore, bound: np.ndarray, about: dict[str, Any],
+    known: Container[tuple[int, int]] | None = None,
+) -> Strengths:  # fmt: skip
+    """The Strengths of all rows of a store, in its order; of those (place of the condition,
+    replicate) that are ``known`` to be bound, all for None."""
+    axes = [list(dict.fromkeys(each)) for each in zip(*store.conditions, strict=True)]
+    tested = [
+        (place, replicate)
+        for place in range(len(store.conditions))
+        for interval in store.intervals(place)
+        for replicate in range(*interval)
+        if known is None or (place, replicate) in known
+    ]
+    places, replicates = np.array(tested, dtype=np.int64).reshape(-1, 2).T
+    columns = dict(zip(AXES, np.unravel_index(places, bound.shape), strict=True))
+    columns["replicate"] = replicates
+    for name in ROW.fields or ():
+        values = [store.read(place, name, each, each + 1) for place, each in tested]
+        columns[name] = np.concatenate([np.empty(0, ROW[name]), *values])
+    given = axes[0], np.array(axes[1]), np.array(axes[2])
+    return strengths_of(given, bound, columns, {"asked": len(tested)} | about)
 
 
 def table_of(found: Strengths) -> str:

@@ -3,12 +3,12 @@
 import math
 import time
 from collections.abc import Callable
+from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.suspension.records import BODIES, END, MOMENT, STATE, Part
-from flocsim.ensembles.suspension.study import Drawn, SwarmStudy
+from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Left, Part
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import GONE, WALL
@@ -19,27 +19,15 @@ from flocsim.swarms.together.bonds import Bonds
 from flocsim.swarms.together.clusters import Clusters
 from flocsim.swarms.together.contacts import Gauge
 
-Going = Callable[[float, int], None]
-"""Is told how far a replicate is: the time [s] of its window, the steps tried in that so far."""
-
-
-@attrs.frozen(eq=False)
-class Left:
-    """Where a replicate was left: how many snapshots it has, and the state of its Progress."""
-
-    moments: int
-    state: dict[str, np.ndarray]
-
 
 def run_replicate(
-    study: SwarmStudy, replicate: int, keep: Callable[[Part], None], left: Left | None = None,
-    halted: Callable[[], bool] | None = None, going: Going | None = None,
-) -> bool:  # fmt: skip
-    """Run a replicate; whether it has come to its end.
+    study: Any, replicate: int, keep: Callable[[Part], object], left: Left | None = None,
+    halted: Callable[[], bool] | None = None, going: Callable[[str], object] | None = None,
+) -> dict[str, Any] | None:  # fmt: skip
+    """Run a replicate of a SwarmStudy: how it ended and what it took; None where it was left.
 
     ``keep`` takes its Parts as they come. ``halted()``, looked at between windows and now and then
-    within long ones, makes it leave off, its state kept. ``going(time, tried)`` is told as often
-    how far it is: the time [s] of the window, and the steps that were tried in it.
+    within long ones, makes it leave off, its state kept. ``going`` is told as often how far it is.
     """
     swarm, drawn, box = study.swarm(replicate)
     gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
@@ -52,14 +40,14 @@ def run_replicate(
 
     def look(tried: int) -> bool:
         if going is not None:
-            going(progress.time, tried)
+            going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps on")
         return halted is not None and halted()
 
     if left is None or not fits(left, swarm):
-        keep(bodies_part(replicate, swarm, drawn, box))
+        keep(bodies_part(swarm, drawn.flocs, box))
         seen = progress.swarm.motion.copy()
         bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
-        keep(moment_part(replicate, 0, study, swarm, gauge, progress, bonds))
+        keep(moment_part(0, study, swarm, gauge, progress, bonds))
         moments = 1
     else:
         progress.restore(left.state)
@@ -70,22 +58,24 @@ def run_replicate(
             late = time.monotonic() - kept_at > study.scene.checkpoint
             stopped = status == Status.STOPPED or look(0)
             if late or stopped:
-                keep(state_part(replicate, place, progress, seen))
+                keep(state_part(place, progress, seen))
                 kept_at = time.monotonic()
             if stopped:
-                return False
+                return None
         if status != Status.FINISHED:
             break
         motion = progress.swarm.motion.copy()
         near = gauge.neighbours(motion[:, :3])
         bonds = bond_gauge.bonds(stops[place], motion, near, (stops[place - 1], seen))
-        keep(moment_part(replicate, place, study, swarm, gauge, progress, bonds))
+        keep(moment_part(place, study, swarm, gauge, progress, bonds))
         seen = motion
         if place + 1 < len(stops) and halted is not None and halted():
-            keep(state_part(replicate, place + 1, progress, seen))
-            return False
-    keep(end_part(replicate, status, progress))
-    return True
+            keep(state_part(place + 1, progress, seen))
+            return None
+    failed = [] if progress.failed is None else progress.failed.tolist()[:MOST_NAMED]
+    return {"status": status.name, "failed": failed, "time": progress.time} | attrs.asdict(
+        progress.effort
+    )
 
 
 def fits(left: Left, swarm: Swarm) -> bool:
@@ -101,18 +91,16 @@ def fits(left: Left, swarm: Swarm) -> bool:
     return bool(np.all(np.sort(owner[points], axis=1) == bodies))
 
 
-def bodies_part(
-    replicate: int, swarm: Swarm, drawn: Drawn, box: tuple[float, float]
-) -> Part:  # fmt: skip
+def bodies_part(swarm: Swarm, flocs: np.ndarray, box: tuple[float, float]) -> Part:
     """What is the same at all times: the bodies, a wall the last of them, and the box."""
     shapes = [body.shape for body in swarm.bodies]
     tables = [table_of(shape.parts) for shape in shapes]
-    walls = len(shapes) - len(drawn.flocs)
-    return Part(replicate, BODIES, {
+    walls = len(shapes) - len(flocs)
+    return Part(BODIES, {
         "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
         "spheroradius": np.array([shape.radius for shape in shapes]),
         "mass": np.array([body.mass for body in swarm.bodies]),
-        "floc": np.append(drawn.flocs, np.full(walls, WALL)).astype(np.int32),
+        "floc": np.append(flocs, np.full(walls, WALL)).astype(np.int32),
         "count": np.array([len(each.place) for each in tables], dtype=np.int64),
         "points": np.concatenate([each.place for each in tables]),
         "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
@@ -123,8 +111,7 @@ def bodies_part(
 
 
 def moment_part(
-    replicate: int, place: int, study: SwarmStudy, swarm: Swarm, gauge: Gauge, progress: Progress,
-    bonds: Bonds,
+    place: int, study: Any, swarm: Swarm, gauge: Gauge, progress: Progress, bonds: Bonds
 ) -> Part:  # fmt: skip
     """A snapshot, its clusters and bonds with it."""
     now, motion, error = progress.seen()
@@ -142,7 +129,7 @@ def moment_part(
     arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
-    return Part(replicate, MOMENT, arrays, facts)
+    return Part(MOMENT, arrays, facts)
 
 
 def summary_of(clusters: Clusters) -> dict[str, float]:
@@ -168,17 +155,9 @@ def summary_of(clusters: Clusters) -> dict[str, float]:
     }
 
 
-def state_part(replicate: int, moments: int, progress: Progress, seen: np.ndarray) -> Part:
+def state_part(moments: int, progress: Progress, seen: np.ndarray) -> Part:
     """What the rest of the replicate follows from; ``seen``: the motion at the last snapshot."""
-    return Part(replicate, STATE, progress.state() | {"seen": seen}, {"moments": moments})
-
-
-def end_part(replicate: int, status: Status, progress: Progress) -> Part:
-    """How it ended, and what it took."""
-    effort = attrs.asdict(progress.effort)
-    failed = [] if progress.failed is None else progress.failed.tolist()[:MOST_NAMED]
-    return Part(replicate, END, {}, {"status": status.name, "failed": failed, "time": progress.time}
-                | effort)  # fmt: skip
+    return Part(STATE, progress.state() | {"seen": seen}, {"moments": moments})
 
 
 MOST_NAMED = 20

@@ -3,6 +3,7 @@ the file."""
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,15 +14,12 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.suspension import dealing
-from flocsim.ensembles.suspension.checks import check_part
-from flocsim.ensembles.suspension.records import Part, part_of
-from flocsim.ensembles.suspension.replicate import Left, run_replicate
-from flocsim.ensembles.suspension.runner import form_of
-from flocsim.ensembles.suspension.study import SwarmStudy
-from flocsim.errors import FileError, UsageError
+from flocsim.ensembles.swarms.checks import check_part
+from flocsim.ensembles.swarms.records import Left, Part, part_of
+from flocsim.ensembles.swarms.replicate import run_replicate
+from flocsim.ensembles.swarms.study import SwarmStudy
+from flocsim.errors import UsageError
 from flocsim.io import terminal
-from flocsim.io.journal.records import Record, scan
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
@@ -72,12 +70,12 @@ def test_what_is_written_agrees_with_itself(finished):
 
 
 def run_parts(config, halts=(), left=None, replicate=0):
-    """(Parts that a replicate keeps, whether it ended); it is asked to halt at some looks."""
+    """(Parts that a replicate keeps, how it ended); it is asked to halt at some looks."""
     parts, looks, study = [], iter(range(10**9)), SwarmStudy(config)
     ended = run_replicate(study, replicate, parts.append, left, lambda: next(looks) in halts)
     for part in parts:
         # What is written is taken when it is read.
-        check_part(part_of_encoded(part), form_of(study, study.swarm(replicate)[0]))
+        check_part(part_of_encoded(part), study.form)
     return parts, ended
 
 
@@ -85,16 +83,14 @@ def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
     config = swarm_config(tmp_path)
     whole, ended = run_parts(config)
     assert ended
-    first, ended = run_parts(config, halts={5})
-    assert not ended and first[-1].of == "state"
+    first, halted = run_parts(config, halts={5})
+    assert halted is None and first[-1].of == "state"
     state = part_of_encoded(first[-1])
-    rest, ended = run_parts(config, left=Left(state.facts["moments"], state.arrays))
-    assert ended
+    rest, again = run_parts(config, left=Left(state.facts["moments"], state.arrays))
     motions = [[part.arrays["motion"] for part in parts if part.of == "moment"]
                for parts in (whole, [*first, *rest])]  # fmt: skip
     assert np.array(motions[0]).tobytes() == np.array(motions[1]).tobytes()
-    efforts = [parts[-1].facts for parts in (whole, rest)]
-    assert efforts[0] == efforts[1]
+    assert ended == again
 
 
 def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
@@ -112,7 +108,7 @@ def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_p
         left = Left(state.facts["moments"], state.arrays)
     assert times > 1
     moments = [
-        [each.encoded() for each in some if each.of == "moment"] for some in (whole, parts)
+        [each.described() for each in some if each.of == "moment"] for some in (whole, parts)
     ]  # fmt: skip
     assert moments[0] == moments[1]
 
@@ -123,10 +119,12 @@ def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys)
     monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
     study = SwarmStudy(swarm_config(tmp_path))
     told = []
-    run_replicate(study, 0, lambda part: None, going=lambda *now: told.append(now))
-    assert [time for time, _ in told] == sorted(time for time, _ in told)
-    assert any(tried == 0 for _, tried in told)
-    assert 0.0 < told[-1][0] <= 0.3
+    run_replicate(study, 0, lambda part: None, going=told.append)
+    found = [re.fullmatch(r"swarm 0 at ([\d.e-]+) s, (\d+) steps on", each) for each in told]
+    assert all(found)
+    times = [float(each[1]) for each in found]
+    assert times == sorted(times) and 0.0 < times[-1] <= 0.3
+    assert any(each[2] == "0" for each in found)
     path = write_swarm_study(tmp_path)
     assert main(["swarm", str(path), "-o", str(tmp_path / "told.h5")]) == 0
     output = capsys.readouterr().out
@@ -159,23 +157,19 @@ def test_what_leaves_is_told_and_resumed(tmp_path, leaving):
     rest, _ = run_parts(config, left=Left(state.facts["moments"], state.arrays))
     both = [part for part in [*first, *rest] if part.of == "moment"]
     for one, other in zip(moments, both, strict=True):
-        assert one.encoded() == other.encoded()
+        assert one.described() == other.described()
 
 
 def part_of_encoded(part):
     """A Part, written and read."""
-    import io
-
-    encoded = part.encoded()
-    [record] = list(scan(io.BytesIO(encoded)))
-    return part_of(record, encoded[record.offset :])
+    return part_of(*part.described())
 
 
 def test_records_come_back_as_they_were():
     arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.zeros((0, 2), dtype=np.int64),
               "c": np.arange(3, dtype=np.int32)}  # fmt: skip
-    found = part_of_encoded(Part(3, "moment", arrays, {"x": 1.5, "nan": float("nan")}))
-    assert (found.replicate, found.of, found.facts) == (3, "moment", {"x": 1.5, "nan": None})
+    found = part_of_encoded(Part("moment", arrays, {"x": 1.5, "nan": float("nan")}))
+    assert (found.of, found.facts) == ("moment", {"x": 1.5, "nan": None})
     for name, values in arrays.items():
         assert found.arrays[name].dtype == values.dtype
         np.testing.assert_array_equal(found.arrays[name], values)
@@ -189,9 +183,8 @@ def test_records_come_back_as_they_were():
     ],
 )  # fmt: skip
 def test_records_that_no_flocsim_wrote_are_refused(listed):
-    about = {"replicate": 0, "of": "moment", "arrays": listed}
     with pytest.raises(ValueError):
-        part_of(Record(3, about, 0, 8, b""), bytes(8))
+        part_of({"of": "moment", "arrays": listed}, bytes(8))
 
 
 def start(folder, *words):
@@ -203,7 +196,9 @@ def start(folder, *words):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, tmp_path, number):
+def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
+    finished, tmp_path, monkeypatch, capsys, number
+):
     write_swarm_study(tmp_path)
     with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
         until = time.monotonic() + 120.0
@@ -217,8 +212,9 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, tmp_path, numbe
     assert journal.exists(), said
     if number == signal.SIGTERM:
         assert process.returncode == 75 and "go on with --resume" in said
-    with pytest.raises(FileError, match="snapshots so far; --resume goes on"):
-        main_raises(["info", str(tmp_path / "swarm.h5")])
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", "swarm.h5"]) == 0 == main(["plot", "swarm.h5", "--figures", "clusters"])
+    assert re.search(r"unfinished: \d of 8 snapshots so far", capsys.readouterr().out)
     with start(tmp_path, "--resume", "--jobs", "2") as process:
         said, _ = process.communicate(timeout=240)
     assert process.returncode == 0 and "left out" not in said, said
@@ -236,16 +232,8 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
         first, ended = run_parts(config, halts={look})
         assert not ended and first[-1].of == "state"
         rest, _ = run_parts(config, left=Left(first[-1].facts["moments"], first[-1].arrays))
-        both = [part.encoded() for part in [*first, *rest] if part.of == "moment"]
-        assert both == [part.encoded() for part in whole if part.of == "moment"]
-
-
-def main_raises(words):
-    """A command's error, not its exit code."""
-    from flocsim.__main__ import make_parser
-
-    arguments = make_parser().parse_args(words)
-    return arguments.run(arguments)
+        both = [part.described() for part in [*first, *rest] if part.of == "moment"]
+        assert both == [part.described() for part in whole if part.of == "moment"]
 
 
 def test_ranks_change_no_byte(finished, tmp_path):
@@ -261,13 +249,30 @@ def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
     before = (finished / "swarm.h5").read_bytes()
     assert main(["swarm", "swarm.toml"]) == UsageError.exit_code
     assert main(["swarm", "swarm.toml", "--resume", "--seed", "9"]) == UsageError.exit_code
-    assert main(["swarm", "swarm.toml", "--resume", "--replicates", "5"]) == UsageError.exit_code
+    fewer = ["swarm", "swarm.toml", "--resume", "--replicates", "1", "--quiet"]
+    assert main(fewer) == 0
     said = capsys.readouterr().err.splitlines()
-    assert len(said) == 3 and "exists already" in said[0]
-    assert "seed is 4 in the file, 9 now" in said[1] and "has 2 replicates, and 5" in said[2]
+    assert len(said) == 2 and "exists already" in said[0]
+    assert "seed is 4 in the file, 9 now" in said[1]
     assert main(["swarm", "swarm.toml", "--resume"]) == 0
-    assert "nothing was run" in capsys.readouterr().out
+    assert "2 replicates, 0 of them run" in capsys.readouterr().out
     assert (finished / "swarm.h5").read_bytes() == before
+
+
+def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, monkeypatch):
+    """And are those of a study of as many from the start; of flocs with other numbers of points."""
+    monkeypatch.chdir(tmp_path)
+    write_swarm_study(tmp_path)
+    shutil.copy(finished / "swarm.h5", tmp_path / "swarm.h5")
+    more = ["--replicates", "5", "--quiet"]
+    assert main(["swarm", "swarm.toml", "--resume", *more]) == 0
+    assert main(["swarm", "swarm.toml", "-o", "fresh.h5", *more]) == 0
+    assert same(tmp_path / "swarm.h5", tmp_path / "fresh.h5")
+    before, after = (read_swarm(each / "swarm.h5").groups for each in (finished, tmp_path))
+    for group, columns in before.items():
+        for name, values in columns.items():
+            assert after[group][name][: len(values)].tobytes() == values.tobytes()
+    assert read_swarm(tmp_path / "swarm.h5").run["sessions"] == 2
 
 
 def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
@@ -295,16 +300,3 @@ def test_a_dry_run_runs_nothing(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "2 swarms of 12 bodies" in said and "bodies cover 0.2000" in said
     assert [path.name for path in tmp_path.iterdir()] == ["swarm.toml"]
-
-
-def test_a_dealer_hands_out_each_replicate_once(monkeypatch):
-    class Alone:
-        size = 1
-
-        def messages(self):
-            return iter(())
-
-    ran, kept = [], []
-    monkeypatch.setattr(dealing, "run_replicate", lambda s, k, *rest: ran.append(k))
-    dealing.Dealer(Alone(), {3: None, 1: None}, kept.append, lambda each: None).run(None)
-    assert ran == [1, 3] and not kept

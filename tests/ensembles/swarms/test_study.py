@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-from flocsim.ensembles.suspension.runner import check_room
-from flocsim.ensembles.suspension.study import SPHERE, SwarmStudy, lognormal
+from flocsim.ensembles.swarms.kind import check_room
+from flocsim.ensembles.swarms.study import SPHERE, SwarmStudy, lognormal
 from flocsim.errors import ConfigError, UsageError
 from tests.helpers.small_study import write_star_library
 from tests.helpers.swarm_study import SWARM, swarm_config
@@ -107,14 +107,13 @@ def test_every_replicate_is_placed_before_the_first_runs(tmp_path):
     least = np.array([6.0 * max(shape.radius for shape in shapes) for shapes in drawn])
     faults = np.flatnonzero(least > 85e-6)
     assert len(faults) and faults[0] > 0, "else this shows nothing"
-    swarm, _, _ = found.swarm(0)
     for size in (1, 3):
         known = [seen for rank in range(size) for seen in [Told(rank, size)]]
         for comm in known[1:]:
-            check_room(found, swarm, comm)
+            check_room(found, comm)
         known[0].others = [comm.given for comm in known[1:]]
         with pytest.raises(UsageError, match=f"swarm {faults[0]} of 30"):
-            check_room(found, swarm, known[0])
+            check_room(found, known[0])
 
 
 def without(key):

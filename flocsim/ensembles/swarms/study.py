@@ -1,8 +1,9 @@
 """A study of swarms: the bodies of any replicate, by its number."""
 
+import hashlib
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -12,8 +13,15 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import EXPONENTS, quantile
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.config.swarm_scene import SwarmScene
+from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
+from flocsim.ensembles.swarms.checks import Form, check_ends, check_part
+from flocsim.ensembles.swarms.records import MOMENT, Found, Left, Read, part_of
+from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.integrators.base import Status
+from flocsim.io.journal.records import Record
+from flocsim.io.results.swarm_file import ENDS
 from flocsim.plausibility.settling import terminal_motion
 from flocsim.swarms.leaving import KEEP, Leaving
 from flocsim.swarms.placement import place_at_random
@@ -23,6 +31,12 @@ from flocsim.system import System
 
 SPHERE = -1
 """Place among the flocs of a body that is a sphere."""
+
+ROW = np.dtype([*((name, f"<{kind}") for name, (kind, _, _) in ENDS.items()), ("trial", "<u8")])
+"""A finished replicate: how it ended, and a digest of what its rank computed first."""
+
+TRIAL_SECONDS = 1e-6
+"""For so long the first bodies are run before a study begins [s]."""
 
 BEYOND = 4.0
 """A floor goes on for so many bounding radii beyond the box."""
@@ -56,7 +70,7 @@ def shapes_of(config: Config) -> ShapesConfig:
 
 
 @attrs.define(eq=False)
-class SwarmStudy:
+class SwarmStudy(StudyKind):
     """Every replicate of a config whose scene is a swarm. All that is random follows from (seed,
     replicate). ``flocs`` are grown or read unless given."""
 
@@ -65,6 +79,12 @@ class SwarmStudy:
         default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
     )
     pool: FlocPool = attrs.field(init=False)
+    any_swarm: Swarm | None = attrs.field(init=False, default=None)
+    trial: int = attrs.field(init=False, default=0)
+    row: ClassVar[np.dtype] = ROW
+    compared: ClassVar[tuple[str, ...]] = ("trial",)
+    most_rows: ClassVar[int] = 1
+    noun: ClassVar[str] = "snapshots"
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -100,6 +120,98 @@ class SwarmStudy:
         if self.scene.duration - times[-1] > 1e-9 * self.scene.duration:
             return [*times, self.scene.duration]
         return [*times[:-1], self.scene.duration]
+
+    @property
+    def first(self) -> Swarm:
+        """The swarm of the first replicate at its start."""
+        if self.any_swarm is None:
+            self.any_swarm = self.swarm(0)[0]
+        return self.any_swarm
+
+    @property
+    def form(self) -> Form:
+        """What its records look like."""
+        scene = self.scene
+        return Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
+
+    @property
+    def pieces(self) -> int:
+        """Snapshots of each replicate."""
+        return len(self.stops)
+
+    @property
+    def allowed(self) -> float:
+        """All may end early: results say which."""
+        return math.inf
+
+    @property
+    def title(self) -> str:
+        """The study in a few words."""
+        number, duration = self.scene.number, self.scene.duration
+        return f"{self.config.replicates} swarms of {number} bodies, {duration:g} s"
+
+    def asked(self) -> dict[str, Any]:
+        """What the study consists of, and what its records look like."""
+        return super().asked() | {"swarm": self.form.asked()}
+
+    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+        """Compile all that a swarm needs, or load it, by running two bodies for no time."""
+        found: dict[Code, dict | None] = {}
+        for code in kinds:
+            self.trial = trial_of(self.first)
+            found[code] = {"trial": self.trial}
+        return found
+
+    def run_task(
+        self, place: Place, replicate: int, halted: Callable[[], bool], left: Left | None = None,
+        keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """One replicate from where it was left; its bodies and snapshots are kept as they come."""
+        kept = keep or (lambda description, data, counts: None)
+        ended = run_replicate(
+            self, replicate, lambda part: kept(*part.described(), part.of == MOMENT), left, halted,
+            going,
+        )  # fmt: skip
+        if ended is None:
+            return None, None
+        finished = ended["status"] == Status.FINISHED.name
+        row = {name: ended.get(name, 0) for name in ROW.fields or ()}
+        row |= {"finished": finished, "end_time": ended["time"], "trial": self.trial}
+        if finished:
+            return row, None
+        why = (
+            f"{ended['status'].lower()} at {ended['time']:.4g} s, in an island of bodies "
+            f"{', '.join(map(str, ended['failed'][:6]))}"
+        )
+        name, vertices, share = self.conditions[0]
+        about = {"type": name, "vertices": vertices, "delta": share, "replicate": replicate}
+        return row, about | {"why": why}
+
+    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
+        """ValueError for rows that no run can have given."""
+        check_ends(column)
+
+    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Which replicates ended before their time."""
+        return column("finished") == 0
+
+    def check_part(self, description: dict, data: bytes) -> None:
+        """ValueError for what cannot have been kept of a replicate."""
+        check_part(part_of(description, data), self.form)
+
+    def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
+        """ValueError where bodies or snapshots of a finished replicate are not there."""
+        [*finished] = rows["finished"]
+        if len(finished) > 1 or not Found.of(parts).has(self.pieces if finished[0] else 0):
+            raise ValueError("its snapshots are not all there")
+
+    def counts_part(self, description: dict) -> bool:
+        """Whether it is a snapshot."""
+        return description["of"] == MOMENT
+
+    def left_of(self, parts: list[Record], read: Read) -> Left | None:
+        """Where a replicate goes on."""
+        return Found.of(parts).left(read)
 
     def generator(self, replicate: int) -> np.random.Generator:
         """The random numbers of a replicate."""
@@ -226,3 +338,19 @@ def lognormal(scene: SwarmScene, numbers: np.ndarray) -> np.ndarray:
     # Uniform numbers come from 0 on, where an unlimited distribution has nothing.
     shares = np.clip(shares, np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
     return scene.radius * np.exp(scene.spread * ndtri(shares))
+
+
+def trial_of(swarm: Swarm) -> int:
+    """A digest of where two bodies of a swarm come to that begin next to each other."""
+    free = [body for body in swarm.bodies if not body.fixed][:2]
+    (x, y), reach = free[0].position, sum(body.shape.bounding_radius for body in free)
+    free[1:] = [attrs.evolve(body, position=(x, y + 1.001 * reach)) for body in free[1:]]
+    bodies = [*free, *(body for body in swarm.bodies if body.fixed)]
+    box = tuple(None if np.isinf(side) else side for side in swarm.box)
+    few = Swarm(bodies, swarm.forces, swarm.integrator, swarm.fluid, box=box)
+    few.gauge().neighbours(few.system.motion()[0])
+    progress = few.begin(TRIAL_SECONDS)
+    while progress.advance(TRIAL_SECONDS) == Status.PAUSED:
+        pass
+    motion = progress.swarm.motion.tobytes()
+    return int.from_bytes(hashlib.blake2b(motion, digest_size=8).digest(), "little")

@@ -1,0 +1,209 @@
+"""The contract of a kind of study: what differs between pairs, rates and swarms, and nothing else.
+
+A kind gives a StudyKind, its conditions, draws and runs, which every rank has, and a Kind, the
+functions by which rank 0 checks, describes and writes such studies. The journal, dealing to ranks
+and processes, resuming, identities, signals and progress exist once and ask these two.
+`flocsim.ensembles.kinds` is the table of all kinds.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import product
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ROW, Condition, Interval
+from flocsim.ensembles.config.schema import Config
+from flocsim.io.journal.records import Record
+
+Code = tuple[int, int]
+"""Place of a collision type, and N: they stand for all that runs the same compiled code."""
+
+Place = tuple[int, int, float]
+"""Of a condition: place of the type, N, share of δ_max."""
+
+Keep = Callable[[dict, bytes, bool], object]
+"""Takes what is kept of an unfinished replicate: description, data, whether progress counts it."""
+
+Going = Callable[[str], object]
+"""Is told in words how far a replicate is."""
+
+
+@attrs.frozen(eq=False)
+class OldRows:
+    """Rows of an older results file: its scalars ``run``; {column: array}, each of which ends in
+    the replicates; where each condition stands in them; replicates of each; what else the kind
+    takes from it; which replicates there are of each condition, where these are not all."""
+
+    run: Mapping[str, Any]
+    columns: Mapping[str, Any]
+    places: Mapping[Condition, tuple[int, ...]]
+    count: int
+    more: Any = None
+    there: Mapping[Condition, list[Interval]] | None = None
+
+
+class StudyKind:
+    """What every rank asks of a study. All that is random follows from (seed, replicate).
+
+    A subclass has ``config`` and ``flocs``, and gives `run_task`, `compile` and `check_rows`; the
+    rest has a default. A row is what a finished replicate comes to, numbers of the types ``row``.
+    """
+
+    config: Config
+    flocs: list
+    row: ClassVar[np.dtype] = ROW
+    compared: ClassVar[tuple[str, ...]] = COLUMNS
+    """Columns by which what is computed first is held against other ranks and earlier runs."""
+    most_rows: ClassVar[int] = MOST_ROWS
+    """Of a chunk; where it is 1 a replicate may go on from what was kept of it."""
+    noun: ClassVar[str] = "replicates"
+    """What progress counts."""
+
+    @property
+    def pieces(self) -> int:
+        """How many of these each replicate has."""
+        return 1
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """(types, vertices, delta, replicates): how many there are of each."""
+        scene = self.config.scene
+        counts = (len(scene.names), len(self.config.shapes.vertices), len(scene.delta))
+        return (*counts, self.config.replicates)
+
+    @property
+    def size(self) -> int:
+        return int(np.prod(self.shape))
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions, in the order of the results file."""
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """The Place of every condition."""
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        return tuple(product(range(len(scene.names)), vertices, scene.delta))
+
+    @property
+    def kinds(self) -> list[Code]:
+        """What stands for the kinds of compiled code that the study needs."""
+        return [(0, self.config.shapes.vertices[0])]
+
+    def first_of(self, code: Code) -> tuple[Condition, int]:
+        """The condition and the replicate that stand for a kind of code."""
+        scene = self.config.scene
+        return Condition(scene.names[code[0]], code[1], scene.delta[0]), 0
+
+    def unneeded(self, place: int) -> list[Interval]:
+        """Replicates of a condition that are not to be run."""
+        return []
+
+    @property
+    def title(self) -> str:
+        """The study in a few words, before "on 2 ranks"."""
+        types, vertices, delta, replicates = self.shape
+        return (
+            f"{self.size} replicates: {types} types x {vertices} numbers of vertices x {delta} "
+            f"displacements x {replicates}"
+        )
+
+    @property
+    def remark(self) -> str:
+        """A further line on it; "" for none."""
+        return ""
+
+    @property
+    def allowed(self) -> float:
+        """How many replicates may fail before the study is given up."""
+        return self.config.stop.failed * self.size
+
+    def asked(self) -> dict[str, Any]:
+        """What the study consists of, for those who look into its journal."""
+        config = self.config
+        return {
+            "types": list(config.scene.names), "vertices": list(config.shapes.vertices),
+            "delta": list(config.scene.delta), "replicates": config.replicates,
+        }  # fmt: skip
+
+    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+        """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
+        raise NotImplementedError
+
+    def run_task(
+        self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
+        keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """(row, None) of one replicate; (row, note) where it failed; row None where it was halted.
+
+        ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
+        """
+        raise NotImplementedError
+
+    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
+        """ValueError for rows that no run can have given."""
+        raise NotImplementedError
+
+    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Which rows are of failed replicates."""
+        raise NotImplementedError
+
+    def check_part(self, description: dict, data: bytes) -> None:
+        """ValueError for what cannot have been kept of a replicate."""
+        raise ValueError("nothing is kept of unfinished replicates")
+
+    def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
+        """ValueError where what is kept of the replicates of rows is not all there."""
+
+    def counts_part(self, description: dict) -> bool:
+        """Whether progress counts what was kept."""
+        return False
+
+    def left_of(self, parts: list[Record], read: Callable[[int, int], bytes]) -> Any:
+        """Where a replicate goes on, by the records of what was kept of it; None: it begins."""
+        return None
+
+
+@attrs.frozen(eq=False)
+class Kind:
+    """What rank 0 asks about a kind of study; ``study`` is a StudyKind, ``results`` what the kind
+    makes of one."""
+
+    make: Callable[..., Any]
+    """(config, flocs, methods) → study."""
+    flocs: Callable[[Config], list]
+    """The flocs that a config's study needs, grown or read."""
+    identity: Callable[..., dict]
+    """(study, facts of the machine or None) → all that its rows follow from."""
+    code: Sequence[str]
+    """Modules of flocsim whose code decides what is in a row."""
+    check: Callable[[Config], object]
+    """Raises the FlocsimError that a config's study would meet."""
+    prepare: Callable[[Any, Any], object]
+    """(study, communicator): the same, of what takes all ranks to look at."""
+    doubts: Callable[[Any], list[str]]
+    """Lines on what is implausible in a study."""
+    facts: Callable[[Any], dict[str, Any]]
+    """(study) → what the results say of it besides their tables, as JSON can hold it."""
+    old_rows: Callable[[Any, ExitStack], OldRows]
+    """(path, resources) → the rows of its results file that is to be extended."""
+    results: Callable[..., Any]
+    """(study, beginning, count, run, communicator, output or None, warn, whether all rows are to
+    be in memory) → results, written to the output."""
+    read: Callable[[Any], Any]
+    """Results from a path."""
+    table: Callable[[Any], str]
+    """The results for the terminal."""
+    total: Callable[[Any], int]
+    """How many replicates results have."""
+    verdict: Callable[[Any], tuple[int, str]]
+    """(exit code, what to say of replicates without an outcome; "" for nothing)."""
+    dry_run: Callable[[Config, int, bool], str]
+    """(config, ranks, with a pilot) → what a study would do."""
+    enough: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda count: False
+    """(study, store) → whether so many replicates of each condition are enough."""

@@ -1,0 +1,145 @@
+"""Studies of pairs and of rates, as rank 0 has them: checks, what they tell, tables from rows."""
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flocsim.ensembles.chunks import COLUMNS, Condition
+from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.pairings import class_facts
+from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.dry_run import dry_run
+from flocsim.ensembles.equivalent_spheres import sphere_facts
+from flocsim.ensembles.estimates.capture import kernel_of
+from flocsim.ensembles.estimates.stop_rule import StopRule
+from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
+from flocsim.ensembles.kernels.study import KernelStudy, study_of
+from flocsim.ensembles.kind import Kind, OldRows
+from flocsim.ensembles.parallel.assembly import assemble
+from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.report import (
+    checked_line,
+    format_table,
+    has_withheld,
+    kernel_lines,
+    touch_lines,
+    undecided_line,
+)
+from flocsim.ensembles.storage.identity import PHYSICS, identity_of
+from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.study import Study, flocs_of
+from flocsim.interruption import WITHHELD
+from flocsim.io.results.file import opened, read_results, scalar_of
+from flocsim.io.results.kernel_group import Kernel
+from flocsim.io.results.row_file import new_row_file
+from flocsim.io.results.schema import Results, as_words
+
+INTERNAL = 70
+
+
+def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+    """The table of replicates of a results file, open until the resources are closed."""
+    file = resources.enter_context(opened(output))
+    rows = file["replicates"]
+    if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
+        raise ValueError("its codes of failures have other words")
+    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
+    places = {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for t, name in enumerate(axes[0])
+        for v, n in enumerate(axes[1])
+        for d, share in enumerate(axes[2])
+    }
+    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    return OldRows(run, rows, places, len(rows["replicate"]))
+
+
+def results(
+    study: Study, start: Beginning, count: int, run: dict, comm: Communicator,
+    output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
+) -> Results:  # fmt: skip
+    """The Results of so many replicates; written to ``output``, if any, by all ranks."""
+    reader = Reader(start.store, (*study.shape[:3], count))
+    kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
+    if output is None:
+        sums = sums_of(reader.codes, len(study.conditions), 0, count)
+        rows = reader.arrays(COLUMNS) if in_memory else None
+        return results_of(study, count, sums, run, rows, kernel)
+    nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
+    # Its tables have no values yet, but their places: where the rows go follows from them.
+    draft = results_of(study, count, nothing, run, kernel=kernel)
+    with new_row_file(output, draft, start.replacing) as file:
+        sums, digests = assemble(reader, file, comm, warn)
+        found = results_of(study, count, sums, run, kernel=kernel)
+        file.complete(found, digests)
+    return found
+
+
+def results_of(
+    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
+    kernel: Kernel | None = None,
+) -> Results:  # fmt: skip
+    """The Results of so many replicates of each condition from their Sums."""
+    config = study.config
+    probabilities, pooled, differences = tables_of(sums)
+    return Results(
+        types=config.scene.names,
+        vertices=np.array(config.shapes.vertices),
+        delta=np.array(config.scene.delta),
+        replicates=replicates,
+        probabilities=probabilities,
+        run=run,
+        failures=FAILURES,
+        flocs=tuple(floc.name for floc in study.flocs),
+        pooled=pooled,
+        differences=differences,
+        count=count,
+        radii=study.radii,
+        kernel=kernel,
+    )
+
+
+def facts(study: Study) -> dict[str, Any]:
+    """What the results say of a study besides their tables."""
+    given = study.config, study.flocs
+    return {
+        "size_classes": json.dumps(class_facts(study.pairings)),
+        "settling": json.dumps(settling_facts(*given)),
+        "equivalent_spheres": json.dumps(sphere_facts(*given)),
+    }
+
+
+def table(found: Results) -> str:
+    """The results for the terminal."""
+    if found.kernel is not None:
+        lines = kernel_lines(found.kernel)
+    else:
+        lines = [format_table(found.types, found.vertices, found.delta, found.probabilities)]
+    return "\n".join([*lines, *filter(None, [*touch_lines(found), checked_line(found)])])
+
+
+def verdict(found: Results) -> tuple[int, str]:
+    """0, or the code of an error where not one replicate has come to an outcome, or of rates that
+    are left open; and what to say of those that have none."""
+    line = undecided_line(found)
+    if not line:
+        return 0, ""
+    counts = found.probabilities
+    if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
+        return INTERNAL, line
+    return (WITHHELD if has_withheld(found) else 0), f"warning: {line}"
+
+
+PAIRS = Kind(
+    make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
+    prepare=lambda study, comm: None, doubts=lambda study: study_doubts(study.config, study.flocs),
+    facts=facts, old_rows=old_rows, results=results, read=partial(read_results, replicates=False),
+    table=table, total=lambda found: int(found.probabilities["n_total"].sum()), verdict=verdict,
+    dry_run=dry_run, enough=lambda study, store: StopRule(study.config.stop, store),
+)  # fmt: skip

@@ -1,0 +1,179 @@
+"""Studies of swarms as rank 0 has them: checks, identity, what they tell, results from records."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flocsim.compiler.fingerprint import fingerprint
+from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.ensembles.chunks import Condition
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kind import Kind, OldRows
+from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.storage.identity import (
+    PHYSICS,
+    config_facts,
+    digest,
+    machine_facts,
+    shape_numbers,
+)
+from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from, table_of
+from flocsim.ensembles.swarms.dry_run import dry_run, largest_pair
+from flocsim.ensembles.swarms.records import Found
+from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
+from flocsim.errors import ConfigError, UsageError
+from flocsim.forces import ContactForce
+from flocsim.io.results.swarm_file import ENDS, SwarmResults, read_swarm, write_swarm
+from flocsim.plausibility.doubts import Names, doubts_of
+from flocsim.swarms.islands import run_islands
+from flocsim.swarms.swarm import check_box
+
+CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
+"""The modules that decide what a swarm does."""
+
+LEFT_OUT = ("scene.checkpoint",)
+"""Keys that change nothing that is computed."""
+
+INTERNAL = 70
+
+
+def check_swarm(config: Config) -> None:
+    """Raise the FlocsimError that the study would meet: forces, sizes, library, room in the box."""
+    if not any(isinstance(force, ContactForce) for force in config.forces):
+        raise ConfigError(
+            "bodies that meet need a contact force, found none among "
+            f"{', '.join(config.force_names)}: add [forces.contact]"
+        )
+    swarm = SwarmStudy(config).first
+    for law in swarm.system.pieces.laws.values():
+        refuse_interpreter(law)
+    refuse_interpreter(run_islands, swarm.fillings())
+
+
+def check_room(study: SwarmStudy, comm: Communicator) -> None:
+    """UsageError on rank 0 where the bodies of a replicate find no place, or its box is too small
+    for them: before the first runs for hours. Every rank looks at its share."""
+    first: tuple[int, str] | None = None
+    for replicate in range(comm.rank, study.config.replicates, comm.size):
+        try:
+            drawn, box, _ = study.placed(replicate)
+            width, height = study.periods(box)
+            check_box(drawn.shapes, (width or math.inf, height or math.inf), study.first.reach)
+        except UsageError as error:
+            first = replicate, str(error)
+            break
+    found = comm.gather(first)
+    if found is None:
+        return
+    if faults := sorted(each for each in found if each is not None):
+        replicate, why = faults[0]
+        raise UsageError(f"swarm {replicate} of {study.config.replicates} (from 0): {why}")
+
+
+def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
+    """{name: text or number} of all that the replicates of a study follow from."""
+    config, swarm = study.config, study.first
+    facts = config_facts(study, ("scene", "shapes", "bodies", "fluid"))
+    facts |= machine or machine_facts(CODE)
+    facts["shapes.vertices"] = list(config.shapes.vertices)
+    shapes = [floc.shapes.get(study.vertices) for floc in study.flocs]
+    numbers = [shape_numbers(shape) for shape in shapes if shape is not None]
+    sizes = [[floc.ratio, floc.size or 0.0] for floc in study.flocs]
+    facts[f"flocs.{study.vertices}"] = digest(np.concatenate([np.ravel(sizes), *numbers]))
+    pieces = swarm.system.pieces
+    numbers = [*pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events]
+    facts["numbers.the swarm"] = digest(np.array(numbers, float))
+    codes = [fingerprint(run_islands, swarm.fillings())]
+    codes += [f"{law} {fingerprint(each, {})}" for law, each in sorted(pieces.laws.items())]
+    facts["kernels.swarms"] = hashlib.blake2b("\n".join(codes).encode(), digest_size=12).hexdigest()
+    for name in LEFT_OUT:
+        facts.pop(name, None)
+    return json.loads(json.dumps(facts))
+
+
+def doubts(study: SwarmStudy) -> list[str]:
+    """Lines on what is implausible."""
+    names = Names(
+        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
+        forces=tuple(f"forces.{name}" for name in study.config.force_names),
+    )  # fmt: skip
+    return doubts_of([largest_pair(study.first)], names)
+
+
+def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+    """The replicates of a results file."""
+    found = read_swarm(output)
+    ends, run = found.groups["ends"], found.run
+    count, vertices = len(ends["finished"]), int(run.get("vertices", 0))
+    trial = int(str(run.get("trial", "0")), 16)
+    columns = {**ends, "trial": np.full(count, trial, "u8")}
+    return OldRows(run, columns, {Condition("swarm", vertices, 0.0): ()}, count, found)
+
+
+def results(
+    study: SwarmStudy, start: Beginning, count: int, run: dict, comm: Communicator,
+    output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
+) -> SwarmResults:  # fmt: skip
+    """The SwarmResults of so many replicates; written to ``output`` where there is one."""
+    store, form, groups = start.store, study.form, {}
+    begun = min(store.old.count, count) if store.old else 0
+    if store.old:
+        groups = first_of(store.old.more, begun)
+    if begun < count:
+        found = [Found.of(store.parts[0, replicate]) for replicate in range(begun, count)]
+        new = groups_of(form, found, store.journal.read)
+        groups = appended(groups, new) if groups else new
+    groups["ends"] = {name: store.read(0, name, 0, count) for name in ENDS}
+    made = results_from(form, groups, run)
+    if output is not None:
+        write_swarm(output, made, start.replacing)
+    return made
+
+
+def first_of(found: SwarmResults, count: int) -> dict[str, dict[str, np.ndarray]]:
+    """The groups of the first replicates of results."""
+    bonds = found.groups["bonds"]
+    kept = bonds["bond_replicate"] < count
+    groups = {
+        group: {name: values[:count] for name, values in columns.items()}
+        for group, columns in found.groups.items() if group != "bonds"
+    }  # fmt: skip
+    return groups | {"bonds": {name: values[kept] for name, values in bonds.items()}}
+
+
+def facts(study: SwarmStudy) -> dict[str, Any]:
+    """What the results say of a study besides their groups."""
+    return {
+        "periodic": study.scene.periodic, "trial": f"{study.trial:016x}",
+        "vertices": study.vertices,
+    }  # fmt: skip
+
+
+def verdict(found: SwarmResults) -> tuple[int, str]:
+    """0, or the code of an error where no swarm has come to its end; what to say of those."""
+    finished = found.groups["ends"]["finished"]
+    missed = int(np.count_nonzero(finished == 0))
+    if not missed:
+        return 0, ""
+    notes = json.loads(found.run.get("failed", "[]"))
+    first = f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
+    line = f"{missed} of {len(finished)} swarms ended before their time; the first: {first}"
+    return (INTERNAL, line) if missed == len(finished) else (0, f"warning: {line}")
+
+
+SWARMS = Kind(
+    make=lambda config, flocs=None, methods=None: SwarmStudy(
+        config, **({} if flocs is None else {"flocs": flocs})
+    ),
+    flocs=flocs_of, identity=identity_of, code=CODE, check=check_swarm, prepare=check_room,
+    doubts=doubts, facts=facts, old_rows=old_rows, results=results, read=read_swarm,
+    table=table_of, total=lambda found: len(found.scales["replicate"]), verdict=verdict,
+    dry_run=lambda config, ranks, pilot: dry_run(config, ranks),
+)  # fmt: skip

@@ -1,0 +1,77 @@
+"""Whoever is killed takes along all that it has started, and what was finished is gone on with."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from flocsim.__main__ import main
+from tests.ensembles.test_matrix import PAIRS
+from tests.helpers.swarm_study import SWARM
+
+SCRIPT = """\
+import flocsim
+flocsim.Study("study.toml").run(jobs=2, output="new.h5", mode="resume")
+"""
+FLOCSIM = [sys.executable, "-m", "flocsim"]
+OVER = ["--over", "fluid.viscosity=1e-3,2e-3"]
+SWEEP = ["sweep", "study.toml", *OVER, "-o", "new.h5", "--jobs", "2"]
+STRENGTH = ["strength", "study.h5", "-o", "new.h5", "--jobs", "2"]
+RUNS = {
+    "sweep": ([*FLOCSIM, *SWEEP], "new.parts/0000.h5.journal", ["--resume"]),
+    "strength": ([*FLOCSIM, *STRENGTH], "new.h5.journal", ["--resume", "--count", "2"]),
+    "Study.run": ([sys.executable, "-c", SCRIPT], "new.h5.journal", []),
+}
+"""What is killed, a file that shows that its processes work, further words that go on with it."""
+
+
+def members(group):
+    """The processes of a group that run; one that nobody has waited for is none."""
+    found = subprocess.run(["ps", "-eo", "pid=,pgid=,stat="], capture_output=True, text=True).stdout
+    rows = [line.split() for line in found.splitlines()]
+    return [int(pid) for pid, of, state in rows if int(of) == group and state[0] != "Z"]
+
+
+def wait_until(holds, seconds):
+    """Whether something holds within so many seconds."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        if holds():
+            return True
+        time.sleep(0.02)
+    return holds()
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("sweep", PAIRS), ("sweep", SWARM), ("strength", PAIRS), ("Study.run", PAIRS),
+     ("Study.run", SWARM)],
+    ids=["sweep", "sweep of swarms", "strength", "Study.run", "Study.run of swarms"],
+)  # fmt: skip
+def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
+    monkeypatch.chdir(tmp_path)
+    more = "replicates = 4000" if text is PAIRS else "replicates = 40"
+    changed = text.replace("replicates = 6", more).replace("replicates = 2", more)
+    (tmp_path / "study.toml").write_text(changed, "utf-8")
+    first, shows, then = RUNS[name]
+    if name == "strength":
+        assert main(["ensemble", "study.toml", "-o", "study.h5", "--quiet", "--jobs", "2"]) == 0
+    running = subprocess.Popen(
+        first, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        path = tmp_path / shows
+        assert wait_until(lambda: path.exists() and b'"first"' in path.read_bytes(), 120.0)
+        assert len(members(running.pid)) > 1
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+        assert wait_until(lambda: not members(running.pid), 3.0), members(running.pid)
+    finally:
+        for each in members(running.pid):
+            os.kill(each, signal.SIGKILL)
+    done = subprocess.run([*first, *then], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "new.h5").exists()

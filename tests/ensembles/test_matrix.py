@@ -1,0 +1,256 @@
+"""What every kind of study can do: each ability works with each kind, or is refused in one line
+that says why."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.io.results.file import read_results
+from flocsim.io.results.strength_file import read_strengths
+from flocsim.io.results.swarm_file import read_swarm
+from tests.helpers.kernel_study import kernel_text
+from tests.helpers.small_study import mpirun
+from tests.helpers.swarm_study import SWARM
+
+PAIRS = """\
+preset = "tang2014"
+seed = 1
+replicates = 6
+[scene]
+types = ["III"]
+delta = [0.25]
+[shapes]
+vertices = [1]
+pool = 2
+"""
+
+
+@attrs.frozen
+class Kind:
+    """A kind of study: the words that run it, those that ask for more, its config, its reader."""
+
+    name: str
+    words: tuple[str, ...]
+    more: tuple[str, ...]
+    text: str
+    read: object
+
+
+FEW = ("--count", "3", "--precision", "0.2")
+KINDS = {
+    each.name: each
+    for each in (
+        Kind("pairs", ("ensemble", "pairs.toml"), ("--replicates", "9"), PAIRS, read_results),
+        Kind("rates", ("kernel", "rates.toml"), ("--replicates", "64"),
+             kernel_text().replace('file = "kernel.h5"', 'file = "rates.h5"'), read_results),
+        Kind("swarms", ("swarm", "swarms.toml"), ("--replicates", "3"),
+             SWARM.replace('file = "swarm.h5"', 'file = "swarms.h5"'), read_swarm),
+        Kind("strengths", ("strength", "pairs.h5", *FEW), ("--count", "5"), "", read_strengths),
+    )
+}  # fmt: skip
+
+REFUSED = {
+    ("sweep", "strengths"): "pairs.h5",
+    ("Study", "strengths"): "pairs.h5",
+    ("compare", "strengths"): "two results of pairs, or two of swarms, can be compared",
+    ("report", "strengths"): "is not a results file, it holds a flocsim strength",
+    ("dry run", "strengths"): "unrecognized arguments: --dry-run",
+    ("export", "pairs"): "is of no kernel study and has no rates",
+    ("export", "swarms"): "is not a results file, it holds a flocsim swarm",
+    ("export", "strengths"): "is not a results file, it holds a flocsim strength",
+}
+"""What is refused, and the words that say why."""
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """A folder with all configs and finished studies."""
+    folder = tmp_path_factory.mktemp("matrix")
+    for kind in KINDS.values():
+        if kind.text:
+            (folder / f"{kind.name}.toml").write_text(kind.text, "utf-8")
+    here = os.getcwd()
+    os.chdir(folder)
+    try:
+        for kind in KINDS.values():
+            assert main([*kind.words, "-o", f"{kind.name}.h5", "--quiet"]) == 0
+    finally:
+        os.chdir(here)
+    return folder
+
+
+@attrs.frozen
+class Cell:
+    """A kind in a folder of its own, with its finished study and those of the others."""
+
+    kind: Kind
+    file: str
+
+    def run(self, *words, output="new.h5"):
+        """The exit code of its command with more words."""
+        out = ["-o", output] if output else []
+        return main([*self.kind.words, *words, *out, "--quiet"])
+
+    def same(self, one, other):
+        """Whether two files hold the same but for where they came from."""
+        a, b = ([*columns(self.kind.read(each))] for each in (one, other))
+        return len(a) > 2 and a == b
+
+
+def columns(found):
+    """The bytes of all arrays of results, whatever their kind."""
+    groups = getattr(found, "groups", None) or {
+        name: group for name in ("replicates", "probabilities", "doublets", "conditions")
+        if (group := getattr(found, name, None)) is not None
+    }  # fmt: skip
+    for group in groups.values():
+        arrays = getattr(group, "columns", group)
+        yield from (np.asarray(getattr(each, "values", each)).tobytes() for each in arrays.values())
+
+
+def in_processes(cell):
+    assert cell.run("--jobs", "2") == 0
+    assert cell.same("new.h5", cell.file)
+
+
+def under_mpirun(cell):
+    words = [mpirun(), "-n", "2", sys.executable, "-m", "flocsim", *cell.kind.words]
+    done = subprocess.run(
+        [*words, "-o", "new.h5", "--quiet"], capture_output=True, text=True, timeout=240
+    )
+    assert done.returncode == 0, done.stderr
+    assert cell.same("new.h5", cell.file)
+
+
+def begun(cell, word):
+    """The command, killed when what it has kept has the word in it."""
+    words = [sys.executable, "-m", "flocsim", *cell.kind.words, "-o", "new.h5"]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True) as running:
+        until = time.monotonic() + 120.0
+        while running.poll() is None and time.monotonic() < until:
+            found = [each for each in ("new.h5.journal", "new.h5") if os.path.exists(each)]
+            if found and word in Path(found[0]).read_bytes():
+                break
+            time.sleep(0.002)
+        running.send_signal(signal.SIGKILL)
+
+
+def resume(cell):
+    begun(cell, b"FLOCREC")
+    assert cell.run("--resume") == 0
+    assert cell.same("new.h5", cell.file)
+
+
+def extend(cell):
+    shutil.copy(cell.file, "new.h5")
+    assert cell.run(*cell.kind.more, "--resume") == 0
+    assert cell.run(*cell.kind.more, output="fresh.h5") == 0
+    assert cell.same("new.h5", "fresh.h5") and not cell.same("new.h5", cell.file)
+
+
+def read_while_running(cell):
+    begun(cell, b'"place"' if cell.kind.name == "swarms" else b'"count"')
+    assert os.path.exists("new.h5.journal")
+    assert main(["info", "new.h5"]) == 0
+    assert main(["plot", "new.h5"]) == 0
+
+
+def opened(cell):
+    found = flocsim.open(cell.file)
+    pytest.importorskip("xarray")
+    assert len(found.to_xarray().data_vars) > 3
+    assert len(found.to_pandas()) > 0
+
+
+def study(cell):
+    if not cell.kind.text:
+        return main(["ensemble", cell.kind.words[1]])
+    found = flocsim.Study(f"{cell.kind.name}.toml").run(output="new.h5")
+    assert "esults(" in repr(found) and cell.same("new.h5", cell.file)
+
+
+def swept(cell):
+    words = ["--over", "fluid.viscosity=1e-3,2e-3", "-o", "swept.h5"]
+    code = main(["sweep", cell.kind.words[1], *words])
+    if code == 0:
+        assert main(["info", "swept.h5"]) == 0 == main(["plot", "swept.h5"])
+        found = flocsim.open("swept.h5").to_xarray()
+        assert found.sizes["viscosity"] == 2
+        more = ["--over", "fluid.viscosity=1e-3,2e-3,3e-3", "-o", "swept.h5", "--resume"]
+        assert main(["sweep", cell.kind.words[1], *more]) == 0
+    return code
+
+
+def compared(cell):
+    return main(["compare", cell.file, cell.file])
+
+
+ABILITIES = {
+    "jobs": in_processes,
+    "mpirun": under_mpirun,
+    "resume": resume,
+    "extend": extend,
+    "read while running": read_while_running,
+    "open": opened,
+    "Study": study,
+    "sweep": swept,
+    "compare": compared,
+    "report": lambda cell: main(["report", cell.file]),
+    "info": lambda cell: main(["info", cell.file]),
+    "plot": lambda cell: main(["plot", cell.file]),
+    "export": lambda cell: main(["export", "csv", cell.file]),
+    "dry run": lambda cell: cell.run("--dry-run", "--no-pilot"),
+}
+CELLS = [(ability, kind) for ability in ABILITIES for kind in KINDS]
+
+
+@pytest.mark.parametrize(("ability", "kind"), CELLS)
+def test_every_kind_has_every_ability_or_says_why_not(
+    home, tmp_path, monkeypatch, capsys, ability, kind
+):
+    shutil.copytree(home, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    cell = Cell(KINDS[kind], f"{kind}.h5")
+    try:
+        code = ABILITIES[ability](cell) or 0
+    except SystemExit as end:
+        code = end.code
+    said = capsys.readouterr()
+    why = REFUSED.get((ability, kind))
+    if why is None:
+        assert code == 0, said.err
+        return
+    lines = [line for line in said.err.splitlines() if not line.startswith(("usage", " "))]
+    assert code in (2, 74) and len(lines) == 1, said.err
+    assert why in lines[0]
+
+
+@pytest.mark.parametrize("kind", ["pairs", "rates", "swarms"])
+def test_what_rows_are_of_is_told_and_held(home, tmp_path, monkeypatch, kind):
+    """Kinds of CPU are recorded; what comes out otherwise than before is not added to."""
+    shutil.copytree(home, tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    cell, file = Cell(KINDS[kind], f"{kind}.h5"), f"{kind}.h5"
+    run = cell.kind.read(file).run
+    assert '"features"' in run["cpus"] and run["identity"] and run["history"] == "[]"
+    from flocsim.ensembles.storage import first_rows
+
+    original = first_rows.stored_rows
+
+    def other(study, store):
+        return {code: each[::-1] + b"x" for code, each in original(study, store).items()}
+
+    monkeypatch.setattr(first_rows, "stored_rows", other)
+    before = Path(file).read_bytes()
+    assert cell.run(*cell.kind.more, "--resume", output=file) == 2
+    assert Path(file).read_bytes() == before

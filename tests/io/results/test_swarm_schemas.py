@@ -1,0 +1,20 @@
+"""Results of swarms that earlier versions wrote are read."""
+
+import gzip
+from pathlib import Path
+
+import flocsim
+from flocsim.__main__ import main
+
+STORED = Path(__file__).parents[2] / "data"
+
+
+def test_files_of_schema_4_are_opened_described_and_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("old.h5").write_bytes(gzip.decompress((STORED / "swarm_4.h5.gz").read_bytes()))
+    found = flocsim.open("old.h5")
+    assert found.groups["snapshots"]["position"].shape == (1, 3, 4, 3)
+    for command in ("info", "plot", "report"):
+        assert main([command, "old.h5"]) == 0
+    assert main(["compare", "old.h5", "old.h5"]) == 0
+    assert "paired" in capsys.readouterr().out
