@@ -25,7 +25,7 @@ pairs = "measured"
 weight = "volume"
 classes = ["13 um"]
 scrambles = 8
-time_limit = "0.5 s"
+time_limit = "5 s"
 [shapes]
 source = "library"
 file = "stars.h5"
