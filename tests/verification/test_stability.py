@@ -29,8 +29,6 @@ SHORT = [index for index in range(130) if family_of(index) in FEW_SCENES]
 
 TYPED = {"REFUSED", *(status.name for status in Status)}
 
-KNOWN_WRONG = 364
-
 
 def assert_right_or_typed(index):
     """The case comes out right, or as a failure with a name."""
@@ -44,16 +42,8 @@ def test_cases_of_few_scenes(index):
     assert_right_or_typed(index)
 
 
-def long_cases():
-    """The other cases; one is known to come out wrong, see docs/benchmarks.md."""
-    known = pytest.mark.xfail(strict=True, reason="an edge passes in 5 ps: 1e-10 m off")
-    for index in range(LONG):
-        if index not in SHORT:
-            yield pytest.param(index, marks=known) if index == KNOWN_WRONG else index
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("index", list(long_cases()))
+@pytest.mark.parametrize("index", [each for each in range(LONG) if each not in SHORT])
 def test_more_cases(index):
     assert_right_or_typed(index)
 
