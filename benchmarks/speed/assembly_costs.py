@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 
 from benchmarks.faults.assembly import resumed, write_study
-from flocsim.ensembles.chunks import Condition
+from flocsim.ensembles.chunks import ROW, Condition
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, sums_of, tables_of
 from flocsim.ensembles.pairs import results_of
@@ -30,7 +30,6 @@ from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.results.layout import frame_of
 from flocsim.io.results.row_file import ROWS, RowFile, new_row_file, plan_of
-from flocsim.io.results.schema import ROW_SIZE
 
 BANDWIDTHS = (5.0, 20.0, 100.0)
 """GB/s at which a file system serves all ranks that read or write parts of one file."""
@@ -123,7 +122,7 @@ class AssemblyCosts:
         often = 1.0 + min(length * writers / rows, 1.0)
         blocks = conditions * (per_condition / counters / ROWS + 1.0)
         reread = 2 * counters * min(blocks, plan.blocks) * ROWS
-        moved = ((often + (2.0 if ranks > 1 else 1.0)) * rows * ROW_SIZE + reread) / 1e9
+        moved = ((often + (2.0 if ranks > 1 else 1.0)) * rows * ROW.itemsize + reread) / 1e9
         blocks = -(-plan.blocks // writers)
         others = often * min(blocks * ROWS, rows) / self.writing + rows / counters / self.counting
         opens = comm.messages / OPENS if ranks > 1 else 0.0

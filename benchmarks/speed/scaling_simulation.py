@@ -16,7 +16,6 @@ from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import Journal
-from flocsim.io.results.schema import ROW_SIZE
 
 LATENCY = SLEEP + 1e-4
 """Seconds between a rank's request and its arrival, half a look for messages each way included."""
@@ -90,7 +89,7 @@ def measure_rank_zero(folder):
         schedule = Schedule.of([[]], [10**9], 1000)
         state = StudyState(schedule, store, lambda stop: False, 1e9)
         record = chunk_record(conditions[0], 0, np.zeros(rows, ROW), "key")
-        start = len(record) - rows * ROW_SIZE
+        start = len(record) - rows * ROW.itemsize
         began = time.perf_counter()
         for _ in range(count):
             chunk = state.next_chunk()

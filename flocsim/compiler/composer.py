@@ -118,7 +118,7 @@ def run_of(module, entry, **readers):
     return known["run"]
 
 
-def machine_code(entry, fillings, name, signature, options, readers=None, arguments=""):
+def machine_code(entry, name, signature, options, readers=None, arguments=""):
     """The entry as a function that numba has compiled for a signature, or loaded from the disk.
 
     ``name``: of the module in which numba looks for it; ``readers``: see run_of; ``arguments``:
@@ -148,7 +148,7 @@ def machine_code(entry, fillings, name, signature, options, readers=None, argume
         return parts[-1]
 
     def link():
-        run.__globals__["driver"] = Linker(fillings, transform).link(entry)
+        run.__globals__["driver"] = Linker({}, transform).link(entry)
 
     module = types.ModuleType(name)
     sys.modules[name] = module  # where numba looks for it when it loads compiled code
@@ -181,14 +181,12 @@ def options_of(allocates):
 
 
 class Compiled:
-    """An entry compiled as module ``name`` at its first call, from the disk where it is there; once
-    more for arguments of other types. What it reaches stays as it is now: it is cloned at once, and
-    for the compiler where that has to run."""
+    """A linked entry compiled as module ``name`` at its first call, or loaded from the disk; once
+    more for arguments of other types."""
 
-    def __init__(self, entry, fillings, name, allocates):
-        self.name, self.allocates = name, allocates
+    def __init__(self, entry, name, allocates):
+        self.entry, self.name, self.allocates = entry, name, allocates
         self.options = options_of(allocates)
-        self.entry = Linker(fillings, lambda clone: clone).link(entry)
         self.made = {}
 
     def __call__(self, *arguments):
@@ -205,9 +203,7 @@ class Compiled:
         places = itertools.accumulate(map(words_in, kinds), initial=0)
         names = self.entry.__code__.co_varnames
         readers = dict(zip(names, map(argument_at, kinds, places), strict=False))
-        return machine_code(
-            self.entry, {}, self.name, (int64,), self.options, readers, repr(kinds)
-        )  # fmt: skip
+        return machine_code(self.entry, self.name, (int64,), self.options, readers, repr(kinds))
 
 
 def compiler_complaint(text):
@@ -241,11 +237,10 @@ def compose(
         refuse_interpreter(entry, fillings)
     key = (fingerprint(entry, fillings, options_text(allocates)), jit)
     if key not in _composed:
+        # Cloned at once: what is reached later, compiled or not, is what it is now.
+        linked = Linker(fillings, lambda clone: clone).link(entry)
         name = f"flocsim_scene_{key[0]}"
-        if jit:
-            _composed[key] = Compiled(entry, fillings, name, allocates)
-        else:
-            _composed[key] = Linker(fillings, lambda clone: clone).link(entry)
+        _composed[key] = Compiled(linked, name, allocates) if jit else linked
     return _composed[key]
 
 
@@ -261,7 +256,7 @@ def compile_law(law: Callable, signature: Any) -> int:
     key = (fingerprint(law, {}, options_text(False)), str(signature))
     if key not in _composed:
         options = {**options_of(False), **UNWRAPPED}
-        dispatcher = machine_code(law, {}, f"flocsim_law_{key[0]}", signature, options)
+        dispatcher = machine_code(law, f"flocsim_law_{key[0]}", signature, options)
         _composed[key] = dispatcher, address_of(dispatcher, signature)
     return _composed[key][1]
 

@@ -8,17 +8,13 @@ the process hangs with all of its threads, deaf to signals.
 import builtins
 import dis
 import functools
-import os
 import sys
 import types
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
-from flocsim.compiler.reads import reached, where
+from flocsim.compiler.reads import PACKAGE, reached, where
 from flocsim.errors import KernelError
-
-PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 OBJECT_MODE = "objmode"
 """numba's name for a way back into Python."""

@@ -28,16 +28,13 @@ import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import address_of_data, is_array
-from flocsim.compiler.reads import is_in_library, names_in, where
+from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.limits import COMPILING, lacking
-
-PACKAGE = str(Path(__file__).parents[1])
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 """Names of what to leave out, to measure what it gains."""
@@ -239,10 +236,9 @@ def libraries():
             """Nothing but its own functions is called from outside: LLVM may then do what it likes
             with the others, as with a C program of one file."""
             module = self._final_module
-            if "internal" not in WITHOUT:
-                for each in module.functions:
-                    if not (each.is_declaration or each.name in self.own):
-                        each.linkage = "internal"
+            for each in module.functions:
+                if not (each.is_declaration or each.name in self.own):
+                    each.linkage = "internal"
             passes, builder = self._codegen._module_pass_manager(
                 loop_vectorize=False, slp_vectorize=False
             )

@@ -7,9 +7,13 @@ import os
 import sys
 import sysconfig
 import types
+from pathlib import Path
 from typing import Any
 
 from flocsim.errors import KernelError
+
+PACKAGE = str(Path(__file__).parents[1]) + os.sep
+"""Where the files of flocsim's own functions lie."""
 
 KNOWN_PACKAGES = {"numpy", "numba"}
 """Packages whose version is part of the hash, as Python's own is."""

@@ -23,8 +23,6 @@ from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, end_with_pa
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 
-INTERNAL = 70
-
 UNSHARED = ("quiet", "run", "read", "command")
 """Arguments in which ranks may differ: the others say what is run."""
 
@@ -250,10 +248,12 @@ def guarded(comm, arguments):
     except KeyboardInterrupt:
         return end_all(comm, "interrupted; go on with --resume", INTERRUPTED)
     except MemoryError:
-        return end_all(comm, "out of memory: ask for fewer ranks on a machine", INTERNAL)
+        return end_all(
+            comm, "out of memory: ask for fewer ranks on a machine", FlocsimError.exit_code
+        )
     except Exception:
         text = f"internal error, please report it:\n{traceback.format_exc()}"
-        return end_all(comm, text, INTERNAL)
+        return end_all(comm, text, FlocsimError.exit_code)
 
 
 def what_is_wrong(arguments, comm):

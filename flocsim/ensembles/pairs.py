@@ -34,13 +34,12 @@ from flocsim.ensembles.report import (
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.study import Study, flocs_of
+from flocsim.errors import FlocsimError
 from flocsim.interruption import WITHHELD
 from flocsim.io.results.file import opened, read_results, scalar_of
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results, as_words
-
-INTERNAL = 70
 
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
@@ -132,7 +131,7 @@ def verdict(found: Results) -> tuple[int, str]:
         return 0, ""
     counts = found.probabilities
     if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
-        return INTERNAL, line
+        return FlocsimError.exit_code, line
     return (WITHHELD if has_withheld(found) else 0), f"warning: {line}"
 
 

@@ -8,7 +8,6 @@ from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.journal.journal import MemoryJournal
-from flocsim.io.results.schema import ROW_SIZE
 
 CONDITION = Condition("I", 1, 0.0)
 NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}
@@ -26,5 +25,5 @@ def result_of(chunk, count=None, failed=0):
     rows = np.zeros(count, ROW)
     rows["steps"] = chunk.first + np.arange(count)
     record = chunk_record(CONDITION, chunk.first, rows, "key")
-    start = len(record) - count * ROW_SIZE
+    start = len(record) - count * ROW.itemsize
     return ChunkResult(chunk, count, record, start, failed, (NOTE,) * failed)

@@ -28,7 +28,7 @@ from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from,
 from flocsim.ensembles.swarms.dry_run import dry_run, largest_pair
 from flocsim.ensembles.swarms.records import Found
 from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
-from flocsim.errors import ConfigError, UsageError
+from flocsim.errors import ConfigError, FlocsimError, UsageError
 from flocsim.forces import ContactForce
 from flocsim.io.results.swarm_file import ENDS, SwarmResults, read_swarm, write_swarm
 from flocsim.plausibility.doubts import Names, doubts_of
@@ -40,8 +40,6 @@ CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/repli
 
 LEFT_OUT = ("scene.checkpoint",)
 """Keys that change nothing that is computed."""
-
-INTERNAL = 70
 
 
 def check_swarm(config: Config) -> None:
@@ -165,7 +163,7 @@ def verdict(found: SwarmResults) -> tuple[int, str]:
     notes = json.loads(found.run.get("failed", "[]"))
     first = f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
     line = f"{missed} of {len(finished)} swarms ended before their time; the first: {first}"
-    return (INTERNAL, line) if missed == len(finished) else (0, f"warning: {line}")
+    return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
 
 
 SWARMS = Kind(

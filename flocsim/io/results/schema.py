@@ -54,8 +54,6 @@ REPLICATES = {  # name: (dtype, units, long name)
 }
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
-ROW_SIZE = sum(np.dtype(kind).itemsize for kind, _, _ in REPLICATES.values())
-"""Bytes of one replicate."""
 
 COUNTS = {
     "n_total": "replicates",
