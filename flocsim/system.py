@@ -211,7 +211,8 @@ class System:
     ) -> Callable:
         """The driver of this family of scenes as one function, compiled unless ``jit=False``."""
         calls = compiled_calls() if jit else {}
-        return compose(entry, {**calls, **self.fillings(observer)}, jit=jit)
+        what = f"the engine for {self.family}"
+        return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 
     def check_overlaps(self) -> None:
         """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones

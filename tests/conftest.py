@@ -1,10 +1,13 @@
 """What every test run shares: one thread per process, no display, repeatable random examples."""
 
+import math
 import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from flocsim.compiler import waiting
 
 # Before numpy or numba is imported: they read these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -14,6 +17,9 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # Compiled scenes of the tests are kept apart from the user's, and from one run to the next.
 CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
 os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
+
+# What a test's commands print must not depend on what was compiled before it.
+waiting.WORTH_SAYING = math.inf
 
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
 settings.register_profile("repeatable", deadline=None, derandomize=True)

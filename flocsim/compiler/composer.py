@@ -15,6 +15,7 @@ numba's symbol table, where two of them can collide and silently return each oth
 """
 
 import builtins
+import contextlib
 import functools
 import hashlib
 import itertools
@@ -29,6 +30,7 @@ from flocsim.compiler.by_pointer import argument_at, table_of, type_of, words_in
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.compiler.reads import is_users_module, module_reads, reached, refuse_closure
+from flocsim.compiler.waiting import compiling
 from flocsim.errors import KernelError
 
 INLINED_SIZE = 400
@@ -118,11 +120,12 @@ def run_of(module, entry, **readers):
     return known["run"]
 
 
-def machine_code(entry, name, signature, options, readers=None, arguments=""):
+def machine_code(entry, name, signature, options, readers=None, arguments="", what=""):
     """The entry as a function that numba has compiled for a signature, or loaded from the disk.
 
     ``name``: of the module in which numba looks for it; ``readers``: see run_of; ``arguments``:
-    what the signature does not tell of these. KernelError where it cannot be compiled.
+    what the signature does not tell of these; ``what`` it is, for who waits. KernelError where it
+    cannot be compiled.
     """
     import numba
 
@@ -149,13 +152,14 @@ def machine_code(entry, name, signature, options, readers=None, arguments=""):
 
     def link():
         run.__globals__["driver"] = Linker({}, transform).link(entry)
+        waiting.enter_context(compiling(what, len(parts)))
 
     module = types.ModuleType(name)
     sys.modules[name] = module  # where numba looks for it when it loads compiled code
     run = run_of(module, entry, **(readers or {}))
     dispatcher = kept_on_disk(numba.njit(run, **options, **for_entry), name, link, arguments)
     try:
-        with quick_typing():
+        with contextlib.ExitStack() as waiting, quick_typing():
             dispatcher.typingctx.refresh()  # has to hear of new intrinsics
             dispatcher.compile(signature)
     except compiler_error() as error:
@@ -182,10 +186,10 @@ def options_of(allocates):
 
 class Compiled:
     """A linked entry compiled as module ``name`` at its first call, or loaded from the disk; once
-    more for arguments of other types."""
+    more for arguments of other types; ``what`` it is in words."""
 
-    def __init__(self, entry, name, allocates):
-        self.entry, self.name, self.allocates = entry, name, allocates
+    def __init__(self, entry, name, allocates, what):
+        self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
         self.options = options_of(allocates)
         self.made = {}
 
@@ -203,7 +207,9 @@ class Compiled:
         places = itertools.accumulate(map(words_in, kinds), initial=0)
         names = self.entry.__code__.co_varnames
         readers = dict(zip(names, map(argument_at, kinds, places), strict=False))
-        return machine_code(self.entry, self.name, (int64,), self.options, readers, repr(kinds))
+        return machine_code(
+            self.entry, self.name, (int64,), self.options, readers, repr(kinds), self.what
+        )
 
 
 def compiler_complaint(text):
@@ -225,12 +231,14 @@ def compose(
     *,
     jit: bool = True,
     allocates: bool = False,
+    what: str = "its kernels",
 ) -> Callable:
     """The driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
-    ``allocates``, whether any of the functions makes an array.
+    ``allocates``, whether any of the functions makes an array; ``what`` it is in words, for who
+    waits while it is compiled.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
     if jit:
@@ -240,7 +248,7 @@ def compose(
         # Cloned at once: what is reached later, compiled or not, is what it is now.
         linked = Linker(fillings, lambda clone: clone).link(entry)
         name = f"flocsim_scene_{key[0]}"
-        _composed[key] = Compiled(linked, name, allocates) if jit else linked
+        _composed[key] = Compiled(linked, name, allocates, what) if jit else linked
     return _composed[key]
 
 

@@ -9,6 +9,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
+from flocsim.compiler import waiting
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
     SerialCommunicator,
@@ -293,6 +294,8 @@ def run_command(arguments: argparse.Namespace) -> int:
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
+    if arguments.quiet:
+        waiting.show_by(waiting.silent)
     return guarded(comm, arguments)
 
 

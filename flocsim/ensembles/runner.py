@@ -53,8 +53,6 @@ from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
 from flocsim.io.terminal import Progress, tell
 
-COMPILING = "compiling what no run on this machine has compiled before …"
-
 
 @attrs.define
 class Ended:
@@ -201,7 +199,7 @@ def chosen(study: Any, comm: Communicator, records: Sequence[dict], quiet: bool)
         choice = recorded_choice(study, records)
         if choice is None:
             if not quiet:
-                tell(f"a pilot chooses method and tolerance; {COMPILING}")
+                tell("a pilot chooses method and tolerance")
             choice = choose(study, lambda study, jobs: share_jobs(study, comm, jobs, True))
         if not quiet:
             for line in choice_lines(choice.record):
@@ -285,9 +283,7 @@ def lead(
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
-        progress.say(COMPILING)
         compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
-        progress.say(f"compiled or loaded in {time.monotonic() - began:.1f} s")
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):

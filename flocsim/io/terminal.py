@@ -10,11 +10,13 @@ import errno
 import io
 import os
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any, TextIO
 
+from flocsim.compiler import waiting
 from flocsim.errors import visible
 
 LINE_SECONDS = 5.0
@@ -42,8 +44,37 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
 
 
+@contextlib.contextmanager
+def counting_seconds(text: str) -> Iterator[None]:
+    """A line on stderr while something works that cannot tell how far it is; on a terminal it
+    counts the seconds."""
+    if not sys.stderr.isatty():
+        tell(f"flocsim: {text}", sys.stderr)
+        yield
+        return
+    began, over = time.monotonic(), threading.Event()
+
+    def show(end=""):
+        renew(f"{text}: {time.monotonic() - began:.0f} s", sys.stderr, end)
+
+    def count():
+        while not over.wait(BAR_SECONDS):
+            show()
+
+    counter = threading.Thread(target=count, daemon=True)
+    counter.start()
+    try:
+        yield
+    finally:
+        over.set()
+        counter.join()
+        show("\n")
+
+
 def plain_warnings(silent: bool = False) -> None:
-    """From now on a warning is one line on stderr, without the place in the code; or none."""
+    """From now on a warning is one line on stderr, without the place in the code, and so is what is
+    compiled; or both are nothing."""
+    waiting.show_by(waiting.silent if silent else counting_seconds)
 
     def show(message, category, filename, lineno, file=None, line=None):
         if not silent:

@@ -157,10 +157,11 @@ class Swarm:
         """A Progress to a time [s] that has yet to begin; ``leaving``: what becomes of bodies that
         leave the box."""
         scene = self.system.scene()._replace(box=self.box)
-        fillings = self.fillings()
+        fillings = {**compiled_calls(), **self.fillings()}
+        what = f"the engine for swarms of {self.system.family}"
         runner = Runner(
-            compose(find_islands, {}), compose(run_islands, {**compiled_calls(), **fillings}),
-            self.integrator, [ThreadArrays(scene) for _ in range(threads)], max_steps,
+            compose(find_islands, {}), compose(run_islands, fillings, what=what), self.integrator,
+            [ThreadArrays(scene) for _ in range(threads)], max_steps,
         )  # fmt: skip
         swarm = swarm_of(scene, *self.system.motion(), self.integrator.fresh_clock())
         return Progress(runner, swarm, self.box, self.reach, until, leaving)

@@ -90,8 +90,9 @@ BESIDE_PYTHON = Path(sys.executable).parent
 
 
 def problems(errors):
-    """The lines on stderr but for warnings."""
-    return [line for line in errors.splitlines() if not line.startswith("flocsim: warning: ")]
+    """The lines on stderr but for warnings and for what is compiled."""
+    said = ("flocsim: warning: ", "flocsim: first run: compiling ")
+    return [line for line in errors.splitlines() if not line.startswith(said)]
 
 
 def write_small(folder, text=SMALL, name="small.toml", **changes):

@@ -130,7 +130,9 @@ class BondGauge:
     def __init__(self, swarm: Any) -> None:
         self.bodies = swarm.bodies
         self.scene = swarm.system.scene()._replace(box=swarm.box)
-        self.judge = compose(judge_bonds, {**compiled_calls(), **swarm.fillings()})
+        self.judge = compose(
+            judge_bonds, {**compiled_calls(), **swarm.fillings()}, what="the proofs of bonds"
+        )
         self.free = np.array([not body.fixed for body in swarm.bodies])
         self.work = self.work_for(64, 1)
         self.settling, self.resistance = alone(swarm)

@@ -1,0 +1,77 @@
+"""What is said while something is compiled."""
+
+import io
+import sys
+
+import pytest
+
+from flocsim.compiler import waiting
+from flocsim.compiler.composer import compose
+from flocsim.io import terminal
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def halved(x):
+    return 0.5 * x
+
+
+def doubled(x):
+    return 2.0 * halved(4.0 * x)
+
+
+@pytest.fixture
+def cold(tmp_path, monkeypatch):
+    """Nothing is compiled yet, and all compiling is worth a line."""
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("flocsim.compiler.composer._composed", {})
+    monkeypatch.setattr(waiting, "WORTH_SAYING", 0.0)
+    monkeypatch.setattr(waiting, "shown", waiting.one_line)
+
+
+def test_the_first_run_says_what_is_compiled_and_the_next_nothing(cold, capsys, monkeypatch):
+    assert compose(doubled, {}, what="a product")(1.5) == 6.0
+    assert capsys.readouterr() == ("", "flocsim: first run: compiling a product, about 5 s, once\n")
+    monkeypatch.setattr("flocsim.compiler.composer._composed", {})
+    assert compose(doubled, {}, what="a product")(1.5) == 6.0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("functions, seconds", [(60, 5), (215, 10), (430, 15), (600, 20)])
+def test_the_time_grows_with_the_number_of_functions(cold, capsys, functions, seconds):
+    with waiting.compiling("it", functions):
+        pass
+    assert f"about {seconds} s" in capsys.readouterr().err
+
+
+def test_short_work_is_not_worth_a_line(capsys, monkeypatch):
+    monkeypatch.setattr(waiting, "WORTH_SAYING", 2.0)
+    with waiting.compiling("it", 40):
+        pass
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_counts_the_seconds_and_ends_with_a_whole_line(monkeypatch):
+    screen = Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(terminal, "BAR_SECONDS", 1e-3)
+    with pytest.raises(ValueError), terminal.counting_seconds("compiling it"):
+        while screen.getvalue().count("\r") < 2:
+            pass
+        raise ValueError
+    lines = screen.getvalue().split("\r")
+    assert all(line.startswith("compiling it: 0 s") for line in lines[1:])
+    assert screen.getvalue().endswith("\n") and screen.getvalue().count("\n") == 1
+
+
+def test_quiet_commands_and_other_ranks_say_nothing(cold, capsys):
+    for silent, said in ((True, 0), (False, 1)):
+        terminal.plain_warnings(silent)
+        with waiting.compiling("it", 100):
+            pass
+        assert capsys.readouterr().err.count("\n") == said
