@@ -7,15 +7,18 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from flocsim.compiler import waiting
+from flocsim.compiler import disk_cache, waiting
 
 # Before numpy or numba is imported: they read these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# Compiled scenes of the tests are kept apart from the user's, and from one run to the next.
-CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
+# Compiled code of the tests is kept apart from the user's, for all checkouts of this machine: a file
+# of it is named by all that it is made of.
+CACHE = disk_cache.own_folder() / "tests"
+if not disk_cache.is_writable(CACHE):
+    CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
 os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
 
 # What a test's commands print must not depend on what was compiled before it.
