@@ -54,7 +54,7 @@ def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, 
 def test_the_path_of_a_new_user(tmp_path):
     for words in (
         ["init", "study.toml"],
-        ["ensemble", "study.toml", "--dry-run", "--no-pilot"],
+        ["ensemble", "study.toml", "--dry-run"],
         ["trajectory", "study.toml", "--vertices", "1", "-o", "strip.png"],
     ):
         done = run_command(tmp_path, *words, module="flocsim")
@@ -76,7 +76,7 @@ def test_flocsim_ensemble_is_the_ensemble_command(tmp_path):
     assert len(done.stdout.splitlines()) == 2
 
 
-@pytest.mark.parametrize("words", [["--dry-run", "--no-pilot"], ["--output", "a.h5"]])
+@pytest.mark.parametrize("words", [["--dry-run"], ["--output", "a.h5"]])
 def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     write_small(tmp_path, vertices="[1]", types='["III"]')  # the others settle implausibly fast
     job = subprocess.Popen(
@@ -115,7 +115,7 @@ def in_shell(folder, line, **more):
         ("FLOCSIM info r.h5 >&-", 74, "flocsim: standard output could not be written: it is"),
         ("FLOCSIM info r.h5 >/dev/full", 74, "flocsim: standard output could not be written: No"),
         (
-            "FLOCSIM ensemble small.toml --dry-run --no-pilot >/dev/full",
+            "FLOCSIM ensemble small.toml --dry-run >/dev/full",
             74,
             "flocsim: standard output could",
         ),

@@ -40,7 +40,7 @@ def add_parser(subparsers: Any) -> None:
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--quiet", action="store_true", help="print warnings and errors only")
     parser.set_defaults(
-        run=run, read=read_survey, heartbeat=SECONDS, dry_run=False, no_pilot=False, parent=None,
+        run=run, read=read_survey, heartbeat=SECONDS, dry_run=False, pilot=False, parent=None,
         plan=None,
     )  # fmt: skip
 

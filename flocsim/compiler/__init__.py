@@ -5,6 +5,7 @@
 ``disk_cache``: what is kept on disk, and what of it is to be trusted.
 ``processor``: what of the machine decides the last digits.
 ``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
+``waiting``: what is said while something is compiled.
 ``by_pointer``: how arguments are handed over.
 ``numba_internals``: all else that leans on numba's private parts.  Imports errors only.
 """

@@ -64,12 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.add_argument(
         "--dry-run", action="store_true",
-        help="say what would be run, and what a pilot of some seconds tells of its core-hours, its "
-        "file and the forces that matter; then stop",
+        help="say what would be run, and what is doubtful; then stop: nothing is compiled or run",
     )  # fmt: skip
     parser.add_argument(
-        "--no-pilot", action="store_true", help="with --dry-run: at once, without the pilot"
-    )
+        "--pilot", action=argparse.BooleanOptionalAction, default=False,
+        help="with --dry-run: run some replicates for some seconds, for what the study takes in "
+        "core-hours, how large its file is, and which forces matter",
+    )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
     parser.set_defaults(read=read_config)
     # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
@@ -217,7 +218,7 @@ def run_rank(comm, arguments):
 
         if comm.rank == 0:
             ranks = max(comm.size, arguments.jobs)
-            tell(kind_of(config).dry_run(config, ranks, not arguments.no_pilot))
+            tell(kind_of(config).dry_run(config, ranks, arguments.pilot))
         return 0
     return study(config, comm, arguments)
 
@@ -263,8 +264,8 @@ def what_is_wrong(arguments, comm):
         return f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}"
     if arguments.jobs < 1:
         return f"--jobs must be at least 1, found {arguments.jobs}"
-    if arguments.no_pilot and not arguments.dry_run:
-        return "--no-pilot is for --dry-run: leave it out"
+    if arguments.pilot and not arguments.dry_run:
+        return "--pilot is for --dry-run: leave it out"
     if arguments.jobs > 1 and comm.size > 1 and not arguments.dry_run:
         return "--jobs is for runs without an MPI launcher: leave out one of the two"
     return ""

@@ -37,6 +37,11 @@ from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
 
+NOTHING_RUN = (
+    "nothing was run (--dry-run); with --pilot some replicates are, for core-hours, the size of "
+    "the file, and which forces matter"
+)
+
 MOST_CHOOSING = 60.0
 """Seconds that a dry run spends on what accuracy = "auto" chooses; a longer pilot is left out."""
 
@@ -239,7 +244,7 @@ def way_words(scene):
     )
 
 
-def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
+def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
     """All that is known of a study before it is run; with a ``pilot``, what some of its replicates
     say as well."""
     scene, shapes, method = config.scene, config.shapes, config.integrator.method
@@ -276,6 +281,6 @@ def dry_run(config: Config, ranks: int, pilot: bool = True) -> str:
         ),
         *(f"warning: {line}" for line in study_doubts(config, measured)),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
-        "nothing was run but the pilot (--dry-run)" if pilot else "nothing was run (--dry-run)",
+        "nothing was run but the pilot (--dry-run)" if pilot else NOTHING_RUN,
     ]
     return "\n".join(lines)

@@ -13,7 +13,7 @@ def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().out
     command = COMMANDS.get(kind, "ensemble")
     assert told.endswith(f"run it with: flocsim {command} 1-{kind}.toml\n")
-    assert main([command, f"1-{kind}.toml", "--dry-run", "--no-pilot"]) == 0
+    assert main([command, f"1-{kind}.toml", "--dry-run"]) == 0
     assert "nothing was run" in capsys.readouterr().out
     assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 2
 

@@ -104,7 +104,7 @@ def test_a_file_without_rates_has_no_tables(folder, capsys):
 
 
 def test_a_dry_run_says_what_would_be_run(folder, capsys):
-    assert main(["kernel", "kernel.toml", "--dry-run", "--no-pilot"]) == 0
+    assert main(["kernel", "kernel.toml", "--dry-run"]) == 0
     assert "shear:10um-20um" in capsys.readouterr().out
 
 

@@ -61,9 +61,7 @@ def test_options_replace_the_configs_values(folder, capsys):
 
 
 def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
-    code, output, errors = call(
-        capsys, "small.toml", "--dry-run", "--no-pilot", "--output", "no/where.h5"
-    )
+    code, output, errors = call(capsys, "small.toml", "--dry-run", "--output", "no/where.h5")
     assert (code, errors) == (0, "")
     assert output.startswith("4 conditions x 3 replicates = 12, seed 1, 1 rank(s), ")
     for said in ("D_0 = 45.35 um", "settling 60.29 and 84.58 mm/s", "in:  StokesDrag(",
@@ -75,7 +73,7 @@ def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
 def test_a_dry_run_names_what_is_left_out(folder, capsys):
     write_small(folder, name="weak.toml", text=(folder / "small.toml").read_text()
                 + '[zone]\ndistance = "1 um"\n[forces.van_der_waals]\nhamaker = 0\n')  # fmt: skip
-    code, output, _ = call(capsys, "weak.toml", "--dry-run", "--no-pilot")
+    code, output, _ = call(capsys, "weak.toml", "--dry-run")
     assert code == 0
     assert "out: VanDerWaals: " in output
 

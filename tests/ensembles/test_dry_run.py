@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from flocsim.__main__ import main
 from flocsim.ensembles import cli, dry_run
 from flocsim.ensembles.pilot import forecast, needless
 from flocsim.errors import FlocsimError
@@ -23,7 +24,7 @@ def spheres(folder, **over):
 
 
 def test_the_pilot_says_what_the_study_takes_and_what_matters(tmp_path, brief):
-    text = dry_run.dry_run(spheres(tmp_path), 2)
+    text = dry_run.dry_run(spheres(tmp_path), 2, pilot=True)
     assert (
         "ran 12 replicates of 4 of the 4 conditions, 4 of them again (0 outcomes flipped); they "
         "ended 12 A"
@@ -39,17 +40,17 @@ def test_the_pilot_says_what_the_study_takes_and_what_matters(tmp_path, brief):
     assert text.endswith("nothing was run but the pilot (--dry-run)")
 
 
-def test_without_a_pilot_it_is_as_it_was(tmp_path, monkeypatch):
+def test_without_a_pilot_nothing_is_run(tmp_path, monkeypatch):
     monkeypatch.setattr(dry_run, "pilot_lines", None)
-    text = dry_run.dry_run(spheres(tmp_path), 1, pilot=False)
+    text = dry_run.dry_run(spheres(tmp_path), 1)
     assert "pilot:" not in text
-    assert text.endswith("nothing was run (--dry-run)")
+    assert "nothing was run (--dry-run); with --pilot some replicates are" in text
 
 
 def test_auto_is_forecast_at_what_it_chooses(tmp_path, brief):
     auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
     config = spheres(tmp_path, **auto)
-    text = dry_run.dry_run(config, 1)
+    text = dry_run.dry_run(config, 1, pilot=True)
     assert re.search(r"pilot:\n  III: implicit, \S+ m, expected flips", text)
 
 
@@ -57,7 +58,7 @@ def test_auto_is_not_waited_for_where_it_takes_long(tmp_path, brief, monkeypatch
     monkeypatch.setattr(dry_run, "MOST_CHOOSING", 0.0)
     auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
     monkeypatch.setattr(dry_run, "choose", None)
-    text = dry_run.dry_run(spheres(tmp_path, **auto), 1)
+    text = dry_run.dry_run(spheres(tmp_path, **auto), 1, pilot=True)
     assert re.search(r"what follows is at Implicit\(tolerance=1e-09", text)
     assert "core-hours: " in text
 
@@ -74,7 +75,7 @@ def test_a_pilot_that_fails_is_one_line_among_the_others(tmp_path, monkeypatch, 
         raise error
 
     monkeypatch.setattr(dry_run, "forecast_study", fail)
-    lines = dry_run.dry_run(spheres(tmp_path), 1).splitlines()
+    lines = dry_run.dry_run(spheres(tmp_path), 1, pilot=True).splitlines()
     assert lines[-2] == f"  none could be run: {words}"
     assert any(line.startswith("stiffness:") for line in lines)
 
@@ -82,7 +83,7 @@ def test_a_pilot_that_fails_is_one_line_among_the_others(tmp_path, monkeypatch, 
 def test_a_machine_without_a_compiler_is_told_the_rest(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     write_small(tmp_path, vertices="[1]")
-    done = run_command(tmp_path, "small.toml", "--dry-run")
+    done = run_command(tmp_path, "small.toml", "--dry-run", "--pilot")
     assert (done.returncode, done.stderr) == (0, "")
     assert "none could be run: NUMBA_DISABLE_JIT is set" in done.stdout
 
@@ -91,15 +92,26 @@ def test_a_signal_ends_the_pilot(tmp_path, monkeypatch, capsys):
     write_small(tmp_path, vertices="[1]")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(dry_run, "stop_requested", lambda: True)
-    assert cli.main(["small.toml", "--dry-run"]) == 75
+    assert cli.main(["small.toml", "--dry-run", "--pilot"]) == 75
     assert capsys.readouterr().out == ""
 
 
-def test_no_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("kind", ["study", "swarm", "kernel", "brownian"])
+def test_a_dry_run_compiles_nothing(tmp_path, monkeypatch, kind):
+    cache = tmp_path / "cache"
+    monkeypatch.setenv("FLOCSIM_CACHE", str(cache))
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "study.toml", "--kind", kind]) == 0
+    done = run_command(tmp_path, "study.toml", "--dry-run")
+    assert done.returncode == 0 and "nothing was run" in done.stdout
+    assert not cache.exists()
+
+
+def test_a_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
     write_small(tmp_path, vertices="[1]")
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["small.toml", "--no-pilot"]) == 2
-    assert capsys.readouterr().err == "flocsim: --no-pilot is for --dry-run: leave it out\n"
+    assert cli.main(["small.toml", "--pilot"]) == 2
+    assert capsys.readouterr().err == "flocsim: --pilot is for --dry-run: leave it out\n"
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
 
 

@@ -37,7 +37,7 @@ def examples(tmp_path):
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_loads_and_describes_itself(path, examples):
     check_study(load_config(examples / path.name))
-    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run", "--no-pilot")
+    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
     assert (done.returncode, problems(done.stderr)) == (0, [])
     assert "nothing was run" in done.stdout
 

@@ -68,7 +68,7 @@ def test_each_mistake_is_one_line(kind, tmp_path, capsys):
         forces = "contact = false\n" if kind == "ContactForce" else ""
         study = SMALL + f'[forces]\n{forces}[forces.own]\nclass = "own:Own"\n'
         path = write_small(folder, study, vertices="[1]")
-        assert main(["ensemble", str(path), "--dry-run", "--no-pilot"]) == 2, name
+        assert main(["ensemble", str(path), "--dry-run"]) == 2, name
         error = capsys.readouterr().err.strip()
         assert "\n" not in error and "Own" in error, (name, error)
         assert f"own.py:{KERNEL_LINE}" in error or f"own.py:{KERNEL_LINE + 2}" in error, error

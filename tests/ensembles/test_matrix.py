@@ -209,7 +209,7 @@ ABILITIES = {
     "info": lambda cell: main(["info", cell.file]),
     "plot": lambda cell: main(["plot", cell.file]),
     "export": lambda cell: main(["export", "csv", cell.file]),
-    "dry run": lambda cell: cell.run("--dry-run", "--no-pilot"),
+    "dry run": lambda cell: cell.run("--dry-run"),
 }
 CELLS = [(ability, kind) for ability in ABILITIES for kind in KINDS]
 

@@ -127,7 +127,7 @@ def test_ranks_are_told_to_use_the_command(tmp_path, monkeypatch):
 
 def test_the_command_reads_its_standard_input(tmp_path):
 
-    words = command("-", "--dry-run", "--no-pilot")
+    words = command("-", "--dry-run")
     done = subprocess.run(words, cwd=tmp_path, input=SMALL, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "small.h5" in done.stdout
