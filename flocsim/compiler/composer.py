@@ -26,6 +26,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import argument_at, table_of, type_of, words_in
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
@@ -198,6 +199,11 @@ class Compiled:
         if kinds not in self.made:
             self.made[kinds] = self.made_for(arguments)
         return self.made[kinds](table.__array_interface__["data"][0])
+
+    @property
+    def is_kept(self):
+        """Whether the disk has it, for some types of arguments."""
+        return disk_cache.has(self.name)
 
     def made_for(self, arguments):
         """The machine code for arguments of such types."""

@@ -153,6 +153,13 @@ def read(name: str, key: str) -> bytes | None:
     return None
 
 
+def has(name: str) -> bool:
+    """Whether something was written under a name; also where nothing can be kept."""
+    looked_at = list(folders())
+    found = any(any(folder.glob(f"{name}-*{SUFFIX}")) for folder in looked_at)
+    return found or not any(map(is_writable, looked_at))
+
+
 def content_of(path):
     """The bytes of an ordinary file of the user's or root's that only they can write; else None."""
     flags = os.O_RDONLY

@@ -30,6 +30,7 @@ from flocsim.ensembles.parallel.communicator import (
 )
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
+from flocsim.ensembles.parallel.processes import beside
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
@@ -319,11 +320,17 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
 
 
 def compile_in_turn(study, comm, stored=()):
-    """Every kind of code is compiled by one rank; then all load what the others made.
+    """Every kind of code is compiled by one rank, or, of one alone, in processes side by side; then
+    all load what the others made.
 
     UsageError where the first rows are not the same on all ranks, and as ``stored``.
     """
-    study.compile(study.kinds[comm.rank :: comm.size])
+    missing = study.uncompiled() if isinstance(comm, SerialCommunicator) else []
+    if len(missing) > 1:
+        with beside(partial(study.compile, missing[1:])):
+            study.compile(missing[:1])
+    else:
+        study.compile(study.kinds[comm.rank :: comm.size])
     comm.barrier()
     rows = first_rows.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))

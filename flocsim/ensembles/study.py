@@ -212,6 +212,12 @@ class Study(StudyKind):
         """
         return {kind: self.run(*kind, self.config.scene.delta[0], 0) for kind in kinds}
 
+    def uncompiled(self) -> list[Code]:
+        """The kinds whose engine is not on the disk."""
+        delta = self.config.scene.delta[0]
+        drivers = {kind: self.driver(self.draw(*kind, delta, 0).encounter) for kind in self.kinds}
+        return [kind for kind, driver in drivers.items() if not driver.is_kept]
+
     def run_task(
         self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
         keep: Keep | None = None, going: Going | None = None,

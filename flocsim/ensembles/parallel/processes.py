@@ -3,6 +3,7 @@
 import contextlib
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
@@ -119,6 +120,40 @@ def start_processes(
     comm = ProcessCommunicator(0, jobs, pipes, others, life)
     INTERRUPTION.leave = comm.abort
     return comm
+
+
+@contextlib.contextmanager
+def beside(work: Callable[[], object]) -> Iterator[None]:
+    """Do some work in a copy of this process while it goes on, for what is left on the disk; not
+    where processes cannot be copied, or there is one processor.
+
+    Nothing is told of it: who needs what it leaves does it again where it is not there.
+    """
+    several = hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
+    if not (several and sys.platform == "linux"):
+        yield
+        return
+    process = multiprocessing.get_context("fork").Process(
+        target=in_silence, args=(work,), daemon=True
+    )
+    process.start()
+    try:
+        yield
+        process.join()
+    finally:
+        process.kill()
+
+
+def in_silence(work):
+    """Work in a copied process, which dies with the first one and by any signal."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_DFL)
+    end_with_parent()
+    with (
+        contextlib.suppress(Exception), open(os.devnull, "w") as nowhere,
+        contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere),
+    ):  # fmt: skip
+        work()
 
 
 def join_job(target, rank, jobs, pipe, life, arguments):
