@@ -200,11 +200,6 @@ class Compiled:
             self.made[kinds] = self.made_for(arguments)
         return self.made[kinds](table.__array_interface__["data"][0])
 
-    @property
-    def is_kept(self):
-        """Whether the disk has it, for some types of arguments."""
-        return disk_cache.has(self.name)
-
     def made_for(self, arguments):
         """The machine code for arguments of such types."""
         from numba import int64
@@ -256,6 +251,11 @@ def compose(
         name = f"flocsim_scene_{key[0]}"
         _composed[key] = Compiled(linked, name, allocates, what) if jit else linked
     return _composed[key]
+
+
+def is_on_disk(driver: Any) -> bool:
+    """Whether a composed driver has been compiled on this machine, for some types of arguments."""
+    return disk_cache.has(driver.name)
 
 
 def compile_law(law: Callable, signature: Any) -> int:

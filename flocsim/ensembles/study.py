@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.compiler.composer import is_on_disk
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
 from flocsim.ensembles.collision.draw import CHECKED, Draw
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
@@ -215,8 +216,10 @@ class Study(StudyKind):
     def uncompiled(self) -> list[Code]:
         """The kinds whose engine is not on the disk."""
         delta = self.config.scene.delta[0]
-        drivers = {kind: self.driver(self.draw(*kind, delta, 0).encounter) for kind in self.kinds}
-        return [kind for kind, driver in drivers.items() if not driver.is_kept]
+        return [
+            kind for kind in self.kinds
+            if not is_on_disk(self.driver(self.draw(*kind, delta, 0).encounter))
+        ]  # fmt: skip
 
     def run_task(
         self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,

@@ -100,10 +100,10 @@ def signed_area(vertices: np.ndarray) -> float:
 
 def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Vectors (k, edges, 2) from the nearest place of each edge to each of the points (k, 2)."""
-    along = ends - starts
-    relative = points[:, None, :] - starts[None]
-    share = np.einsum("kej,ej->ke", relative, along) / np.einsum("ej,ej->e", along, along)
-    return relative - np.clip(share, 0.0, 1.0)[..., None] * along[None]
+    ax, ay = (ends - starts).T
+    x, y = points.T[..., None] - starts.T[:, None]
+    share = np.clip((x * ax + y * ay) / (ax * ax + ay * ay), 0.0, 1.0)
+    return np.stack([x - share * ax, y - share * ay], axis=-1)
 
 
 def distance_to_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -100,15 +100,16 @@ def circle_cuts(origins, directions, found):
 def offset_cuts(origins, directions, found):
     """Where lines (rows) cross the offsets of the edges, on both sides: row numbers and places."""
     starts, units, lengths = found.starts, found.units, found.lengths
-    slope = cross(directions[:, None], units[None])
-    rows, edges = np.nonzero(np.abs(slope) > 1e-12)
-    offset = cross(starts[edges] - origins[rows], units[edges])
+    (dx, dy), (ux, uy) = directions.T[..., None], units.T
+    (x, y) = starts.T[:, None] - origins.T[..., None]
+    slope, alike = dx * uy - dy * ux, dx * ux + dy * uy
+    offset, ahead = x * uy - y * ux, x * ux + y * uy
+    slope = np.where(np.abs(slope) > 1e-12, slope, np.nan)
     cuts = []
     for side in (-found.edge_radius, found.edge_radius):
-        place = (offset + side[edges]) / slope[rows, edges]
-        met = origins[rows] + place[:, None] * directions[rows] - starts[edges]
-        on_edge = beside(np.einsum("ij,ij->i", met, units[edges]), lengths[edges])
-        cuts.append((rows[on_edge], place[on_edge]))
+        place = (offset + side) / slope
+        rows, edges = np.nonzero(beside(place * alike - ahead, lengths))
+        cuts.append((rows, place[rows, edges]))
     return joined(*cuts)
 
 
@@ -331,27 +332,40 @@ def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarra
     return all_moments((Part((vertices,), radius),))[:3]
 
 
-def union_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float]:
-    """The same of all that some parts cover together: outer rings counter-clockwise, those of holes
-    clockwise."""
-    return all_moments(parts)[:3]
+def area_and_growth(parts: Sequence[Part]) -> tuple[float, float]:
+    """Area [m²] of what parts of one radius cover together, and by how much it grows with that
+    radius [m]: the length of the outline, holes included."""
+    if is_disc(parts):
+        return np.pi * parts[0].radius ** 2, 2.0 * np.pi * parts[0].radius
+    (x, y), (dx, dy), weights, _ = outline_nodes(parts)
+    return 0.5 * np.sum(x * dy - y * dx), weights.sum()
 
 
-def all_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float, np.ndarray]:
-    """The same, and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+def is_disc(parts):
+    return len(parts) == len(parts[0].rings) == len(parts[0].rings[0]) == 1
 
-    With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
-    (M₁ − M₂)(cos 2ψ, sin 2ψ).
-    """
-    if len(parts) == len(parts[0].rings) == len(parts[0].rings[0]) == 1:
-        radius, [ring] = parts[0].radius, parts[0].rings
-        return np.pi * radius**2, ring[0].copy(), 0.5 * np.pi * radius**4, np.zeros(2)
+
+def outline_nodes(parts):
+    """(x, y), (dx, dy), weights of the swept outline, and the origin (2,) that they are seen from,
+    amid the cores."""
     origin = np.concatenate([ring for part in parts for ring in part.rings]).mean(axis=0)
     placed = [Part(tuple(ring - origin for ring in part.rings), part.radius) for part in parts]
     found = pieces_of(placed)
     points, tangents, weights = joined(chord_nodes(placed, found), arc_nodes(placed, found))
-    x, y = points.T
-    dx, dy = (tangents * weights[:, None]).T
+    return points.T, (tangents * weights[:, None]).T, weights, origin
+
+
+def all_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float, np.ndarray]:
+    """The same of all that some parts cover together, outer rings counter-clockwise, those of holes
+    clockwise; and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+
+    With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
+    (M₁ − M₂)(cos 2ψ, sin 2ψ).
+    """
+    if is_disc(parts):
+        radius, [ring] = parts[0].radius, parts[0].rings
+        return np.pi * radius**2, ring[0].copy(), 0.5 * np.pi * radius**4, np.zeros(2)
+    (x, y), (dx, dy), _, origin = outline_nodes(parts)
     area = 0.5 * np.sum(x * dy - y * dx)
     centroid = np.array([np.sum(x**2 * dy), -np.sum(y**2 * dx)]) / (2.0 * area)
     polar = np.sum(x**3 * dy - y**3 * dx) / 3.0

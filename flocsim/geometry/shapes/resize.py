@@ -1,57 +1,48 @@
 """A shape of a wanted size with a wanted spheroradius."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.moments import swept_moments, union_moments
+from flocsim.geometry.shapes.moments import area_and_growth
 from flocsim.geometry.shapes.parts import Part, scaled_parts
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 
-ACCURACY = 1e-10
-"""Relative accuracy of the area before the last, uniform correction."""
-
-
-def area_of_scaled(vertices: np.ndarray, factor: float, radius: float) -> float:
-    return swept_moments(vertices * factor, radius)[0]
+SETTLED = 1e-4
+"""Relative error of the area from which one more step of the model below leaves less than 1e-9."""
 
 
 def core_factor(vertices: np.ndarray, radius: float, area: float) -> float:
     """The factor by which the core must be scaled for the swept outline to have an area."""
-    return factor_for(
-        lambda factor: area_of_scaled(vertices, factor, radius), np.pi * radius**2, area
-    )
+    return parts_factor([Part((vertices,), radius)], area)
 
 
 def parts_factor(parts: Sequence[Part], area: float) -> float:
-    """The same of several rings, whose radii stay what they are."""
-    return factor_for(
-        lambda factor: union_moments(scaled_parts(parts, factor, 1.0))[0],
-        np.pi * max(part.radius for part in parts) ** 2, area,
-    )  # fmt: skip
+    """The same of several rings, of one radius, which stays what it is.
 
-
-def factor_for(area_at: Callable[[float], float], disc: float, area: float) -> float:
-    """The factor at which ``area_at`` is an area; ``disc``: what is left of it at 0.
-
-    While the outline keeps its form, the area is disc + b·factor + c·factor²: each trial fits b
-    and c to the two latest areas, which settles it in three or four.
+    While the outline keeps its form, the area is disc + b·factor + c·factor², of which each trial
+    gives b and c: scaled as a whole, radius and all, the area goes with the square, and with the
+    radius alone it grows by the length of the outline.
     """
-    guess = np.sqrt(area / area_at(1.0))
-    trials = [(f, area_at(f)) for f in (1e-3 * guess, guess)]
+    [radius] = {part.radius for part in parts}
+    room = area - np.pi * radius**2
+
+    factor = 1.0
     for _ in range(60):
-        (f, at_f), (g, at_g) = trials[-2:]
-        if abs(at_g - area) <= ACCURACY * area:
-            return g
-        (b, c) = np.linalg.solve([[f, f * f], [g, g * g]], [at_f - disc, at_g - disc])
-        root = b * b + 4.0 * c * (area - disc)
-        step = 2.0 * (area - disc) / (b + np.sqrt(root)) if root > 0.0 else 0.0
+        found, growth = area_and_growth(scaled_parts(parts, factor, 1.0))
+        slope = (2.0 * found - radius * growth) / factor
+        above = found - area + room
+        c = (slope * factor - above) / factor**2
+        b = slope - 2.0 * c * factor
+        root = b * b + 4.0 * c * room
+        step = 2.0 * room / (b + np.sqrt(root)) if root > 0.0 else 0.0
         # Far from the model's reach the area still goes roughly with the square.
-        trial = step if 0.2 * g < step < 5.0 * g else g * np.sqrt(area / at_g)
-        trials.append((trial, area_at(trial)))
-    return trials[-1][0]
+        factor = step if 0.2 * factor < step < 5.0 * factor else factor * np.sqrt(area / found)
+        if abs(found - area) <= SETTLED * area:
+            break
+    return factor
 
 
 def resized(shape: Shape, equivalent_radius: float, radius: float) -> Shape:

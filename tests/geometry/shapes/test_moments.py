@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of, inside_polygon
-from flocsim.geometry.shapes.moments import swept_moments
+from flocsim.geometry.shapes.moments import area_and_growth, swept_moments
+from flocsim.geometry.shapes.parts import Part
 from tests.reference.outline import area_centroid_inertia
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, convex, spiral, star
@@ -48,6 +49,21 @@ def test_convex_outlines_obey_steiner(count, radius):
     polygon = shapely.Polygon(core)
     expected = polygon.area + polygon.length * radius + np.pi * radius**2
     assert swept_moments(core, radius)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("make_core", [convex, star, c_shape, spiral])
+@given(seed=st.integers(0, 40), radius=st.floats(0.02, 0.4))
+def test_the_area_grows_with_the_radius_by_the_length_of_the_outline(make_core, seed, radius):
+    core = random_core(make_core, np.random.default_rng(seed))
+    area, growth = area_and_growth([Part((core,), radius)])
+    assert area == swept_moments(core, radius)[0]
+    assert growth == pytest.approx(shapely.Polygon(core).buffer(radius, 400).length, rel=1e-4)
+
+
+def test_the_outline_of_a_hole_counts():
+    outer, hole = SQUARE * 5.0, (SQUARE * 2.0 + 3.0)[::-1]
+    _, growth = area_and_growth([Part((outer, hole), 0.5)])
+    assert growth == pytest.approx(40 + np.pi + 4 * (4 - 1), rel=1e-13)
 
 
 def ring(mouth):
