@@ -17,6 +17,7 @@ import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, PairView
 from flocsim.compiler.composer import compile_law
+from flocsim.compiler.constants import Intrinsic
 from flocsim.hooks import hook
 
 LAWS = (
@@ -109,36 +110,28 @@ def contact_event(scene, view, which):
     return scene.laws[CONTACT_EVENT](view, scene.parameters, which)
 
 
+VIEWS = (BodyView,) * 3 + (PairView,) * 4 + (ContactView,) * 4
+"""What each law is given, beside the parameters."""
+
+NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1
+"""How many numbers each law returns."""
+
+
 @functools.cache
-def signatures():
-    """{law: its numba signature}."""
+def signature(index: int) -> Any:
+    """The numba signature of a law."""
     from numba import types
 
-    number, parameters = types.float64, types.CPointer(types.float64)
+    number, view, count = types.float64, VIEWS[index], NUMBERS[index]
+    returned = number if count == 1 else types.UniTuple(number, count)
+    more = (types.int64,) if index == CONTACT_EVENT else ()
+    given = types.NamedUniTuple(number, len(view._fields), view)
+    return returned(given, types.CPointer(number), *more)
 
-    def view_type(view):
-        return types.NamedUniTuple(number, len(view._fields), view)
 
-    body, pair, contact = map(view_type, (BodyView, PairView, ContactView))
-
-    def numbers(count):
-        return types.UniTuple(number, count)
-
-    of_body, of_pair = numbers(3)(body, parameters), number(pair, parameters)
-    derivatives_of_body = numbers(9)(body, parameters)
-    derivatives_of_pair = numbers(2)(pair, parameters)
-    return dict(
-        zip(
-            LAWS,
-            (
-                of_body, derivatives_of_body, derivatives_of_body,
-                of_pair, derivatives_of_pair, of_pair, derivatives_of_pair,
-                numbers(2)(contact, parameters), numbers(10)(contact, parameters),
-                number(contact, parameters), number(contact, parameters, types.int64),
-            ),
-            strict=True,
-        )
-    )  # fmt: skip
+def signature_text(index: int) -> str:
+    """The same in words, for what is kept of it."""
+    return f"{LAWS[index]} {VIEWS[index]._fields} {NUMBERS[index]}"
 
 
 def has_address(scene, law):
@@ -149,12 +142,11 @@ def has_address(scene, law):
 @functools.cache
 def compiled_calls() -> dict[Callable, Callable]:
     """{hook: function} that let the compiled engine call laws by their addresses."""
-    from flocsim.compiler.numba_internals import call_by_address
-
     calls: dict[Callable, Callable] = {has: has_address}
-    for index, (law, signature) in enumerate(signatures().items()):
-        more = ", which" if law == "contact_event" else ""
-        names: dict[str, Any] = {"call": call_by_address(signature), "__name__": __name__}
+    for index, law in enumerate(LAWS):
+        more = ", which" if index == CONTACT_EVENT else ""
+        call = Intrinsic(signature_text(index), functools.partial(call_of, index))
+        names: dict[str, Any] = {"call": call, "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
             f"    return call(scene.laws[{index}], view, scene.parameters{more})\n",
@@ -162,6 +154,14 @@ def compiled_calls() -> dict[Callable, Callable]:
         )
         calls[globals()[law]] = names[law]
     return calls
+
+
+@functools.cache
+def call_of(index):
+    """What calls a law by its address, for numba."""
+    from flocsim.compiler.numba_internals import call_by_address
+
+    return call_by_address(signature(index))
 
 
 def law_table(functions: dict[str, Callable], *, jit: bool) -> Any:
@@ -172,7 +172,9 @@ def law_table(functions: dict[str, Callable], *, jit: bool) -> Any:
     if not jit:
         return tuple(functions.get(name) for name in LAWS)
     addresses = [
-        compile_law(functions[name], signatures()[name]) if name in functions else 0
-        for name in LAWS
+        compile_law(functions[name], signature_text(index), functools.partial(signature, index))
+        if name in functions
+        else 0
+        for index, name in enumerate(LAWS)
     ]
     return np.array(addresses, dtype=np.int64)

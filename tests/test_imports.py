@@ -42,7 +42,7 @@ INNER_ROWS = {
         ["composer"],
         ["fingerprint", "interpreter_calls"],
         ["constants", "numba_internals"],
-        ["by_pointer", "disk_cache", "processor", "reads", "waiting"],
+        ["by_pointer", "disk_cache", "object_code", "processor", "reads", "waiting"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "swarms": [

@@ -6,6 +6,7 @@
 ``processor``: what of the machine decides the last digits.
 ``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
 ``waiting``: what is said while something is compiled.
+``object_code``: machine code, loaded without numba.
 ``by_pointer``: how arguments are handed over.
 ``numba_internals``: all else that leans on numba's private parts.  Imports errors only.
 """

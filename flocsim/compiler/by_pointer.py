@@ -63,6 +63,17 @@ def table_of(arguments: Sequence[Any]) -> tuple[np.ndarray, tuple[Any, ...]]:
     return np.frombuffer(struct.pack(LAYOUTS[kinds], *words), np.int64), kinds
 
 
+def told_kinds(kinds: tuple[Any, ...]) -> str:
+    """What the arguments are, in words that differ where what is compiled may: with the names of
+    fields in their order, and sizes that are declared."""
+    return " ".join(
+        f"{each[0].__name__}{each[0]._fields}{sizes_of(each[0])}"
+        if isinstance(each, tuple) and hasattr(each[0], "_fields")
+        else repr(each)
+        for each in kinds
+    )
+
+
 def words_in(kind):
     """How many words of a table hold a value of a numba type."""
     from numba import types

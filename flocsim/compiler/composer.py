@@ -27,12 +27,16 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import argument_at, table_of, type_of, words_in
+from flocsim.compiler.by_pointer import argument_at, table_of, told_kinds, type_of, words_in
+from flocsim.compiler.constants import Intrinsic
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.compiler.object_code import ObjectCode, function_at
+from flocsim.compiler.processor import compiled_for, numba_settings, versions
 from flocsim.compiler.reads import is_users_module, module_reads, reached, refuse_closure
 from flocsim.compiler.waiting import compiling
-from flocsim.errors import KernelError
+from flocsim.errors import FlocsimError, KernelError
+from flocsim.limits import COMPILING, lacking
 
 INLINED_SIZE = 400
 """Functions of less bytecode [bytes] are always inlined; of the others LLVM decides."""
@@ -45,9 +49,6 @@ def apart(function: Callable) -> Callable:
     return function
 
 
-UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Options of functions that only compiled code calls."""
-
 MADE = re.compile(r"<flocsim_(scene|law)_[0-9a-f]+>$")
 """Code that is made here, and says nothing to a user."""
 
@@ -57,10 +58,12 @@ _composed: dict = {}
 class Linker:
     """Clones functions, with others in the place of hooks."""
 
-    def __init__(self, fillings, transform):
-        """``fillings`` {hook: function}; ``transform(clone)`` compiles or not."""
+    def __init__(self, fillings, transform, made=lambda value: value):
+        """``fillings`` {hook: function}; ``transform(clone)`` compiles or not; ``made(value)``:
+        what stands for what is no function."""
         self.fillings = fillings
         self.transform = transform
+        self.made = made
         self.clones = {}
 
     def link(self, function):
@@ -72,8 +75,8 @@ class Linker:
         return self.clones[function]
 
     def linked_value(self, value):
-        """A function linked, anything else as it is."""
-        return self.link(value) if isinstance(value, types.FunctionType) else value
+        """A function linked, anything else as it is, or as numba is to see it."""
+        return self.link(value) if isinstance(value, types.FunctionType) else self.made(value)
 
     def put(self, names, chain, value):
         """Put ``module.name`` among a clone's globals: in a module that has what is read alone.
@@ -121,96 +124,139 @@ def run_of(module, entry, **readers):
     return known["run"]
 
 
-def machine_code(entry, name, signature, options, readers=None, arguments="", what=""):
-    """The entry as a function that numba has compiled for a signature, or loaded from the disk.
+class Code:
+    """A linked entry and how it is compiled: as module ``name``; ``what`` it is in words;
+    ``allocates``, whether it makes arrays."""
 
-    ``name``: of the module in which numba looks for it; ``readers``: see run_of; ``arguments``:
-    what the signature does not tell of these; ``what`` it is, for who waits. KernelError where it
-    cannot be compiled.
-    """
-    import numba
+    def __init__(self, entry, name, allocates=False, what="its kernels"):
+        self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
+        if numba_settings()["DISABLE_JIT"] != "0":
+            raise KernelError(
+                "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs "
+                "compiled code only: unset it (in Python, jit=False runs a scene uncompiled)"
+            )
 
-    from flocsim.compiler.numba_internals import (
-        compiler_error,
-        compilers,
-        forget,
-        kept_on_disk,
-        quick_typing,
-        typed_once,
-    )
+    def key(self, told):
+        """What the machine code depends on beside the name: types, processor, versions."""
+        return repr((told, compiled_for(), versions()))
 
-    for_inner, for_entry = compilers()
-    # Nothing outside calls the inner functions: no wrappers for Python or C, which cost time.
-    inner = {**options, **UNWRAPPED, **for_inner}
+    def loaded(self, told, typed):
+        """(address of its machine code, what it returns), from the disk or compiled; ``told`` tells
+        all that ``typed()``, the signature and the readers of arguments (see run_of), follow from.
+        """
+        key = self.key(told)
+        data = disk_cache.read(self.name, key)
+        if data is not None:
+            # What fails was written by this code, and yet is of no use: it is compiled anew.
+            with contextlib.suppress(Exception):
+                found = ObjectCode.unpacked(data)
+                return found.load(), found.returned
+        signature, readers = typed()
+        with self.compiling(readers) as (run, options, link):
+            from flocsim.compiler.numba_internals import object_code
 
-    parts = []
+            link()
+            found, lasts = object_code(run, signature, options)
+        if lasts:
+            disk_cache.write(self.name, key, found.packed())
+        return found.load(), found.returned
 
-    def transform(clone):
-        clone.__module__ = name
-        small = len(clone.__code__.co_code) < INLINED_SIZE and not hasattr(clone, "apart")
-        parts.append(typed_once(numba.njit(clone, **inner, forceinline=small)))
-        return parts[-1]
+    def dispatcher(self, told, typed):
+        """The entry as numba calls it, which hands over what it allocates."""
+        import numba
 
-    def link():
-        run.__globals__["driver"] = Linker({}, transform).link(entry)
-        waiting.enter_context(compiling(what, len(parts)))
+        from flocsim.compiler.numba_internals import kept_on_disk
 
-    module = types.ModuleType(name)
-    sys.modules[name] = module  # where numba looks for it when it loads compiled code
-    run = run_of(module, entry, **(readers or {}))
-    dispatcher = kept_on_disk(numba.njit(run, **options, **for_entry), name, link, arguments)
-    try:
-        with contextlib.ExitStack() as waiting, quick_typing():
-            dispatcher.typingctx.refresh()  # has to hear of new intrinsics
-            dispatcher.compile(signature)
-    except compiler_error() as error:
-        raise KernelError(compiler_complaint(str(error))) from None
-    finally:
-        run.__globals__.pop("driver", None)
-        forget(parts)
-    return dispatcher
+        signature, readers = typed()
+        with self.compiling(readers) as (run, options, link):
+            found = kept_on_disk(numba.njit(run, **options), self.name, self.key(told), link)
+            found.compile(signature)
+        return found
 
+    @contextlib.contextmanager
+    def compiling(self, readers):
+        """(the function to compile, options of numba.njit for it, what links it), for a while.
 
-def options_of(allocates):
-    """How kernels are compiled: without the interpreter's lock, dividing by zero as numpy does."""
-    from numba import config
+        KernelError where it cannot be compiled.
+        """
+        import numba
 
-    from flocsim.compiler.numba_internals import NO_COUNTING
-
-    if config.DISABLE_JIT:
-        raise KernelError(
-            "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs compiled "
-            "code only: unset it (in Python, jit=False runs a scene uncompiled)"
+        from flocsim.compiler.numba_internals import (
+            NO_COUNTING,
+            UNWRAPPED,
+            compiler_error,
+            compilers,
+            forget,
+            quick_typing,
+            typed_once,
         )
-    return {"nogil": True, "error_model": "numpy", **({} if allocates else NO_COUNTING)}
+
+        # Without the interpreter's lock, dividing by zero as numpy does.
+        options = {"nogil": True, "error_model": "numpy"}
+        options |= {} if self.allocates else NO_COUNTING
+        for_inner, for_entry = compilers()
+        inner = {**options, **UNWRAPPED, **for_inner}
+        parts = []
+
+        def transform(clone):
+            clone.__module__ = self.name
+            small = len(clone.__code__.co_code) < INLINED_SIZE and not hasattr(clone, "apart")
+            parts.append(typed_once(numba.njit(clone, **inner, forceinline=small)))
+            return parts[-1]
+
+        def link():
+            if text := lacking(COMPILING, "compiling"):
+                raise FlocsimError(text)  # LLVM ends the process where it gets no memory
+            run.__globals__["driver"] = Linker({}, transform, made).link(self.entry)
+            waiting.enter_context(compiling(self.what, len(parts)))
+
+        module = types.ModuleType(self.name)
+        sys.modules[self.name] = module  # where numba looks for it when it loads compiled code
+        run = run_of(module, self.entry, **readers)
+        try:
+            with contextlib.ExitStack() as waiting, quick_typing():
+                yield run, {**options, **for_entry}, link
+        except compiler_error() as error:
+            raise KernelError(compiler_complaint(str(error))) from None
+        finally:
+            run.__globals__.pop("driver", None)
+            forget(parts)
+
+
+def made(value):
+    """What numba is to see in the place of a value."""
+    return value.make() if isinstance(value, Intrinsic) else value
 
 
 class Compiled:
-    """A linked entry compiled as module ``name`` at its first call, or loaded from the disk; once
-    more for arguments of other types; ``what`` it is in words."""
+    """A Code that is compiled at its first call, or loaded from the disk; once more for arguments
+    of other types."""
 
-    def __init__(self, entry, name, allocates, what):
-        self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
-        self.options = options_of(allocates)
-        self.made = {}
+    def __init__(self, code):
+        self.code = code
+        self.functions = {}
 
     def __call__(self, *arguments):
         table, kinds = table_of(arguments)
-        if kinds not in self.made:
-            self.made[kinds] = self.made_for(arguments)
-        return self.made[kinds](table.__array_interface__["data"][0])
+        if kinds not in self.functions:
+            self.functions[kinds] = self.function_for(kinds, arguments)
+        return self.functions[kinds](table.__array_interface__["data"][0])
 
-    def made_for(self, arguments):
-        """The machine code for arguments of such types."""
-        from numba import int64
+    def function_for(self, kinds, arguments):
+        """The function of a table's address for arguments of such types."""
+        code = self.code
 
-        kinds = [type_of(each, arrays=self.allocates) for each in arguments]
-        places = itertools.accumulate(map(words_in, kinds), initial=0)
-        names = self.entry.__code__.co_varnames
-        readers = dict(zip(names, map(argument_at, kinds, places), strict=False))
-        return machine_code(
-            self.entry, self.name, (int64,), self.options, readers, repr(kinds), self.what
-        )
+        def typed():
+            from numba import int64
+
+            found = [type_of(each, arrays=code.allocates) for each in arguments]
+            places = itertools.accumulate(map(words_in, found), initial=0)
+            names = code.entry.__code__.co_varnames
+            return (int64,), dict(zip(names, map(argument_at, found, places), strict=False))
+
+        if code.allocates:
+            return code.dispatcher(told_kinds(kinds), typed)
+        return function_at(*code.loaded(told_kinds(kinds), typed))
 
 
 def compiler_complaint(text):
@@ -249,30 +295,28 @@ def compose(
         # Cloned at once: what is reached later, compiled or not, is what it is now.
         linked = Linker(fillings, lambda clone: clone).link(entry)
         name = f"flocsim_scene_{key[0]}"
-        _composed[key] = Compiled(linked, name, allocates, what) if jit else linked
+        _composed[key] = Compiled(Code(linked, name, allocates, what)) if jit else linked
     return _composed[key]
 
 
 def is_on_disk(driver: Any) -> bool:
     """Whether a composed driver has been compiled on this machine, for some types of arguments."""
-    return disk_cache.has(driver.name)
+    return disk_cache.has(driver.code.name)
 
 
-def compile_law(law: Callable, signature: Any) -> int:
-    """The address [int] at which an engine calls a plain function, compiled for a numba signature.
+def compile_law(law: Callable, told: str, signature: Callable[[], Any]) -> int:
+    """The address [int] at which an engine calls a plain function, compiled for a numba signature,
+    of which ``told`` tells all.
 
     Raises KernelError for what captures variables, reads globals that may change, or cannot be
     compiled. The compiled function lives as long as the process.
     """
-    from flocsim.compiler.numba_internals import address_of
-
     refuse_interpreter(law)
-    key = (fingerprint(law, {}, options_text(False)), str(signature))
+    key = (fingerprint(law, {}, options_text(False)), told)
     if key not in _composed:
-        options = {**options_of(False), **UNWRAPPED}
-        dispatcher = machine_code(law, f"flocsim_law_{key[0]}", signature, options)
-        _composed[key] = dispatcher, address_of(dispatcher, signature)
-    return _composed[key][1]
+        code = Code(law, f"flocsim_law_{key[0]}")
+        _composed[key], _ = code.loaded(told, lambda: (signature().args, {}))
+    return _composed[key]
 
 
 @functools.cache

@@ -8,7 +8,8 @@ computed with today and be stale tomorrow.
 
 import enum
 import sys
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from flocsim.compiler.reads import is_versioned
 
@@ -21,8 +22,12 @@ RANDOM = ("random", "numpy.random")
 OF_NUMBA = ("prange", "literally", "literal_unroll")
 """What a kernel may call of numba itself, beside its types as conversions."""
 
-MADE_HERE = "flocsim.compiler.numba_internals"
-"""The module whose intrinsics are in the hash by its source."""
+
+class Intrinsic(NamedTuple):
+    """What compiled code calls and numba has yet to make: its ``name``, and ``make()`` it."""
+
+    name: str
+    make: Callable[[], Any]
 
 
 class Untold(Exception):
@@ -33,6 +38,8 @@ def told(value: Any) -> str:
     """One line that tells a value wholly; Untold where there is none."""
     if type(value) in LITERALS:
         return repr(value)
+    if isinstance(value, Intrinsic):
+        return f"intrinsic {value.name}"
     if type(value) is tuple:
         return f"({', '.join(map(told, value))})"
     if isinstance(value, type):
@@ -103,9 +110,6 @@ def told_of_numba(value):
     for name in OF_NUMBA:
         if getattr(numba, name) is value:
             return f"numba {name}"
-    intrinsic = type(value).__name__ == "_Intrinsic" and getattr(value, "_defn", None)
-    if intrinsic and intrinsic.__module__ == MADE_HERE:
-        return f"intrinsic {intrinsic.__qualname__}"
     return None
 
 

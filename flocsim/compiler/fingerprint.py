@@ -13,11 +13,9 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from flocsim.compiler.constants import Untold, told
+from flocsim.compiler.processor import numba_settings, versions
 from flocsim.compiler.reads import chains, module_reads, reached, refuse_closure, where
 from flocsim.errors import KernelError
-
-PER_INTERPRETER = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "USING_SVML")
-"""Settings of numba that change the machine code, beside the CPU, which names numba's own files."""
 
 
 def code_digest(code):
@@ -51,14 +49,7 @@ def has_docstring(code):
 @functools.cache
 def compiler_text() -> str:
     """What compiles: Python, numba, LLVM, numpy and numba's settings."""
-    import llvmlite
-    import numba
-    import numpy
-
-    config: Any = numba.config
-    settings = [str(getattr(config, name, None)) for name in PER_INTERPRETER]
-    versions = [sys.version, numba.__version__, llvmlite.__version__, numpy.__version__]
-    return "\n".join([*versions, *settings])
+    return f"{versions()}\n{numba_settings()}"
 
 
 def globals_read(function: Any) -> Iterable[tuple[str, Any]]:

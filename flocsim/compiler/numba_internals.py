@@ -10,7 +10,9 @@
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
    says about an error is without colours.
-6. ``kept_on_disk``: numba's own cache unpickles whatever lies in its folder; ours is checked first.
+6. ``object_code``: what numba makes is taken as an object file, which runs without numba.
+   ``kept_on_disk``: the same of what allocates, which does not; numba's own cache unpickles
+   whatever lies in its folder, ours is checked first.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
    hash of a kernel could tell it.
 
@@ -32,9 +34,9 @@ from typing import Any
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import address_of_data, is_array
+from flocsim.compiler.object_code import LENT, ObjectCode
 from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
-from flocsim.errors import FlocsimError, KernelError
-from flocsim.limits import COMPILING, lacking
+from flocsim.errors import KernelError
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 """Names of what to leave out, to measure what it gains."""
@@ -109,69 +111,96 @@ def call_by_address(signature: Any) -> Callable:
     return call
 
 
-def address_of(dispatcher: Any, signature: Any) -> int:
-    """The address of a compiled function of a signature, for ``call_by_address``.
-
-    It holds as long as the dispatcher lives.
-    """
-    compiled = dispatcher.get_compile_result(signature)
-    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of functions that neither Python nor C calls by numba's wrappers, which take time."""
 
 
-def type_text(kind: Any) -> str:
-    """A numba type, or types, in words that differ where what is compiled may: with the names of
-    fields, in their order."""
+def returned_as(kind: Any) -> str:
+    """What a numba type that is returned looks like, for struct.unpack; KernelError for what is
+    neither a number nor a flat tuple of numbers."""
     from numba import types
 
-    if isinstance(kind, tuple | types.BaseTuple):
+    if isinstance(kind, types.BaseTuple):
         parts: Any = kind
-        return f"{getattr(kind, 'fields', '')}({', '.join(map(type_text, parts))})"
-    return str(kind)
+        return "".join(map(returned_as, parts))
+    letters = {
+        types.none: "", types.boolean: "?", types.float64: "d", types.int64: "q",
+        types.uint64: "Q", types.float32: "f", types.int32: "i",
+    }  # fmt: skip
+    plain = types.unliteral(kind)
+    if plain not in letters:
+        raise KernelError(f"a compiled function returns {kind}: let it return numbers")
+    return letters[plain]
 
 
-def kept_on_disk(
-    dispatcher: Any, name: str, link: Callable[[], None] = lambda: None, arguments: str = ""
-) -> Any:
-    """The function, loaded from flocsim.compiler.disk_cache where it is there, and put there else.
+class Taker:
+    """What numba asks for compiled code, and hands it to: ``results``."""
 
-    ``name`` is one that only functions which do the same have; ``link`` is called before it is
-    compiled; ``arguments`` tells what the signature does not.
-    """
-    import llvmlite
+    def __init__(self):
+        from numba.core.caching import NullCache
+
+        self.asked, self.results = NullCache(), []
+
+    def __getattr__(self, name):
+        return getattr(self.asked, name)
+
+    def load_overload(self, sig, target_context):
+        """None: it has to be compiled."""
+        target_context.refresh()
+
+    def save_overload(self, sig, data):
+        """Take what has been compiled."""
+        self.results.append(data)
+
+
+def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, bool]:
+    """The machine code of a function of a signature, and whether another process can use it: not
+    where it holds addresses of this one."""
     import numba
-    from numba.core.caching import NullCache
+
+    dispatcher: Any = numba.njit(function, **options, **UNWRAPPED)
+    dispatcher._cache = taker = Taker()
+    dispatcher.typingctx.refresh()  # has to hear of new intrinsics
+    dispatcher.compile(signature)
+    [result] = taker.results
+    library = result.library
+    declared = [each.name for each in library._final_module.functions if each.is_declaration]
+    found = ObjectCode(
+        library._get_compiled_object(), result.fndesc.llvm_func_name,
+        returned_as(result.signature.return_type),
+        any(name.encode().startswith(LENT) for name in declared),
+    )  # fmt: skip
+    return found, not library.has_dynamic_globals
+
+
+def kept_on_disk(dispatcher: Any, name: str, key: str, link: Callable[[], None]) -> Any:
+    """A function that allocates, loaded from flocsim.compiler.disk_cache where it is there, and put
+    there else. ``link`` is called before it is compiled."""
     from numba.core.compiler import CompileResult
     from numba.core.serialize import dumps
 
-    class DiskCache(NullCache):
+    class DiskCache(Taker):
         """What numba asks for compiled code, and tells of it."""
-
-        def key(self, signature, codegen):
-            """What compiled code depends on beside its name: types, processor, versions."""
-            versions = sys.version, numba.__version__, llvmlite.__version__
-            return repr((type_text(signature), arguments, codegen.magic_tuple(), versions))
 
         def load_overload(self, sig, target_context):
             """The compiled function for a signature; None where there is none to be relied upon."""
-            target_context.refresh()
-            data = disk_cache.read(name, self.key(sig, target_context.codegen()))
+            super().load_overload(sig, target_context)
+            data = disk_cache.read(name, key)
             if data is not None:
                 # What fails was written by this code, and yet is of no use: it is compiled anew.
                 with contextlib.suppress(Exception):
                     return CompileResult._rebuild(target_context, *pickle.loads(data))
-            if text := lacking(COMPILING, "compiling"):
-                raise FlocsimError(text)  # LLVM ends the process where it gets no memory
             link()
             return None
 
         def save_overload(self, sig, data):
             """Keep what has been compiled, unless it holds addresses of this process."""
             if not data.library.has_dynamic_globals:
-                key = self.key(sig, data.codegen)
                 disk_cache.write(name, key, dumps(data._reduce()))
                 data.library._shared_module = None  # made to be written
 
     dispatcher._cache = DiskCache()
+    dispatcher.typingctx.refresh()
     return dispatcher
 
 
@@ -464,6 +493,8 @@ def refuse_extensions(functions: Iterable[Any], values: Iterable[Any]) -> None:
     ``values``: what they read beside functions. What a function of the user's own is taught for
     (@overload of it, @register_jitable) does not matter: such a function is compiled as it stands.
     """
+    if "numba" not in sys.modules:
+        return
     from numba.core.imputils import builtin_registry as lowering
     from numba.core.typing.templates import builtin_registry as typing
 

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from flocsim.compiler.by_pointer import table_of
+from flocsim.compiler.by_pointer import table_of, told_kinds
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError
 
@@ -155,3 +155,23 @@ def test_a_table_holds_addresses_sizes_and_numbers_bit_by_bit():
     assert table[1:3].tolist() == [2, 3] and table[4] == -1
     assert table[[3, 5, 6]].view(np.float64).tolist() == [0.5, 1.0, 2.0]
     assert kinds == table_of([array.copy(), (0.25, 8), View(0.0, 1.0)])[1]
+
+
+def test_what_arguments_are_is_told_with_names_of_fields_and_declared_sizes():
+    class First(NamedTuple):
+        a: np.ndarray
+        b: np.ndarray
+
+    class Second(NamedTuple):
+        b: np.ndarray
+        a: np.ndarray
+
+    class Third(NamedTuple):
+        a: Annotated[np.ndarray, (3,)]
+        b: np.ndarray
+
+    Second.__name__ = Third.__name__ = "First"
+    texts = [
+        told_kinds(table_of([each(np.ones(3), np.ones(3))])[1]) for each in (First, Second, Third)
+    ]
+    assert len(set(texts)) == 3

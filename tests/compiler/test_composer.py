@@ -210,7 +210,9 @@ def test_a_law_is_called_by_its_address_and_compiled_anew_only_where_it_was_edit
 
     def answer(*edits):
         monkeypatch.setattr(composer, "_composed", {})
-        return scale(compile_law(load(*edits).scaled_view, SIGNATURE), 3.0, np.ones(1))
+        return scale(
+            compile_law(load(*edits).scaled_view, "scaled", lambda: SIGNATURE), 3.0, np.ones(1)
+        )
 
     def files():
         return sorted(path.name for path in (tmp_path / "cache").rglob("*.code"))
@@ -224,7 +226,7 @@ def test_a_law_is_called_by_its_address_and_compiled_anew_only_where_it_was_edit
 
 def test_a_law_that_cannot_be_compiled_is_named_by_file_and_line(load):
     with pytest.raises(KernelError, match=r"kernels\.py:\d+: .*use plain arithmetic on scalars"):
-        compile_law(load().unknown, SIGNATURE)
+        compile_law(load().unknown, "unknown", lambda: SIGNATURE)
 
 
 def test_a_closure_is_refused_by_file_and_line():

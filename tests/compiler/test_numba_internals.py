@@ -3,7 +3,6 @@
 import gc
 import re
 import sys
-from collections import namedtuple
 from pathlib import Path
 
 import numba
@@ -16,15 +15,16 @@ from flocsim.compiler import composer, numba_internals
 from flocsim.compiler.composer import compose
 from flocsim.compiler.numba_internals import (
     NO_COUNTING,
-    address_of,
     call_by_address,
     compilers,
     kept_on_disk,
+    object_code,
     quick_typing,
     remembering,
-    type_text,
+    returned_as,
     typed_once,
 )
+from flocsim.errors import KernelError
 
 ONE = numba.float64(numba.float64, numba.types.CPointer(numba.float64))
 
@@ -82,14 +82,23 @@ def calling(address, x, parameters):
     return by_address(address, x, parameters)
 
 
+OPTIONS = {"nogil": True, **NO_COUNTING}
+
+
+def address_of(function):
+    """The address of a compiled function (number, parameters)."""
+    with quick_typing():
+        code, lasts = object_code(function, ONE.args, {**OPTIONS, **compilers()[1]})
+    assert lasts
+    return code.load()
+
+
 def test_a_function_is_called_by_its_address():
-    function = numba.njit(ONE)(scaled)
-    assert calling(address_of(function, ONE), 3.0, np.array([2.0])) == 6.0
+    assert calling(address_of(scaled), 3.0, np.array([2.0])) == 6.0
 
 
 def test_what_a_function_raises_comes_through_a_call_by_address():
-    function = numba.njit(ONE)(failing)
-    address = address_of(function, ONE)
+    address = address_of(failing)
     assert calling(address, 3.0, np.ones(1)) == 3.0
     with pytest.raises(ValueError, match="below zero"):
         calling(address, -3.0, np.ones(1))
@@ -110,12 +119,18 @@ def test_inner_functions_are_linked_and_have_no_machine_code(fresh):
 
 
 def test_of_a_whole_program_only_the_entry_can_be_called_from_outside(fresh):
-    compiled = compose(root, {})
-    assert compiled(2.0) == root(2.0)
-    (dispatcher,) = compiled.made.values()
-    (result,) = dispatcher.overloads.values()
-    own = [each.name for each in result.library.get_defined_functions()]
-    assert all("run" in each or "cpython" in each for each in own if "linkonce" not in each)
+    seen = []
+    real = numba_internals.ObjectCode
+
+    def taken(code, entry, *more):
+        seen.append((code, entry))
+        return real(code, entry, *more)
+
+    fresh.setattr(numba_internals, "ObjectCode", taken)
+    assert compose(root, {})(2.0) == root(2.0)
+    [(code, entry)] = seen
+    names = set(re.findall(rb"_ZN\d+[^\0]*", code))
+    assert [name for name in names if b"NumbaEnv" not in name] == [entry.encode()]
 
 
 @pytest.mark.parametrize("name", ["compilers", "typed_once", "quick_typing"])
@@ -162,17 +177,30 @@ def test_what_cannot_be_typed_is_asked_again():
 
 
 def test_compiled_code_is_kept_by_ours_and_never_by_numbas_cache(fresh, tmp_path):
-    kept = kept_on_disk(numba.njit(twice), "twice")
-    assert kept(3.0) == 6.0
-    [path] = tmp_path.iterdir()
-    assert path.suffix == ".code"
-    again = kept_on_disk(numba.njit(twice), "twice")
-    again.compile((types.float64,))
-    assert again.stats.cache_hits == {(types.float64,): 1}
-    assert again(3.0) == 6.0
-    # Another type is other code.
-    assert kept(3) == 6
-    assert len(list(tmp_path.iterdir())) == 2
+    linked = []
+    for key, count in (("number", 1), ("number", 1), ("integer", 2)):
+        kept = kept_on_disk(numba.njit(twice), "twice", key, lambda: linked.append(1))
+        kept.compile((types.float64,))
+        assert kept(3.0) == 6.0 and len(linked) == count
+        assert {path.suffix for path in tmp_path.iterdir()} == {".code"}
+        assert len(list(tmp_path.iterdir())) == count
+
+
+RETURNED = [
+    (types.none, ""), (types.float64, "d"), (types.boolean, "?"), (types.literal(3), "q"),
+    (types.Tuple((types.float64, types.boolean)), "d?"), (types.UniTuple(types.int64, 2), "qq"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "expected"), RETURNED, ids=str)
+def test_what_is_returned_is_read_as_it_lies(kind, expected):
+    assert returned_as(kind) == expected
+
+
+@pytest.mark.parametrize("kind", [types.complex128, types.float64[:], types.unicode_type], ids=str)
+def test_what_is_no_number_is_not_returned(kind):
+    with pytest.raises(KernelError, match="let it return numbers"):
+        returned_as(kind)
 
 
 def test_a_numba_that_is_installed_anywhere_is_not_taken_for_the_users(monkeypatch):
@@ -181,13 +209,6 @@ def test_a_numba_that_is_installed_anywhere_is_not_taken_for_the_users(monkeypat
     assert not is_installed("/home/alice/numba/core/x.py")
     monkeypatch.setattr(numba, "__file__", "/home/alice/numba/__init__.py")
     assert is_installed("/home/alice/numba/core/x.py")
-
-
-def test_the_text_of_a_type_has_the_names_of_fields_in_their_order():
-    first, second = (namedtuple("View", names) for names in ("x y", "y x"))
-    texts = {type_text((types.NamedUniTuple(types.float64, 2, kind),)) for kind in (first, second)}
-    assert len(texts) == 2
-    assert str(ONE.args[1]) in type_text(ONE.args)
 
 
 @pytest.mark.parametrize("collecting", [True, False])

@@ -1,7 +1,8 @@
 """The attraction zone d_c < D_0: where van der Waals attraction and double-layer repulsion balance.
 
 With x = κ d, F_A = F_R reads x² exp(−x) = S, S = H_A κ/(24π ε0 ε_r φ²): sizes cancel. It has two
-roots where S ≤ 4/e², x = −2 W₀(−√S/2) (inner) and −2 W₋₁(−√S/2) (outer), and none above.
+roots where S ≤ 4/e², x = −2 W₀(−√S/2) (inner) and −2 W₋₁(−√S/2) (outer), W Lambert's function, and
+none above.
 """
 
 import math
@@ -14,9 +15,6 @@ from flocsim.forces.base import Force
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
-
-BRANCHES = {"inner": 0, "outer": -1}
-"""Branch of the Lambert function that gives each root."""
 
 
 def attraction_ratio(
@@ -33,8 +31,6 @@ def neutral_distance(
     hamaker: float, potential: float, debye_length: float, permittivity: float, root: str
 ) -> float:
     """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
-    from scipy.special import lambertw
-
     ratio = attraction_ratio(hamaker, potential, debye_length, permittivity)
     if ratio > LARGEST_RATIO:
         raise ZoneError(
@@ -48,8 +44,22 @@ def neutral_distance(
             "no attraction zone: without attraction F_A = F_R has no root; raise "
             "forces.van_der_waals.hamaker, or give zone.distance or zone.centre"
         )
-    x = -2.0 * lambertw(-0.5 * math.sqrt(ratio), BRANCHES[root]).real
-    return float(x * debye_length)
+    return balance(ratio, root) * debye_length
+
+
+def balance(ratio: float, root: str) -> float:
+    """x [-] at which x² exp(−x) is a ratio up to 4/e², below 2 ("inner") or above ("outer").
+
+    Newton's method on 2 ln x − x, which is concave: from outside of a root it comes nearer with
+    every step and never passes it.
+    """
+    x = math.sqrt(ratio) if root == "inner" else 4.0 - 2.0 * math.log(ratio)
+    for _ in range(100):
+        above = 2.0 * math.log(x) - x - math.log(ratio)
+        if above >= 0.0 or x == 2.0:
+            break
+        x -= above / (2.0 / x - 1.0)
+    return x
 
 
 def only_one(forces, kind):

@@ -1,11 +1,17 @@
 """Roots of attraction = repulsion, against the numbers of MODEL sections 5 and 7."""
 
+import math
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import lambertw
 
 from flocsim.arrays import PairView
 from flocsim.ensembles.collision.zone import (
     LARGEST_RATIO,
     attraction_ratio,
+    balance,
     neutral_distance,
     zone_distance,
 )
@@ -129,3 +135,10 @@ def test_the_paper_as_printed_runs_with_a_zone_that_is_given(tmp_path):
     assert Study(small_config(tmp_path, given), flocs=[]).zones == {"I": 45e-6, "III": 45e-6}
     outer = Study(small_config(tmp_path), flocs=[]).zones
     assert outer["I"] == pytest.approx(sum(RADII) + 5924.98e-9, rel=1e-6)
+
+
+@pytest.mark.parametrize(("root", "branch"), [("inner", 0), ("outer", -1)])
+@given(ratio=st.floats(1e-300, 0.999 * LARGEST_RATIO))
+def test_the_balance_is_lamberts_function(root, branch, ratio):
+    expected = -2.0 * lambertw(-0.5 * math.sqrt(ratio), branch).real
+    assert balance(ratio, root) == pytest.approx(expected, rel=1e-12)

@@ -1,0 +1,88 @@
+"""Machine code as numba has made it: object files, kept as they are and loaded by LLVM alone.
+
+Loading numba, and all that it registers, takes longer than a short run; a function that allocates
+nothing needs no more of it than an object file and the name of its entry. What such a function
+returns is numbers: numba's way of calling puts them where a first pointer says, a second one tells
+what was raised, and the answer is whether anything was.
+"""
+
+import ctypes
+import pickle
+import struct
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+LENT = b"numba_", b"NRT_", b"Py", b"_Py", b"__svml"
+"""How names begin of what numba lends to compiled code, once it is loaded itself."""
+
+_lock = threading.Lock()
+_engines: list[Any] = []
+
+
+class ObjectCode(NamedTuple):
+    """``code``, an object file; ``entry``, its symbol; ``returned``, what it returns, as for
+    struct.unpack; ``borrows``, whether it calls what only numba has."""
+
+    code: bytes
+    entry: str
+    returned: str
+    borrows: bool
+
+    def packed(self) -> bytes:
+        """As the disk has it."""
+        head = f"{self.entry}\0{self.returned}\0{int(self.borrows)}\0"
+        return head.encode() + self.code
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> "ObjectCode":
+        entry, returned, borrows, code = data.split(b"\0", 3)
+        return cls(code, entry.decode(), returned.decode(), borrows == b"1")
+
+    def load(self) -> int:
+        """The address of the entry; the code stays as long as the process lives."""
+        import llvmlite.binding as llvm
+
+        if self.borrows:
+            import numba
+
+            numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
+        with _lock:
+            llvm.initialize_native_target()
+            llvm.initialize_native_asmprinter()
+            machine = llvm.Target.from_default_triple().create_target_machine()
+            # One of its own: symbols of two object files may have the same names.
+            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+            engine.add_object_file(llvm.ObjectFileRef.from_data(self.code))
+            engine.finalize_object()
+            _engines.append(engine)
+            return engine.get_function_address(self.entry)
+
+
+def function_at(entry: int, returned: str) -> Callable[[int], Any]:
+    """The entry at an address as a function of an address, which runs without the interpreter's
+    lock; ``returned`` as in ObjectCode."""
+    kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
+    call, layout = kind(entry), struct.Struct(f"@{returned}")
+
+    def function(address):
+        answer, raised = ctypes.create_string_buffer(layout.size or 8), ctypes.c_void_p()
+        if call(ctypes.addressof(answer), ctypes.addressof(raised), address):
+            raise exception_at(raised.value)
+        numbers = layout.unpack_from(answer)
+        return numbers if len(numbers) > 1 else next(iter(numbers), None)
+
+    return function
+
+
+class Raised(ctypes.Structure):
+    """What numba's compiled code tells of an exception: a pickle (class, arguments, place)."""
+
+    _fields_ = [("data", ctypes.c_void_p), ("size", ctypes.c_int32)]
+
+
+def exception_at(address: int | None) -> BaseException:
+    """The exception that compiled code has raised."""
+    found = Raised.from_address(address or 0)
+    kind, arguments, _ = pickle.loads(ctypes.string_at(found.data, found.size))
+    return kind(*(arguments or ()))
