@@ -30,7 +30,7 @@ from flocsim.ensembles.parallel.communicator import (
 )
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
-from flocsim.ensembles.parallel.processes import beside
+from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
@@ -320,17 +320,14 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
 
 
 def compile_in_turn(study, comm, stored=()):
-    """Every kind of code is compiled by one rank, or, of one alone, in processes side by side; then
+    """Every kind of code is compiled by one rank, or, where there is but one, in copies of it; then
     all load what the others made.
 
     UsageError where the first rows are not the same on all ranks, and as ``stored``.
     """
-    missing = study.uncompiled() if isinstance(comm, SerialCommunicator) else []
-    if len(missing) > 1:
-        with beside(partial(study.compile, missing[1:])):
-            study.compile(missing[:1])
-    else:
-        study.compile(study.kinds[comm.rank :: comm.size])
+    if isinstance(comm, SerialCommunicator):
+        in_copies([partial(study.compile, [kind]) for kind in study.uncompiled()])
+    study.compile(study.kinds[comm.rank :: comm.size])
     comm.barrier()
     rows = first_rows.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))

@@ -122,37 +122,44 @@ def start_processes(
     return comm
 
 
-@contextlib.contextmanager
-def beside(work: Callable[[], object]) -> Iterator[None]:
-    """Do some work in a copy of this process while it goes on, for what is left on the disk; not
-    where processes cannot be copied, or there is one processor.
-
-    Nothing is told of it: who needs what it leaves does it again where it is not there.
+def in_copies(works: Sequence[Callable[[], object]]) -> None:
+    """Do some works in copies of this process, for what they leave on the disk: side by side where
+    there are processors enough, and what they take of memory is given back. Nothing is done where
+    processes cannot be copied, and nothing is told: who needs what a work leaves does it again.
     """
-    several = hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
-    if not (several and sys.platform == "linux"):
-        yield
+    if sys.platform != "linux":
         return
-    process = multiprocessing.get_context("fork").Process(
-        target=in_silence, args=(work,), daemon=True
-    )
-    process.start()
+    context = multiprocessing.get_context("fork")
+    copies = [
+        context.Process(target=as_copy, args=(work, place > 0), daemon=True)
+        for place, work in enumerate(works)
+    ]
+    together = len(os.sched_getaffinity(0)) >= len(copies)
     try:
-        yield
-        process.join()
+        for copy in copies:
+            copy.start()
+            if not together:
+                copy.join()
+        for copy in copies:
+            copy.join()
     finally:
-        process.kill()
+        for copy in copies:
+            if copy.pid is not None:
+                copy.kill()
 
 
-def in_silence(work):
-    """Work in a copied process, which dies with the first one and by any signal."""
+def as_copy(work, silent):
+    """Work in a copied process, which dies with the first one and by any signal; unless it is
+    ``silent`` it says what the first one would."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_DFL)
     end_with_parent()
-    with (
-        contextlib.suppress(Exception), open(os.devnull, "w") as nowhere,
-        contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere),
-    ):  # fmt: skip
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.suppress(Exception))
+        if silent:
+            nowhere = stack.enter_context(open(os.devnull, "w"))
+            stack.enter_context(contextlib.redirect_stdout(nowhere))
+            stack.enter_context(contextlib.redirect_stderr(nowhere))
         work()
 
 

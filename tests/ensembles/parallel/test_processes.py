@@ -1,10 +1,12 @@
-"""Work that a copy of the process does beside it."""
+"""What copies of the process do for it."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pytest
@@ -12,16 +14,16 @@ import pytest
 from flocsim.compiler import composer
 from flocsim.ensembles.kinds import flocs_of, study_of
 from flocsim.ensembles.parallel import processes
-from flocsim.ensembles.parallel.processes import beside
+from flocsim.ensembles.parallel.processes import in_copies
 from tests.helpers.small_study import small_config
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux")
 
 
-@pytest.fixture
-def several(monkeypatch):
-    """Two processors, whatever there are."""
-    monkeypatch.setattr(processes.os, "sched_getaffinity", lambda number: {0, 1})
+@pytest.fixture(params=[1, 8])
+def processors(monkeypatch, request):
+    """So many processors, whatever there are."""
+    monkeypatch.setattr(processes.os, "sched_getaffinity", lambda number: set(range(request.param)))
 
 
 def has_ended(number):
@@ -34,54 +36,58 @@ def has_ended(number):
     return False
 
 
-def test_the_work_is_done_in_another_process_by_the_end(tmp_path, several):
-    path = tmp_path / "left"
-    with beside(lambda: (time.sleep(0.2), path.write_text(str(os.getpid())))):
-        assert not path.exists()
-    assert path.read_text() != str(os.getpid())
+def test_works_are_done_in_other_processes_by_the_end(tmp_path, processors):
+    paths = [tmp_path / str(place) for place in range(3)]
+    in_copies([partial(leave, path) for path in paths])
+    numbers = {path.read_text() for path in paths}
+    assert len(numbers) == 3 and str(os.getpid()) not in numbers
 
 
-def test_what_the_work_prints_and_how_it_fails_is_not_told(capfd, several):
-    with beside(lambda: 1 / 0):
-        pass
-    assert capfd.readouterr() == ("", "")
+def leave(path):
+    path.write_text(str(os.getpid()))
 
 
-def test_it_ends_with_what_goes_wrong_here(tmp_path, several):
+def test_the_first_one_speaks_and_how_a_work_fails_is_not_told(capfd, processors):
+    in_copies([partial(print, "one"), partial(print, "two"), lambda: 1 / 0])
+    assert capfd.readouterr() == ("one\n", "")
+
+
+def test_they_end_with_what_goes_wrong_here(tmp_path, monkeypatch):
     path = tmp_path / "number"
 
     def work():
-        path.write_text(str(os.getpid()))
+        leave(path)
         time.sleep(60.0)
 
-    with pytest.raises(ValueError), beside(work):
+    def interrupted(*arguments):
         while not (path.exists() and path.read_text()):
             time.sleep(0.01)
-        raise ValueError
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(BaseProcess, "join", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        in_copies([work])
     assert has_ended(int(path.read_text()))
 
 
 KILLED = """
-import os, sys, time
-from flocsim.ensembles.parallel import processes
-processes.os.sched_getaffinity = lambda number: {0, 1}
-with processes.beside(lambda: (print(os.getpid(), file=open("number", "w"), flush=True),
-                               time.sleep(60.0))):
-    while not (os.path.exists("number") and open("number").read()):
-        time.sleep(0.01)
-    print("ready", flush=True)
+import os, time
+from flocsim.ensembles.parallel.processes import in_copies
+
+def work():
+    print(os.getpid(), flush=True)
     time.sleep(60.0)
+
+in_copies([work])
 """
 
 
-def test_it_ends_with_a_killed_parent(tmp_path):
-    job = subprocess.Popen(
-        [sys.executable, "-c", KILLED], cwd=tmp_path, stdout=subprocess.PIPE, text=True
-    )
-    assert job.stdout.readline() == "ready\n"
+def test_they_end_with_a_killed_parent():
+    job = subprocess.Popen([sys.executable, "-c", KILLED], stdout=subprocess.PIPE, text=True)
+    number = int(job.stdout.readline())
     os.kill(job.pid, signal.SIGKILL)
     job.wait(timeout=20)
-    assert has_ended(int((tmp_path / "number").read_text()))
+    assert has_ended(number)
 
 
 def test_a_study_knows_which_engines_the_disk_has(tmp_path, monkeypatch):
@@ -92,7 +98,7 @@ def test_a_study_knows_which_engines_the_disk_has(tmp_path, monkeypatch):
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
     assert study.uncompiled() == study.kinds
     (tmp_path / "cache").mkdir()
-    name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).name
+    name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).code.name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
     assert study.uncompiled() == study.kinds[1:]
     monkeypatch.setattr(composer.disk_cache, "is_writable", lambda folder: False)
