@@ -93,8 +93,9 @@ def paper_counts(mask, vertices):
     start = even_start(room, vertices, 1.0)
     settings = fit_paper.FORCE, fit_paper.DAMPING, fit_paper.SPACING
     steps = compiled(fit_paper.damped_descent)(
-        room, np.array(start), 1.0, *settings, fit_paper.TIME_STEP, fit_paper.PATIENCE
-    )[1]
+        room, np.array(start), np.array(start), 1.0, *settings, fit_paper.TIME_STEP,
+        fit_paper.PATIENCE,
+    )  # fmt: skip
     began = time.process_time()
     for _ in range(20):
         count_errors(room, start, 1.0)

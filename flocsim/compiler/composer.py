@@ -126,7 +126,7 @@ def run_of(module, entry, **readers):
 
 class Code:
     """A linked entry and how it is compiled: as module ``name``; ``what`` it is in words;
-    ``allocates``, whether it makes arrays."""
+    ``allocates``, whether it makes arrays for itself."""
 
     def __init__(self, entry, name, allocates=False, what="its kernels"):
         self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
@@ -151,76 +151,45 @@ class Code:
             with contextlib.suppress(Exception):
                 found = ObjectCode.unpacked(data)
                 return found.load(), found.returned
-        signature, readers = typed()
-        with self.compiling(readers) as (run, options, link):
-            from flocsim.compiler.numba_internals import object_code
-
-            link()
-            found, lasts = object_code(run, signature, options)
+        found, lasts = self.compiled(*typed())
         if lasts:
             disk_cache.write(self.name, key, found.packed())
         return found.load(), found.returned
 
-    def dispatcher(self, told, typed):
-        """The entry as numba calls it, which hands over what it allocates."""
+    def compiled(self, signature, readers):
+        """(its ObjectCode, whether another process can use it); KernelError where it cannot be
+        compiled."""
         import numba
 
-        from flocsim.compiler.numba_internals import kept_on_disk
-
-        signature, readers = typed()
-        with self.compiling(readers) as (run, options, link):
-            found = kept_on_disk(numba.njit(run, **options), self.name, self.key(told), link)
-            found.compile(signature)
-        return found
-
-    @contextlib.contextmanager
-    def compiling(self, readers):
-        """(the function to compile, options of numba.njit for it, what links it), for a while.
-
-        KernelError where it cannot be compiled.
-        """
-        import numba
-
-        from flocsim.compiler.numba_internals import (
-            NO_COUNTING,
-            UNWRAPPED,
-            compiler_error,
-            compilers,
-            forget,
-            quick_typing,
-            typed_once,
-        )
+        from flocsim.compiler import numba_internals as internals
 
         # Without the interpreter's lock, dividing by zero as numpy does.
-        options = {"nogil": True, "error_model": "numpy"}
-        options |= {} if self.allocates else NO_COUNTING
-        for_inner, for_entry = compilers()
-        inner = {**options, **UNWRAPPED, **for_inner}
+        options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
+        options |= {} if self.allocates else internals.NO_COUNTING
+        for_inner, for_entry = internals.compilers()
         parts = []
 
         def transform(clone):
             clone.__module__ = self.name
             small = len(clone.__code__.co_code) < INLINED_SIZE and not hasattr(clone, "apart")
-            parts.append(typed_once(numba.njit(clone, **inner, forceinline=small)))
+            inner = numba.njit(clone, **options, **for_inner, forceinline=small)
+            parts.append(internals.typed_once(inner))
             return parts[-1]
 
-        def link():
-            if text := lacking(COMPILING, "compiling"):
-                raise FlocsimError(text)  # LLVM ends the process where it gets no memory
-            run.__globals__["driver"] = Linker({}, transform, made).link(self.entry)
-            waiting.enter_context(compiling(self.what, len(parts)))
-
+        if text := lacking(COMPILING, "compiling"):
+            raise FlocsimError(text)  # LLVM ends the process where it gets no memory
         module = types.ModuleType(self.name)
-        sys.modules[self.name] = module  # where numba looks for it when it loads compiled code
+        sys.modules[self.name] = module  # where numba looks for its name
         run = run_of(module, self.entry, **readers)
+        run.__globals__["driver"] = Linker({}, transform, made).link(self.entry)
         try:
-            with contextlib.ExitStack() as waiting, quick_typing():
-                yield run, {**options, **for_entry}, link
-        except compiler_error() as error:
+            with compiling(self.what, len(parts)), internals.quick_typing():
+                return internals.object_code(run, signature, {**options, **for_entry})
+        except internals.compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         finally:
-            run.__globals__.pop("driver", None)
-            forget(parts)
+            del sys.modules[self.name]
+            internals.forget(parts)
 
 
 def made(value):
@@ -254,8 +223,6 @@ class Compiled:
             names = code.entry.__code__.co_varnames
             return (int64,), dict(zip(names, map(argument_at, found, places), strict=False))
 
-        if code.allocates:
-            return code.dispatcher(told_kinds(kinds), typed)
         return function_at(*code.loaded(told_kinds(kinds), typed))
 
 
@@ -284,8 +251,8 @@ def compose(
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
-    ``allocates``, whether any of the functions makes an array; ``what`` it is in words, for who
-    waits while it is compiled.
+    ``allocates``, whether any of the functions makes an array, for itself; ``what`` it is in words,
+    for who waits while it is compiled.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
     if jit:

@@ -11,8 +11,6 @@
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
    says about an error is without colours.
 6. ``object_code``: what numba makes is taken as an object file, which runs without numba.
-   ``kept_on_disk``: the same of what allocates, which does not; numba's own cache unpickles
-   whatever lies in its folder, ours is checked first.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
    hash of a kernel could tell it.
 
@@ -26,13 +24,11 @@ import gc
 import inspect
 import operator
 import os
-import pickle
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import address_of_data, is_array
 from flocsim.compiler.object_code import LENT, ObjectCode
 from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
@@ -133,36 +129,16 @@ def returned_as(kind: Any) -> str:
     return letters[plain]
 
 
-class Taker:
-    """What numba asks for compiled code, and hands it to: ``results``."""
-
-    def __init__(self):
-        from numba.core.caching import NullCache
-
-        self.asked, self.results = NullCache(), []
-
-    def __getattr__(self, name):
-        return getattr(self.asked, name)
-
-    def load_overload(self, sig, target_context):
-        """None: it has to be compiled."""
-        target_context.refresh()
-
-    def save_overload(self, sig, data):
-        """Take what has been compiled."""
-        self.results.append(data)
-
-
 def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, bool]:
     """The machine code of a function of a signature, and whether another process can use it: not
     where it holds addresses of this one."""
     import numba
 
-    dispatcher: Any = numba.njit(function, **options, **UNWRAPPED)
-    dispatcher._cache = taker = Taker()
+    dispatcher: Any = numba.njit(function, **options)
     dispatcher.typingctx.refresh()  # has to hear of new intrinsics
+    dispatcher.targetctx.refresh()
     dispatcher.compile(signature)
-    [result] = taker.results
+    [result] = dispatcher.overloads.values()
     library = result.library
     declared = [each.name for each in library._final_module.functions if each.is_declaration]
     found = ObjectCode(
@@ -171,37 +147,6 @@ def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCod
         any(name.encode().startswith(LENT) for name in declared),
     )  # fmt: skip
     return found, not library.has_dynamic_globals
-
-
-def kept_on_disk(dispatcher: Any, name: str, key: str, link: Callable[[], None]) -> Any:
-    """A function that allocates, loaded from flocsim.compiler.disk_cache where it is there, and put
-    there else. ``link`` is called before it is compiled."""
-    from numba.core.compiler import CompileResult
-    from numba.core.serialize import dumps
-
-    class DiskCache(Taker):
-        """What numba asks for compiled code, and tells of it."""
-
-        def load_overload(self, sig, target_context):
-            """The compiled function for a signature; None where there is none to be relied upon."""
-            super().load_overload(sig, target_context)
-            data = disk_cache.read(name, key)
-            if data is not None:
-                # What fails was written by this code, and yet is of no use: it is compiled anew.
-                with contextlib.suppress(Exception):
-                    return CompileResult._rebuild(target_context, *pickle.loads(data))
-            link()
-            return None
-
-        def save_overload(self, sig, data):
-            """Keep what has been compiled, unless it holds addresses of this process."""
-            if not data.library.has_dynamic_globals:
-                disk_cache.write(name, key, dumps(data._reduce()))
-                data.library._shared_module = None  # made to be written
-
-    dispatcher._cache = DiskCache()
-    dispatcher.typingctx.refresh()
-    return dispatcher
 
 
 class NoEnvironment:

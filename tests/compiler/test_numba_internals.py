@@ -15,9 +15,9 @@ from flocsim.compiler import composer, numba_internals
 from flocsim.compiler.composer import compose
 from flocsim.compiler.numba_internals import (
     NO_COUNTING,
+    UNWRAPPED,
     call_by_address,
     compilers,
-    kept_on_disk,
     object_code,
     quick_typing,
     remembering,
@@ -82,7 +82,7 @@ def calling(address, x, parameters):
     return by_address(address, x, parameters)
 
 
-OPTIONS = {"nogil": True, **NO_COUNTING}
+OPTIONS = {"nogil": True, **NO_COUNTING, **UNWRAPPED}
 
 
 def address_of(function):
@@ -174,16 +174,6 @@ def test_what_cannot_be_typed_is_asked_again():
     for _ in range(2):
         with pytest.raises(TypeError):
             memory("plus", None, (), {})
-
-
-def test_compiled_code_is_kept_by_ours_and_never_by_numbas_cache(fresh, tmp_path):
-    linked = []
-    for key, count in (("number", 1), ("number", 1), ("integer", 2)):
-        kept = kept_on_disk(numba.njit(twice), "twice", key, lambda: linked.append(1))
-        kept.compile((types.float64,))
-        assert kept(3.0) == 6.0 and len(linked) == count
-        assert {path.suffix for path in tmp_path.iterdir()} == {".code"}
-        assert len(list(tmp_path.iterdir())) == count
 
 
 RETURNED = [

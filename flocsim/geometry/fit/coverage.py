@@ -43,15 +43,21 @@ def cover(vertices, radius, shape):
     """Counts per pixel: (edges crossed to the right are odd, edges within the radius)."""
     odd = np.zeros(shape, np.bool_)
     near = np.zeros(shape, np.int32)
+    count_edges(vertices, radius, odd, near)
+    return odd, near
+
+
+def count_edges(vertices, radius, odd, near):
+    """The same into arrays (h, w) of zeros."""
+    rows, columns = odd.shape
     count = len(vertices)
     for k in range(count):
         ax, ay = vertices[k]
         bx, by = vertices[(k + 1) % count]
-        for row in range(shape[0]):
-            for column in range(first_pixel(crossing(ax, ay, bx, by, row), shape[1])):
+        for row in range(rows):
+            for column in range(first_pixel(crossing(ax, ay, bx, by, row), columns)):
                 odd[row, column] = not odd[row, column]
         add_edge(near, ax, ay, bx, by, radius)
-    return odd, near
 
 
 def add_edge(near, ax, ay, bx, by, radius):
@@ -79,10 +85,20 @@ def count_wrong(mask, odd, near):
     return wrong, excess
 
 
+def crossed_and_near(
+    shape: tuple[int, int], vertices: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels (h, w) bool whose centres the polygon has inside, and those within the radius of
+    its edges."""
+    odd, near = np.zeros(shape, bool), np.zeros(shape, np.int32)
+    compiled(count_edges)(np.array(vertices), radius, odd, near)
+    return odd, near > 0
+
+
 def covered(shape: tuple[int, int], vertices: np.ndarray, radius: float) -> np.ndarray:
     """The pixels (h, w) bool whose centres the swept polygon covers."""
-    odd, near = compiled(cover)(np.array(vertices), radius, shape)
-    return odd | (near > 0)
+    odd, near = crossed_and_near(shape, vertices, radius)
+    return odd | near
 
 
 def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int]:

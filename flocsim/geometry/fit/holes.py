@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.geometry.fit.coverage import compiled, cover
+from flocsim.geometry.fit.coverage import compiled, crossed_and_near
 from flocsim.geometry.fit.search import COARSE, DIRECTIONS, FINE, hole_search
 from flocsim.geometry.fit.simple import is_simple
 from flocsim.geometry.fit.starts import even_points, telling_points, trace_outline
@@ -95,7 +95,7 @@ def ring_around(inside: np.ndarray, count: int, reach: float) -> np.ndarray:
     wide = distance_transform_edt(~inside) <= reach
     outline = trace_outline(wide)
     points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    return compiled(telling_points)(points, count)
+    return telling_points(points, count)
 
 
 def searched_hole(
@@ -110,8 +110,8 @@ def searched_hole(
 
 def wrong_in_hole(mask: np.ndarray, ring: np.ndarray, radius: float) -> tuple[int, int]:
     """(V, pixels covered outside of the mask) around one hole; ``mask``: all but the hole."""
-    odd, near = compiled(cover)(np.array(ring), radius, mask.shape)
-    solid = ~odd | (near > 0)
+    inside, near = crossed_and_near(mask.shape, ring, radius)
+    solid = ~inside | near
     return int(np.count_nonzero(solid != mask)), int(np.count_nonzero(solid & ~mask))
 
 
@@ -125,8 +125,8 @@ def wrong_with_holes(
     around = np.pad(mask, margin)
     inside, close = np.zeros(around.shape, bool), np.zeros(around.shape, bool)
     for ring in rings:
-        odd, near = compiled(cover)(ring * (1.0, -1.0) + margin, radius, around.shape)
+        odd, near = crossed_and_near(around.shape, ring * (1.0, -1.0) + margin, radius)
         inside ^= odd
-        close |= near > 0
+        close |= near
     solid = inside | close
     return int(np.count_nonzero(solid != around)), int(np.count_nonzero(solid & ~around))

@@ -56,11 +56,13 @@ def advance(mask, odd, near, vertices, velocities, k, radius, step):
     return change
 
 
-def damped_descent(mask, vertices, radius, force, damping, spacing, step, patience):
-    """The vertices (N, 2) of the least V on the way of the damped motion, and the steps taken."""
+def damped_descent(mask, vertices, best, radius, force, damping, spacing, step, patience):
+    """The vertices (N, 2) of the least V on the way of the damped motion into ``best``; the steps
+    taken."""
     odd, near = cover(vertices, radius, mask.shape)
     wrong = least = count_wrong(mask, odd, near)[0]
-    best, velocities = vertices.copy(), np.zeros_like(vertices)
+    best[:] = vertices
+    velocities = np.zeros_like(vertices)
     steps = waited = 0
     while waited < patience and least > 0:
         for k in range(len(vertices)):
@@ -72,10 +74,13 @@ def damped_descent(mask, vertices, radius, force, damping, spacing, step, patien
         steps, waited = steps + 1, waited + 1
         if wrong < least:
             best[:], least, waited = vertices, wrong, 0
-    return best, steps
+    return steps
 
 
 def paper_fit(mask: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
     """The vertices (N, 2) that the paper's motion leads to from a start, which it leaves alone."""
-    descend = compiled(damped_descent)
-    return descend(mask, np.array(start), radius, FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE)[0]
+    vertices, best = np.array(start), np.empty_like(start)
+    compiled(damped_descent)(
+        mask, vertices, best, radius, FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE
+    )
+    return best

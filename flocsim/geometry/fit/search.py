@@ -197,16 +197,15 @@ def insertion_gain(mask, odd, near, vertices, k, radius, steps):
     return gain
 
 
-def estimates(mask, vertices, radius, steps):
-    """(N, 2): growth of V when a vertex is left out; insertion_gain of the edge after it [px]."""
+def estimates(mask, vertices, radius, steps, found):
+    """Growth of V when a vertex is left out, and insertion_gain of the edge after it [px], into
+    ``found`` (N, 2)."""
     odd, near = cover(vertices, radius, mask.shape)
-    found = np.empty((len(vertices), 2))
     for k in range(len(vertices)):
         before, here, after = neighbours(vertices, k)
         cost, _ = move_vertex(mask, odd, near, before, here, after, before, radius, False)
         found[k, 0] = cost
         found[k, 1] = insertion_gain(mask, odd, near, vertices, k, radius, steps)
-    return found
 
 
 def promising_pairs(costs, gains):
@@ -231,14 +230,16 @@ def moved(vertices, removed, edge):
 def relocate(mask, vertices, objective, radius, weights):
     """Take the first promising move of a vertex that lowers the objective, again and again."""
     while len(vertices) > 2 and objective > 0:
-        costs, gains = compiled(estimates)(mask, vertices, radius, MOVE_STEPS).T
+        found = np.empty((len(vertices), 2))
+        compiled(estimates)(mask, vertices, radius, MOVE_STEPS, found)
+        costs, gains = found.T
         for removed, edge in promising_pairs(costs, gains):
             start, nearby = moved(vertices, removed, edge)
             if not is_simple(start):
                 continue
-            trial, found = searched(mask, start, radius, MOVE_STEPS, weights, nearby)
-            if found < objective:
-                vertices, objective = trial, found
+            trial, reached = searched(mask, start, radius, MOVE_STEPS, weights, nearby)
+            if reached < objective:
+                vertices, objective = trial, reached
                 break
         else:
             break
@@ -288,7 +289,7 @@ def _splits(outline, count):
 
 def _telling(outline, count):
     points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    return compiled(telling_points)(points, count)
+    return telling_points(points, count)
 
 
 def _split_coarser(mask, outline, count, radius):

@@ -99,15 +99,21 @@ def triangle(points, before, k, after):
     return abs(ux * wy - uy * wx)
 
 
-def telling_points(points, count):
+def telling_points(points: np.ndarray, count: int) -> np.ndarray:
     """The `count` points that tell most of a closed outline (Visvalingam and Whyatt 1993).
 
     The point that spans the smallest triangle with its neighbours is left out, again and again.
     """
+    areas = np.empty(len(points))
+    compiled(leave_out)(points, count, areas)
+    return points[np.isfinite(areas)]
+
+
+def leave_out(points, count, areas):
+    """Twice the areas of the triangles of all but `count` points, inf where one is left out."""
     size = len(points)
     before, after = np.arange(size) - 1, np.arange(size) + 1
     before[0], after[size - 1] = size - 1, 0
-    areas = np.empty(size)
     for k in range(size):
         areas[k] = triangle(points, before[k], k, after[k])
     for _ in range(size - count):
@@ -117,7 +123,6 @@ def telling_points(points, count):
         after[left], before[right] = right, left
         areas[left] = triangle(points, before[left], left, right)
         areas[right] = triangle(points, left, right, after[right])
-    return points[np.isfinite(areas)]
 
 
 def moment_sums(points):
@@ -143,11 +148,16 @@ def run_costs(points, longest):
     return np.sqrt((steps + 1.0) * np.maximum(least, 0.0))
 
 
-def best_breaks(costs, count, start):
-    """The `count` breaks, the first at `start`, of the split of least total cost.
+def best_breaks(costs: np.ndarray, count: int, start: int) -> np.ndarray:
+    """The `count` breaks, the first at `start`, of the split of least total cost."""
+    breaks = np.empty(count, np.int64)
+    compiled(split_costs)(costs, start, breaks)
+    return breaks
 
-    Plain Python, compiled.
-    """
+
+def split_costs(costs, start, breaks):
+    """The same into an array."""
+    count = len(breaks)
     size, longest = costs.shape[0], costs.shape[1] - 1
     least = np.empty((count + 1, size + 1))
     chosen = np.zeros((count + 1, size + 1), np.int64)
@@ -162,12 +172,10 @@ def best_breaks(costs, count, start):
                 if total < least[k, place]:
                     least[k, place] = total
                     chosen[k, place] = steps
-    breaks = np.empty(count, np.int64)
     place = size
     for k in range(count, 0, -1):
         place -= chosen[k, place]
         breaks[k - 1] = (start + place) % size
-    return breaks
 
 
 def corners(points, breaks):
@@ -210,7 +218,7 @@ def split_corners(points: np.ndarray, count: int, start: int, rounds: int) -> np
     size = len(points)
     longest = size // 2 if count < SPACINGS else SPACINGS * size // count
     costs = run_costs(points, min(longest, size - 1))
-    breaks = compiled(best_breaks)(costs, count, start)
+    breaks = best_breaks(costs, count, start)
     for _ in range(rounds):
-        breaks = compiled(best_breaks)(costs, count, int(breaks[count // 2]))
+        breaks = best_breaks(costs, count, int(breaks[count // 2]))
     return corners(points, breaks)
