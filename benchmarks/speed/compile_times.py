@@ -7,6 +7,7 @@ its first steps; cold ones start with an empty cache folder, all others with wha
 have compiled. ``--private`` also tells what a cold start costs without each private part of numba
 that flocsim leans on (flocsim.compiler.numba_internals); ``--against`` starts the flocsim of
 another commit beside this one, each scene twice and in both orders: the smaller CPU time counts.
+It also runs commands that compile nothing, each six times, in turn: the least CPU time counts.
 """
 
 import os
@@ -16,6 +17,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+import numpy as np
 
 from benchmarks.reporting import ROOT, Table, parse_arguments, print_heading
 from benchmarks.speed.against_commit import other_tree
@@ -142,6 +145,62 @@ def beside(commit):
     return table
 
 
+COMMANDS = (
+    ["--help"],
+    ["ensemble", "one.toml", "--overwrite", "--quiet"],
+    ["info", "one.h5"],
+)
+"""What is run where everything is compiled; the second makes what the third reads."""
+
+ONE = """
+preset = "tang2014"
+seed = 1
+replicates = 1
+[scene]
+types = ["I"]
+delta = [0.5]
+[shapes]
+source = "synthetic"
+vertices = [16]
+pool = 10
+"""
+
+
+def commanded(tree, words, folder):
+    """(CPU time [s], wall time [s], memory at most [MB]) of a command of the flocsim of a tree."""
+    environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": f"{folder}/cache"}
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flocsim", *words], env=environment, cwd=folder,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    _, status, found = os.wait4(process.pid, 0)
+    assert status == 0, words
+    wall = time.perf_counter() - began
+    return found.ru_utime + found.ru_stime, wall, found.ru_maxrss / 1024
+
+
+def warm_commands(commit):
+    """The table of commands that compile nothing, here and at another commit."""
+    heads = ("flocsim …", "CPU there [s]", "here [s]", "ratio", "wall here [s]",
+             "memory there [MB]", "here [MB]")  # fmt: skip
+    table = Table(f"Commands that compile nothing beside {commit}", heads)
+    with tempfile.TemporaryDirectory() as folder:
+        there = other_tree(commit, Path(folder))
+        places = {tree: Path(folder) / name for tree, name in ((there, "there"), (ROOT, "here"))}
+        for place in places.values():
+            place.mkdir()
+            (place / "one.toml").write_text(ONE)
+        for words in COMMANDS:
+            found = {tree: [] for tree in places}
+            for tree in 7 * [there, ROOT]:
+                found[tree].append(commanded(tree, words, places[tree]))
+            # The first one compiles.
+            old, new = (np.array(each[1:]).min(axis=0) for each in found.values())
+            table.add(" ".join(words[:1]), old[0], new[0], new[0] / old[0], new[1], old[2], new[2])
+    return table
+
+
 def main():
     """Print the tables."""
     more = {"action": "store_true", "help": "tell what each private part of numba saves, too"}
@@ -150,6 +209,7 @@ def main():
     print_heading()
     if arguments.against:
         beside(arguments.against).print(arguments.markdown)
+        warm_commands(arguments.against).print(arguments.markdown)
         return
     starts(arguments.quick).print(arguments.markdown)
     if arguments.private:
