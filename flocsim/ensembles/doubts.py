@@ -7,7 +7,8 @@ Of flocs of measured sizes it looks at the largest of each collision type, which
 from collections.abc import Sequence
 
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import pairings, sphere_pairs
 from flocsim.plausibility.doubts import Names, doubts_of
 from flocsim.plausibility.ranges import ROUNDING

@@ -8,7 +8,8 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts, class_words
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.equivalent_spheres import sphere_facts, sphere_words
 from flocsim.ensembles.kernels.study import study_of
@@ -232,7 +233,7 @@ def piloted(config, ranks):
 
 def way_words(scene):
     """How the bodies of a scene meet, in words."""
-    if scene.meetings == (BROWNIAN,):
+    if scene.meeting == BROWNIAN:
         return f"brownian: from {scene.release:g} to {scene.escape:g} (r_i + r_j) apart"
     return (
         f"delta {list(scene.delta)} of the {scene.delta_max} delta_max, receiver {scene.receiver}"

@@ -12,7 +12,8 @@ from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.impact import too_deep
 from flocsim.errors import ConfigError, KernelError
 from flocsim.forces import ContactForce
@@ -75,7 +76,7 @@ def check_study(config: Config) -> None:
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
         )
-    if config.scene.meetings == (BROWNIAN,):
+    if config.scene.meeting == BROWNIAN:
         check_release(config, flocs)
     for name, pair in sphere_pairs(config, flocs):
         check_approach(config, name, pair)
@@ -95,7 +96,6 @@ def check_study(config: Config) -> None:
 def check_release(config: Config, flocs: Sequence[Floc]) -> None:
     """ConfigError where outlines may touch as they are let go; of grown flocs it is not known."""
     release, pool = config.scene.release, pool_of(config.shapes, flocs)
-    assert release is not None
     shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
     shapes += [
         pool.shape(place, n, radius)

@@ -7,6 +7,7 @@ rung of both methods and takes the time.
 import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -74,10 +75,10 @@ class Measured:
 def part_of(config: Config, args: Namespace) -> Config:
     """The config with the type, N and δ alone that were named."""
     place, vertices, delta = select(config, args)
-    scene = config.scene
+    scene: Any = config.scene
     if args.type is not None:
         scene = scene.only([place])
-    if args.delta is not None:
+    if len(scene.delta) > 1 and args.delta is not None:
         scene = attrs.evolve(scene, delta=(delta,))
     if args.vertices is not None:
         config = with_one_count(config, vertices)

@@ -15,7 +15,8 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
-from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
+from flocsim.ensembles.config.pair_scene import SETTLING, PairScene
+from flocsim.ensembles.config.schema import Config
 from flocsim.errors import ConfigError
 
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
@@ -141,7 +142,7 @@ def median(values, weights):
     return float(values[quantile(weights, 0.5)])
 
 
-def size_classes(scene: SceneConfig, flocs: Sequence[Floc]) -> list[SizeClass]:
+def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
     """The classes of ``[scene] pairs = "measured"``; ConfigError for one without flocs."""
     sizes = np.array([floc.size for floc in flocs], float)
     low, high = scene.min_radius or 0.0, scene.max_radius or math.inf

@@ -9,7 +9,8 @@ import numpy as np
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.schema import SETTLING, Config
+from flocsim.ensembles.config.pair_scene import SETTLING
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels.sampling import (
     as_draws,
     flow_offset,
