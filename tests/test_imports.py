@@ -86,7 +86,7 @@ INNER_ROWS = {
         ["config", "chunks"],
     ],
     "io": [
-        ["plots"],
+        ["plots", "contents"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
         ["outputs", "opening", "groups"],

@@ -131,13 +131,8 @@ def label(name):
 def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
-    from flocsim.io import trajectory
-    from flocsim.io.files import held
-    from flocsim.io.opening import kind_of
-    from flocsim.io.results import strength_file, swarm_file, sweep_file
-    from flocsim.io.results.file import read_results
-    from flocsim.io.results.layout import FORMAT
-    from flocsim.io.shapes.library import is_library, read_library
+    from flocsim.io.contents import LIBRARY, RESULTS, STRENGTH, SWARM, SWEEP, TRAJECTORY, content_of
+    from flocsim.io.results import strength_file, swarm_file
 
     if (journal := journal_of(path)) is not None:
         found = read_unfinished(journal)
@@ -147,25 +142,17 @@ def read_content(path):
         elif isinstance(found.results, strength_file.Strengths):
             figures = STRENGTH_FIGURES
         return found.results, figures, found.progress
-    path = held(path)
-    kind = kind_of(path)
-    if kind == trajectory.KIND:
-        moved = trajectory.read_trajectory(path)
-        return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
-    if kind == sweep_file.FORMAT:
-        swept = sweep_file.read_sweep(path)
-        return swept, SWARM_SWEEP_FIGURES if "counts" in swept.groups else SWEEP_FIGURES, ""
-    if kind == strength_file.FORMAT:
-        strengths = strength_file.read_strengths(path)
-        remark = "" if strengths.complete else f"unfinished: {strengths.progress}"
-        return strengths, STRENGTH_FIGURES, remark
-    if kind == swarm_file.FORMAT:
-        found = swarm_file.read_swarm(path)
-        return found, swarm_figures(found), ""
-    if kind != FORMAT and is_library(path):
-        return read_library(path), POPULATION_FIGURES, ""
-    results = read_results(path, replicates=False)
-    return results, FIGURES if results.kernel is None else KERNEL_FIGURES, ""
+    figures_of = {
+        RESULTS: lambda found: FIGURES if found.kernel is None else KERNEL_FIGURES,
+        SWARM: swarm_figures,
+        SWEEP: lambda found: SWARM_SWEEP_FIGURES if "counts" in found.groups else SWEEP_FIGURES,
+        STRENGTH: lambda found: STRENGTH_FIGURES,
+        TRAJECTORY: lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
+        LIBRARY: lambda found: POPULATION_FIGURES,
+    }
+    kind, found = content_of(path, figures_of)
+    half = kind == STRENGTH and not found.complete
+    return found, figures_of[kind](found), f"unfinished: {found.progress}" if half else ""
 
 
 def swarm_figures(found):
