@@ -67,11 +67,10 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["strength"],
         ["cli", "studies"],
         ["runner", "unfinished"],
         ["kinds"],
-        ["pairs", "swarms"],
+        ["pairs", "strength", "swarms"],
         ["dry_run", "report"],
         ["parallel"],
         ["pilot"],

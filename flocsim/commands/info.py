@@ -293,9 +293,9 @@ def strength_text(path, found):
 def unfinished_text(found):
     """What a run that has not ended has so far; nothing of it is final."""
     results, last = found.results, found.sessions[-1]
-    if isinstance(results, strength_file.Strengths):
+    if found.kind == STRENGTH:
         return strength_text(found.path, results)
-    of_swarms = isinstance(results, swarm_file.SwarmResults)
+    of_swarms = found.kind == SWARM
     facts = swarm_facts(results)[:-1] if of_swarms else so_far(found)
     facts.append(("begun", f"{last['date']} by {last['command']}"))
     if found.unread:

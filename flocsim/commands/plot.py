@@ -132,16 +132,7 @@ def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
     from flocsim.io.contents import LIBRARY, RESULTS, STRENGTH, SWARM, SWEEP, TRAJECTORY, content_of
-    from flocsim.io.results import strength_file, swarm_file
 
-    if (journal := journal_of(path)) is not None:
-        found = read_unfinished(journal)
-        figures = FIGURES
-        if isinstance(found.results, swarm_file.SwarmResults):
-            figures = swarm_figures(found.results)
-        elif isinstance(found.results, strength_file.Strengths):
-            figures = STRENGTH_FIGURES
-        return found.results, figures, found.progress
     figures_of = {
         RESULTS: lambda found: FIGURES if found.kernel is None else KERNEL_FIGURES,
         SWARM: swarm_figures,
@@ -150,6 +141,9 @@ def read_content(path):
         TRAJECTORY: lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
         LIBRARY: lambda found: POPULATION_FIGURES,
     }
+    if (journal := journal_of(path)) is not None:
+        begun = read_unfinished(journal)
+        return begun.results, figures_of[begun.kind](begun.results), begun.progress
     kind, found = content_of(path, figures_of)
     half = kind == STRENGTH and not found.complete
     return found, figures_of[kind](found), f"unfinished: {found.progress}" if half else ""
