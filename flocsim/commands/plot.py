@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
+from flocsim.io.files import make_folder
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.kernel import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES
@@ -88,13 +89,7 @@ def run(args: argparse.Namespace) -> int:
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
     folder = Path(args.output_dir)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"--output-dir {args.output_dir} could not be made: {error.strerror}; "
-            "name another folder"
-        ) from error
+    make_folder(folder, "--output-dir ")
     stem, rule = Path(args.results).stem, figure_rule(args.overwrite)
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     drawn = [*paths.values(), *animation_of(args, content)]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits
+from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.doubts import settling_facts, study_doubts
@@ -58,13 +58,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     rows = file["replicates"]
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its codes of failures have other words")
-    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
-    places = {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
+    places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
     run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
     return OldTable(rows, places, len(rows["replicate"]), run)
 

@@ -97,7 +97,7 @@ def folder(tmp_path, monkeypatch):
         (
             {"scene": "release = 1.1",
              "shapes": 'source = "library"\nfile = "synthetic"\nvertices = [16]\nradius = "50 nm"'},
-            "scene.release = 1.1 (r_i + r_j) lets outlines touch that reach up to 1.6",
+            "scene.release = 1.1 (r_i + r_j) lets outlines touch that reach 1.6",
         ),
     ],
 )  # fmt: skip

@@ -170,10 +170,7 @@ def begin(
     start = Beginning(RowStore(journal, study.conditions, study.row), identity)
     start.cpus_now, start.rule, start.accuracy = list(cpus), rule_of(study), accuracy or {}
     start.resources.callback(journal.release)
-
-    def take_rows() -> None:
-        take_results(start, study, output, old_rows)
-
+    take_rows = partial(take_results, start, study, output, old_rows)
     try:
         take_journal(start, study)
         take_place(start, output, mode, overwrite, take_rows)
@@ -236,19 +233,16 @@ def refuse_fewer(start, output, replicates):
     asked = set(start.store.conditions)
     left_out = [condition for condition in old.places if condition not in asked]
     if left_out or old.count > replicates:
-        what = "; ".join(
-            ([f"{len(left_out)} conditions such as {spelled(left_out[0])}"] if left_out else [])
-            + ([f"{old.count} replicates of each"] if old.count > replicates else [])
-        )
+        what = [f"{old.count} replicates of each"] if old.count > replicates else []
+        if left_out:
+            name, n, share = left_out[0]
+            such = f"type {name}, N = {n}, delta {share:g}"
+            what.insert(0, f"{len(left_out)} conditions such as {such}")
         raise UsageError(
-            f"{output} has rows that this run does not ask for ({what}), and others are missing "
-            "in it: ask for all of them together, or name another output"
+            f"{output} has rows that this run does not ask for ({'; '.join(what)}), and others are "
+            "missing in it: ask for all of them together, or name another output"
         )
     start.at_least = old.count
-
-
-def spelled(condition):
-    return f"type {condition.type}, N = {condition.vertices}, delta {condition.delta:g}"
 
 
 def take_journal(start: Beginning, study: StudyKind) -> None:

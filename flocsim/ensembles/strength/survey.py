@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, Interval, missing
+from flocsim.ensembles.chunks import Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
 from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
 from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
@@ -263,12 +263,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
         blank = NOT_APPLICABLE if name == "bond" else 0
         columns[name] = np.full((*map(len, axes), count), blank, ROW[name])
         columns[name][at] = found.column(name)
-    places = {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
+    places = places_in(*axes)
     there: dict[Condition, list[Interval]] = {condition: [] for condition in places}
     by_place = {place: condition for condition, place in places.items()}
     for t, v, d, replicate in zip(*(each.tolist() for each in at), strict=True):
