@@ -31,7 +31,7 @@ from flocsim.ensembles.preflight import (
     placed_system,
     sphere_pairs,
 )
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.interruption import INTERRUPTION, stop_requested
@@ -161,7 +161,7 @@ def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[st
     """(Study, its Forecast for so many ranks, lines on a choice of its methods, seconds that
     compiling or loading took), from a pilot that is run here."""
     began = time.process_time()
-    study = study_of(config, flocs_of(config), first_methods(config))
+    study = study_of(config, methods=first_methods(config))
     grown = time.process_time() - began
     compiled = -time.monotonic()
     study.compile(study.kinds)

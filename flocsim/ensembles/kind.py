@@ -49,6 +49,11 @@ class StudyKind:
     """What progress counts."""
 
     @property
+    def scene(self) -> Any:
+        """[scene] of the config, of the class that the kind has."""
+        return self.config.scene
+
+    @property
     def pieces(self) -> int:
         """How many of these each replicate has."""
         return 1

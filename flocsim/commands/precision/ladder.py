@@ -23,7 +23,7 @@ from flocsim.ensembles.pilot.sample import sample_of
 from flocsim.ensembles.pilot.trials import Job, Trial, try_out
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.studies.replicates import with_one_count
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.io.confidence import wilson
@@ -178,7 +178,7 @@ def run(args: Namespace) -> int:
         checked_format(path)
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
-    study = study_of(config, flocs_of(config), first_methods(config))
+    study = study_of(config, methods=first_methods(config))
     target = ALLOWED * sampling_error(config)
     climbed: list[Measured] = []
     panels: dict[str, list[Rung]] = {}

@@ -136,11 +136,6 @@ class StrengthStudy(StudyKind):
                 self.wanted[place].append(replicate)
 
     @property
-    def scene(self) -> Any:
-        """The Bonds."""
-        return self.config.scene
-
-    @property
     def size(self) -> int:
         return sum(map(len, self.wanted.values()))
 

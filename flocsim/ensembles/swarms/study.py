@@ -49,22 +49,16 @@ class Drawn:
     shapes: list[Shape]
 
 
-def scene_of(config: Config) -> SwarmScene:
-    """[scene] of a config that is known to be of a swarm."""
-    scene: Any = config.scene
-    return scene
-
-
 def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's swarm needs: none for spheres of given sizes."""
-    scene, shapes = scene_of(config), shapes_of(config)
-    needed = scene.is_measured or max(shapes.vertices) > 1
+    shapes = shapes_of(config)
+    needed = config.scene.is_measured or max(shapes.vertices) > 1
     return load_flocs(shapes, config.seed) if needed else []
 
 
 def shapes_of(config: Config) -> ShapesConfig:
     """[shapes], measured flocs keeping their sizes."""
-    own = scene_of(config).is_measured
+    own = config.scene.is_measured
     return attrs.evolve(config.shapes, size="own") if own else config.shapes
 
 
@@ -91,10 +85,6 @@ class SwarmStudy(StudyKind):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
         if self.scene.is_measured:
             self.choosable = within_limits(self.scene, self.flocs)
-
-    @property
-    def scene(self) -> SwarmScene:
-        return scene_of(self.config)
 
     @property
     def vertices(self) -> int:
