@@ -7,15 +7,16 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.config.pair_scene import (
+    CLASSES,
     FLOWS,
     LARGEST_LENGTH,
     MEASURED,
     MECHANISMS,
     MOST_CLASSES,
     SETTLING,
+    WEIGHT,
     DrivenScene,
     FlowScene,
-    PairScene,
     Problem,
     micrometres,
 )
@@ -42,12 +43,6 @@ read_meetings = list_of(
 def as_tuple(value: Any) -> tuple[str, ...]:
     """One word as a tuple of it."""
     return (value,) if isinstance(value, str) else tuple(value)
-
-
-def inherited(name: str) -> Any:
-    """A field of PairScene whose default follows from one that is defined anew before it."""
-    field = attrs.fields_dict(PairScene)[name]
-    return attrs.field(default=field.default, validator=field.validator, metadata=field.metadata)
 
 
 @attrs.frozen
@@ -85,8 +80,8 @@ class KernelScene(DrivenScene):
         default=None,
         help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
     )
-    weight: str | None = inherited("weight")
-    classes: int | tuple[float, ...] | None = inherited("classes")
+    weight: str | None = WEIGHT
+    classes: int | tuple[float, ...] | None = CLASSES
     types: None = attrs.field(init=False, default=None)
     delta: tuple[float, ...] = attrs.field(init=False, default=(1.0,))
     delta_max: str = attrs.field(init=False, default="radius")

@@ -65,6 +65,39 @@ def size_limit(which: str, **more: Any) -> Any:
     return quantity("m", above=0.0, at_most=LARGEST_LENGTH, default=None, help=help, **more)
 
 
+WEIGHT: Any = choice(
+    "number",
+    "area",
+    "volume",
+    default=of_measured("number"),
+    shown='"number"',
+    only_for=("pairs", MEASURED),
+    help="how often a measured floc is drawn: number, each alike; area, in proportion to its "
+    "area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
+    "laser diffraction and Coulter counters give it",
+)
+CLASSES: Any = read_by(
+    either(
+        int,
+        whole(1, MOST_CLASSES),
+        list_of(
+            number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH)),
+            "a list of radii such as ['10 um', '20 um'], or a number of classes",
+        ),
+    ),
+    f"a list of distinct radii, each above 0 and at most 0.01, or a number of classes from 1 "
+    f"to {MOST_CLASSES}",
+    default=of_measured(1),
+    shown="1",
+    unit="m",
+    only_for=("pairs", MEASURED),
+    help="size classes of the measured flocs, each pair of which is a collision type: so many, "
+    "of equal weight (`q1` of the smallest to `q2`, …), or the r_eq between them (`to10um`, "
+    "`10to20um`, `from20um`)",
+)
+"""Keys of measured flocs."""
+
+
 def one_tag(word: str, of: tuple[str, ...], help: str) -> Any:
     """A key that takes one word in this class of scenes, and any that it is ``of`` in a config."""
     return checked_field(
@@ -118,38 +151,10 @@ class PairScene:
         help="the paper's collision types: (r_i, r_j) = I (16.41, 23.02), "
         "II (4.95, 23.02), III (4.62, 4.95) µm",
     )
-    weight: str | None = choice(
-        "number",
-        "area",
-        "volume",
-        default=of_measured("number"),
-        shown='"number"',
-        only_for=("pairs", MEASURED),
-        help="how often a measured floc is drawn: number, each alike; area, in proportion to its "
-        "area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
-        "laser diffraction and Coulter counters give it",
-    )
+    weight: str | None = WEIGHT
     min_radius: float | None = size_limit("least", only_for=("pairs", MEASURED))
     max_radius: float | None = size_limit("largest", only_for=("pairs", MEASURED))
-    classes: int | tuple[float, ...] | None = read_by(
-        either(
-            int,
-            whole(1, MOST_CLASSES),
-            list_of(
-                number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH)),
-                "a list of radii such as ['10 um', '20 um'], or a number of classes",
-            ),
-        ),
-        f"a list of distinct radii, each above 0 and at most 0.01, or a number of classes from 1 "
-        f"to {MOST_CLASSES}",
-        default=of_measured(1),
-        shown="1",
-        unit="m",
-        only_for=("pairs", MEASURED),
-        help="size classes of the measured flocs, each pair of which is a collision type: so many, "
-        "of equal weight (`q1` of the smallest to `q2`, …), or the r_eq between them (`to10um`, "
-        "`10to20um`, `from20um`)",
-    )
+    classes: int | tuple[float, ...] | None = CLASSES
     time_limit: float | str = word_or_quantity(
         "auto",
         "s",

@@ -498,8 +498,10 @@ def scene_class(table: Mapping[str, Any]) -> type:
     whose keys tell that."""
     scene = table.get("scene")
     given = scene if isinstance(scene, Mapping) else {}
-    words = [str(given.get(key)) for key in ("kind", "meeting")]
-    return next((SCENES[word] for word in words if word in SCENES), SettlingScene)
+    kind, meeting = (str(given.get(key)) for key in ("kind", "meeting"))
+    if kind in SCENES and kind not in PAIR_SCENES:
+        return SCENES[kind]
+    return PAIR_SCENES.get(meeting, SettlingScene)
 
 
 def elsewhere(key: str, scene: type) -> list[tuple[str, attrs.Attribute]]:

@@ -80,6 +80,8 @@ WRONG = {
     "[scene]\nsizes = [1e-6]": 'scene.sizes: goes with kind = "kernel": remove it',
     "[scene]\nrelease = '3 kg'": "scene.release must be a finite number above 1, found '3 kg'",
     "[scene]\nkind = 'swarn'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'swarn'",
+    "[scene]\nkind = 'shear'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'shear'",
+    "[scene]\nmeeting = 'swarm'": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = ['shear']": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = 'shear'": "scene: needs rate",
     "[zone]\nroot = 'middle'": "zone.root must be 'inner' or 'outer', found 'middle'",
