@@ -29,6 +29,7 @@ from flocsim.ensembles.config.values import (
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
+from flocsim.forces.thermal import thermal_in
 
 MOST_SCRAMBLES = 64
 
@@ -187,6 +188,13 @@ class KernelScene(DrivenScene):
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         """What does not go together with the other tables of a config, by their names."""
         yield from super().problems(parts)
+        if thermal_in(parts["forces"]):
+            text = (
+                "brings bodies together from beyond the offsets that a study of rates samples, "
+                "which would cut its widths off: leave it out, or let two bodies meet by "
+                'scene.meeting = "brownian"'
+            )
+            yield ("forces", "thermal"), text
         replicates = parts.get("replicates", KERNEL_REPLICATES)
         points, rest = divmod(replicates, self.scrambles)
         if rest or points < 1 or points & (points - 1):
@@ -199,13 +207,3 @@ class KernelScene(DrivenScene):
         if parts["stop"] is not None and parts["stop"].half_width is not None:
             text = "is for probabilities, and a study of rates runs all its points: "
             yield ("stop", "half_width"), text + "give more replicates and --resume instead"
-
-    def thermal_problems(self, warm: bool) -> Iterator[Problem]:
-        """Kicks act beyond what is sampled."""
-        if warm:
-            text = (
-                "brings bodies together from beyond the offsets that a study of rates samples, "
-                "which would cut its widths off: leave it out, or let two bodies meet by "
-                'scene.meeting = "brownian"'
-            )
-            yield ("forces", "thermal"), text

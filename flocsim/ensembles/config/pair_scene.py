@@ -106,15 +106,6 @@ def one_tag(word: str, of: tuple[str, ...], help: str) -> Any:
     )  # fmt: skip
 
 
-MEETING_HELP = (
-    "what brings the two together: settling, the faster from above; or a flow alone, "
-    "their weight left out: shear, u = (G y, 0), or extension, u = (s x, -s y), in which δ is "
-    "how near the centres would come to each other, as a share of R_i + R_j; or thermal motion "
-    "alone, brownian, their weight left out: let go `release` apart, in any direction, they "
-    "touch, or miss each other once they are `escape` apart; needs [forces.thermal]"
-)
-
-
 @attrs.frozen
 class PairScene:
     """Of what sizes two bodies meet, and what all ways to meet have in common.
@@ -261,7 +252,6 @@ class PairScene:
         for name in ("velocity", "gradient") if self.flow_in_fluid else ():
             if any(getattr(parts["fluid"], name)):
                 yield ("fluid", name), f"{self.flow_in_fluid}: leave it out"
-        yield from self.thermal_problems(bool(thermal_in(parts["forces"])))
         shapes = parts["shapes"]
         if self.is_measured and shapes.source != "library":
             text = '"measured" draws flocs that were measured, but shapes.source is no library: '
@@ -270,10 +260,6 @@ class PairScene:
         elif self.is_measured and shapes.size != "own":
             text = 'scene.pairs = "measured", which takes every floc at its own size: leave size '
             yield ("shapes", "size"), f'"{shapes.size}" does not go with {text}out'
-
-    def thermal_problems(self, warm: bool) -> Iterable[Problem]:
-        """What does not go with thermal motion, or without."""
-        return ()
 
 
 @attrs.frozen
@@ -321,7 +307,15 @@ class DrivenScene(PairScene):
 class SettlingScene(DrivenScene):
     """[scene]: who meets whom, and how the meeting begins and ends."""
 
-    meeting: str = one_tag(SETTLING, of=MEETINGS, help=MEETING_HELP)
+    meeting: str = one_tag(
+        SETTLING,
+        of=MEETINGS,
+        help="what brings the two together: settling, the faster from above; or a flow alone, "
+        "their weight left out: shear, u = (G y, 0), or extension, u = (s x, -s y), in which δ is "
+        "how near the centres would come to each other, as a share of R_i + R_j; or thermal motion "
+        "alone, brownian, their weight left out: let go `release` apart, in any direction, they "
+        "touch, or miss each other once they are `escape` apart; needs [forces.thermal]",
+    )
     receiver: str = choice(
         "free", "fixed", default="free", help="whether the receiving body i settles or is held"
     )
@@ -342,9 +336,9 @@ class FlowScene(DrivenScene):
         "that turns faster than it strains all ways are closed, and none do"
     )
 
-    def thermal_problems(self, warm: bool) -> Iterator[Problem]:
-        """Across a shear flow kicks have no end."""
-        if warm and self.meeting == SHEAR:
+    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+        yield from super().problems(parts)
+        if self.meeting == SHEAR and thermal_in(parts["forces"]):
             text = (
                 '"shear" has no end with [forces.thermal]: across a shear flow kicks bring a pair '
                 'back from any distance, so that none has departed; give "extension", "settling" '
@@ -383,9 +377,9 @@ class BrownianScene(PairScene):
                 "let go nearer than where they have missed"
             )
 
-    def thermal_problems(self, warm: bool) -> Iterator[Problem]:
-        """Nothing else moves the two."""
-        if not warm:
+    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+        yield from super().problems(parts)
+        if not thermal_in(parts["forces"]):
             text = '"brownian" needs kicks: add [forces.thermal], of a temperature above 0 K'
             yield ("scene", "meeting"), text
 
