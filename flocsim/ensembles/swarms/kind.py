@@ -15,6 +15,7 @@ from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.chunks import Condition, is_chunk
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import names_in
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import (
@@ -45,7 +46,7 @@ from flocsim.io.results.swarm_file import (
     read_swarm,
     write_swarm,
 )
-from flocsim.plausibility.doubts import Names, doubts_of
+from flocsim.plausibility.doubts import doubts_of
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import check_box
 
@@ -112,10 +113,7 @@ def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
 
 def doubts(study: SwarmStudy) -> list[str]:
     """Lines on what is implausible."""
-    names = Names(
-        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
-        forces=tuple(f"forces.{name}" for name in study.config.force_names),
-    )  # fmt: skip
+    names = names_in(study.config, study.config.forces)
     return doubts_of([largest_pair(study.first)], names)
 
 
