@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from flocsim.ensembles.config import presets
-from flocsim.ensembles.config.kernel_scene import KernelScene
+from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.schema import FORCES, STUDY_KEYS, TABLES, keys_of
-from flocsim.ensembles.config.swarm_scene import SwarmScene
+from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, keys_of
 from flocsim.errors import UsageError
 from flocsim.io.markdown import markdown_table
 from flocsim.io.results.kernel_group import KERNEL
@@ -29,20 +28,31 @@ from flocsim.io.results.schema import (
 
 DOCS = Path(__file__).parent
 
+FORCES_BY_TABLE = {f"forces.{name}": force for name, force in FORCES.items()}
+
+SCENE_HEADINGS = {
+    "": SCENES["settling"],
+    " in a flow": SCENES["shear"],
+    " in thermal motion": SCENES["brownian"],
+    " of a swarm": SCENES["swarm"],
+    " of a kernel study": SCENES["kernel"],
+}
+
 QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
 
 def config_parts() -> dict[str, str]:
     """{name: text} of all that docs/config.md has of the schema: the keys, and the presets."""
     parts = ["## At the top\n", key_table(STUDY_KEYS)]
-    tables = TABLES | {f"forces.{name}": force for name, force in FORCES.items()}
-    kinds = {"a swarm": SwarmScene, "a kernel study": KernelScene}
-    for name, table_class in tables.items():
-        parts += [f"## [{name}]\n", about(table_class, name), key_table(keys_of(table_class))]
-        if name == "scene":
-            for kind, scene in kinds.items():
-                heading = f"## [scene] of {kind}\n"
-                parts += [heading, about(scene, "scene"), key_table(keys_of(scene))]
+    first = keys_of(SCENES["settling"])
+    for name, table_class in (TABLES | FORCES_BY_TABLE).items():
+        scenes = SCENE_HEADINGS if name == "scene" else {"": table_class}
+        for heading, each in scenes.items():
+            keys = keys_of(each)
+            if each in PAIR_SCENES.values():  # what is as in [scene] itself need not be said again
+                known = first if heading else {}
+                keys = {key: field for key, field in keys.items() if field != known.get(key)}
+            parts += [f"## [{name}]{heading}\n", about(each, name), key_table(keys)]
     return {"keys": "\n".join(parts), "presets": f"{about(presets, '')}\n{preset_table()}"}
 
 

@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from flocsim.ensembles.studies.opened import open_any as open
     from flocsim.ensembles.studies.study import Study
     from flocsim.ensembles.studies.sweep import sweep
+    from flocsim.forces.base import Force
     from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
-    from flocsim.integrators.base import Status
+    from flocsim.integrators.base import Integrator, Status
     from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
     from flocsim.io.results.sweep_file import SweepResults
@@ -35,6 +36,8 @@ HOMES = {
     "Body": "body",
     "Composite": "geometry.shapes.composite",
     "Fluid": "body",
+    "Force": "forces.base",
+    "Integrator": "integrators.base",
     "Shape": "geometry.shapes.shape",
     "Sphere": "geometry.shapes.sphere",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
@@ -68,6 +71,8 @@ __all__ = [
     "Comparison",
     "Composite",
     "Fluid",
+    "Force",
+    "Integrator",
     "Shape",
     "Sphere",
     "SpheroPolygon",

@@ -67,11 +67,10 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["strength"],
         ["cli", "studies"],
         ["runner", "unfinished"],
         ["kinds"],
-        ["pairs", "swarms"],
+        ["pairs", "strength", "swarms"],
         ["dry_run", "report"],
         ["parallel"],
         ["pilot"],
@@ -86,7 +85,7 @@ INNER_ROWS = {
         ["config", "chunks"],
     ],
     "io": [
-        ["plots"],
+        ["plots", "contents"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
         ["outputs", "opening", "groups"],

@@ -9,8 +9,35 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.outcome_changes import outcome_changes, percent_changed
+from flocsim.ensembles.estimates.outcome_changes import OutcomeChanges, changes_between
 from flocsim.ensembles.runner import run
+from flocsim.errors import UsageError
+from flocsim.io.results.schema import Results
+
+
+def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
+    """The OutcomeChanges of the first runs of ``found`` against those of ``exact``.
+
+    Of the same conditions. Replicates are paired; the shorter of the two decides how many are
+    compared. UsageError where the conditions differ.
+    """
+    same = (
+        found.types == exact.types
+        and np.array_equal(found.vertices, exact.vertices)
+        and np.array_equal(found.delta, exact.delta)
+    )
+    if not same:
+        raise UsageError("the two results are not of the same conditions: name runs of one config")
+    outcomes = [each.replicates["outcome"] for each in (found, exact) if each.replicates]
+    count = min(each.shape[-1] for each in outcomes)
+    a, b = (each[..., :count] for each in outcomes)
+    return changes_between(a, b)
+
+
+def percent_changed(changed: np.ndarray, among: np.ndarray) -> float:
+    """Percent of what is in ``among`` that has changed; NaN of nothing."""
+    count = np.count_nonzero(among)
+    return 100.0 * np.count_nonzero(changed & among) / count if count else np.nan
 
 
 def study(arguments, tolerance):

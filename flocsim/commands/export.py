@@ -9,13 +9,12 @@ import numpy as np
 
 from flocsim.commands import SUMMARIES
 from flocsim.errors import UsageError
+from flocsim.io.contents import RESULTS, SWARM, TRAJECTORY, content_of
 from flocsim.io.exchange.gsd_file import write_gsd
-from flocsim.io.files import held, write_file
-from flocsim.io.opening import kind_of
+from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.swarm import last_known, shape_of
 from flocsim.io.results.curvilinear import CORRECTIONS
-from flocsim.io.results.file import read_results
 from flocsim.io.results.kernel_tables import (
     MODELS,
     QUANTITIES,
@@ -23,8 +22,6 @@ from flocsim.io.results.kernel_tables import (
     kernel_csv,
     kernel_matrix,
 )
-from flocsim.io.results.swarm_file import FORMAT, read_swarm
-from flocsim.io.trajectory import read_trajectory
 
 SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}
 
@@ -71,18 +68,16 @@ def run(args: argparse.Namespace) -> int:
     if args.format == "csv":
         write_file(path, kernel_csv(kernel_in(args.source)).encode(), rule)
     else:
-        source = held(args.source)
-        of_swarms = kind_of(source) == FORMAT
-        moved = first_swarm(read_swarm(source)) if of_swarms else motion_in(source)
-        t, position, velocity, shapes = moved
+        motions = {TRAJECTORY: motion_in, SWARM: first_swarm}
+        kind, found = content_of(args.source, motions)
+        t, position, velocity, shapes = motions[kind](found)
         write_gsd(path, t, position, velocity, shapes, rule)
     print(path)
     return 0
 
 
-def motion_in(path):
+def motion_in(motion):
     """(times, positions, velocities, shapes) of a trajectory file."""
-    motion = read_trajectory(path)
     return motion.t, motion.position, motion.velocity, motion.shapes
 
 
@@ -111,7 +106,7 @@ def named(args):
 
 def kernel_in(path):
     """The rates in a results file; UsageError where it has none."""
-    kernel = read_results(path, replicates=False).kernel
+    kernel = content_of(path, (RESULTS,))[1].kernel
     if kernel is None:
         raise UsageError(
             f"{path} is of no kernel study and has no rates: run flocsim kernel with a config of "

@@ -15,9 +15,9 @@ from flocsim.commands.fitting.pictures import (
     report,
     titles_of,
 )
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
 from flocsim.fields.quantities import read_number
-from flocsim.io.files import write_file
+from flocsim.io.files import make_folder, write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
     if args.masks_out is not None:
-        made_folder(args.masks_out)
+        make_folder(args.masks_out, "--masks-out ")
         made = label_paths(args.masks_out, titles_of(paths)).values()
         outputs += [Output(path, rule) for path in made]
     check_outputs(outputs, [*paths, *beneath.values()])
@@ -250,16 +250,6 @@ def whole(option, text):
     if not text.strip().isdecimal() or int(text) < 1:
         raise UsageError(f"{option} takes whole numbers from 1, found {text!r}")
     return int(text)
-
-
-def made_folder(name):
-    """Make the folder of --masks-out; FileError where that cannot be."""
-    try:
-        Path(name).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"--masks-out {name} could not be made: {error.strerror}; name another folder"
-        ) from error
 
 
 def label_paths(folder, names):

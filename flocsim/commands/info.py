@@ -5,7 +5,6 @@ import math
 import sys
 from argparse import Namespace
 from collections import Counter
-from functools import partial
 from typing import Any
 
 import attrs
@@ -31,16 +30,23 @@ from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.swarms.kind import SWARMS
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
-from flocsim.io import trajectory
-from flocsim.io.files import held
-from flocsim.io.opening import kind_of
-from flocsim.io.results import strength_file, swarm_file, sweep_file
-from flocsim.io.results.file import OUTCOMES, Totals, read_overview, read_results
-from flocsim.io.results.layout import FORMAT
+from flocsim.io.contents import (
+    LIBRARY,
+    READERS,
+    RESULTS,
+    STRENGTH,
+    SWARM,
+    SWEEP,
+    TRAJECTORY,
+    content_of,
+)
+from flocsim.io.results import strength_file, swarm_file
+from flocsim.io.results.file import OUTCOMES, Totals, read_overview
 from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.shapes.fit_report import format_errors
-from flocsim.io.shapes.library import is_library, read_library, read_settings
+from flocsim.io.shapes.library import read_settings
 from flocsim.io.terminal import aligned
+from flocsim.io.trajectory import centre_distance
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
          "warnings", "trial", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
@@ -74,10 +80,7 @@ def run(args: Namespace) -> int:
     if not args.config:
         print(text_of(args.results))
         return 0
-    source = held(args.results)
-    swarm = kind_of(source) == swarm_file.FORMAT
-    read = swarm_file.read_swarm if swarm else partial(read_results, replicates=False)
-    results = read(source)
+    _, results = content_of(args.results, (RESULTS, SWARM))
     if results.run.get("config"):
         sys.stdout.write(str(results.run["config"]))
     else:
@@ -87,24 +90,17 @@ def run(args: Namespace) -> int:
 
 def text_of(path):
     """What a file holds, of whatever kind it is."""
-    path = held(path)
-    kind = kind_of(path)
-    if kind == trajectory.KIND:
-        return trajectory_text(path)
-    if kind == sweep_file.FORMAT:
-        return sweep_text(path)
-    if kind == swarm_file.FORMAT:
-        return swarm_text(path)
-    if kind == strength_file.FORMAT:
-        return strength_text(path)
-    if kind != FORMAT and is_library(path):
-        return library_text(path)
-    return results_text(path, *read_overview(path))
+    texts = {
+        RESULTS: lambda path, found: results_text(path, *found), SWARM: swarm_text,
+        SWEEP: sweep_text, STRENGTH: strength_text, TRAJECTORY: trajectory_text,
+        LIBRARY: library_text,
+    }  # fmt: skip
+    kind, found = content_of(path, texts, READERS | {RESULTS: read_overview})
+    return texts[kind](path, found)
 
 
-def swarm_text(path):
+def swarm_text(path, results):
     """What a results file of a swarm study holds."""
-    results = swarm_file.read_swarm(path)
     facts, came, warnings = swarm_summary(path, results)
     lines = fact_lines([*facts, *came])
     lines += [f"warning: {visible(line, '')}" for line in warnings]
@@ -141,8 +137,7 @@ def swarm_facts(results):
     ]  # fmt: skip
 
 
-def library_text(path):
-    entries = read_library(path)
+def library_text(path, entries):
     images = sorted({entry.image for entry in entries})
     sizes = [1e6 * entry.measured_radius for entry in entries]
     facts = [
@@ -210,9 +205,8 @@ def efficiency_block(results):
     return ["", *lines] if lines else []
 
 
-def trajectory_text(path):
+def trajectory_text(path, found):
     """What a trajectory file holds."""
-    found = trajectory.read_trajectory(path)
     moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
     facts = [
         ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
@@ -221,7 +215,7 @@ def trajectory_text(path):
           for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
     ]  # fmt: skip
     if len(found.shapes) == 2:
-        apart = 1e6 * trajectory.centre_distance(found.position)
+        apart = 1e6 * centre_distance(found.position)
         facts.append(
             ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
              f"{apart[-1]:.4g} at last")
@@ -233,9 +227,8 @@ def trajectory_text(path):
     return "\n".join([f"{path}: a trajectory", "", *fact_lines(facts)])
 
 
-def sweep_text(path):
+def sweep_text(path, found):
     """What the joined file of a sweep holds: Pr[A] at every value, the mean size of swarms."""
-    found = sweep_file.read_sweep(path)
     swept = found.swept
     lines = [f"{path}: a sweep", ""]
     for name, each in swept.items():
@@ -280,9 +273,8 @@ def swarm_sweep_rows(found):
     return rows
 
 
-def strength_text(path, found=None):
+def strength_text(path, found):
     """What a file of `flocsim strength` holds, or the journal of a survey so far."""
-    found = found or strength_file.read_strengths(path)
     told = found.progress if found.complete else f"{found.progress} so far; go on with --resume"
     statuses = Counter(found.column("status").tolist())
     ends = [f"{count} {strength_file.STATUS[code].replace('_', ' ')}"
@@ -301,9 +293,9 @@ def strength_text(path, found=None):
 def unfinished_text(found):
     """What a run that has not ended has so far; nothing of it is final."""
     results, last = found.results, found.sessions[-1]
-    if isinstance(results, strength_file.Strengths):
+    if found.kind == STRENGTH:
         return strength_text(found.path, results)
-    of_swarms = isinstance(results, swarm_file.SwarmResults)
+    of_swarms = found.kind == SWARM
     facts = swarm_facts(results)[:-1] if of_swarms else so_far(found)
     facts.append(("begun", f"{last['date']} by {last['command']}"))
     if found.unread:

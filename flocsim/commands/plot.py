@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
+from flocsim.io.files import make_folder
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.kernel import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES
@@ -88,13 +89,7 @@ def run(args: argparse.Namespace) -> int:
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
     folder = Path(args.output_dir)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"--output-dir {args.output_dir} could not be made: {error.strerror}; "
-            "name another folder"
-        ) from error
+    make_folder(folder, "--output-dir ")
     stem, rule = Path(args.results).stem, figure_rule(args.overwrite)
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     drawn = [*paths.values(), *animation_of(args, content)]
@@ -131,41 +126,22 @@ def label(name):
 def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
     from flocsim.ensembles.unfinished import journal_of, read_unfinished
-    from flocsim.io import trajectory
-    from flocsim.io.files import held
-    from flocsim.io.opening import kind_of
-    from flocsim.io.results import strength_file, swarm_file, sweep_file
-    from flocsim.io.results.file import read_results
-    from flocsim.io.results.layout import FORMAT
-    from flocsim.io.shapes.library import is_library, read_library
+    from flocsim.io.contents import LIBRARY, RESULTS, STRENGTH, SWARM, SWEEP, TRAJECTORY, content_of
 
+    figures_of = {
+        RESULTS: lambda found: FIGURES if found.kernel is None else KERNEL_FIGURES,
+        SWARM: swarm_figures,
+        SWEEP: lambda found: SWARM_SWEEP_FIGURES if "counts" in found.groups else SWEEP_FIGURES,
+        STRENGTH: lambda found: STRENGTH_FIGURES,
+        TRAJECTORY: lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
+        LIBRARY: lambda found: POPULATION_FIGURES,
+    }
     if (journal := journal_of(path)) is not None:
-        found = read_unfinished(journal)
-        figures = FIGURES
-        if isinstance(found.results, swarm_file.SwarmResults):
-            figures = swarm_figures(found.results)
-        elif isinstance(found.results, strength_file.Strengths):
-            figures = STRENGTH_FIGURES
-        return found.results, figures, found.progress
-    path = held(path)
-    kind = kind_of(path)
-    if kind == trajectory.KIND:
-        moved = trajectory.read_trajectory(path)
-        return moved, MOTION_FIGURES if len(moved.shapes) == 2 else {"strip": strip}, ""
-    if kind == sweep_file.FORMAT:
-        swept = sweep_file.read_sweep(path)
-        return swept, SWARM_SWEEP_FIGURES if "counts" in swept.groups else SWEEP_FIGURES, ""
-    if kind == strength_file.FORMAT:
-        strengths = strength_file.read_strengths(path)
-        remark = "" if strengths.complete else f"unfinished: {strengths.progress}"
-        return strengths, STRENGTH_FIGURES, remark
-    if kind == swarm_file.FORMAT:
-        found = swarm_file.read_swarm(path)
-        return found, swarm_figures(found), ""
-    if kind != FORMAT and is_library(path):
-        return read_library(path), POPULATION_FIGURES, ""
-    results = read_results(path, replicates=False)
-    return results, FIGURES if results.kernel is None else KERNEL_FIGURES, ""
+        begun = read_unfinished(journal)
+        return begun.results, figures_of[begun.kind](begun.results), begun.progress
+    kind, found = content_of(path, figures_of)
+    half = kind == STRENGTH and not found.complete
+    return found, figures_of[kind](found), f"unfinished: {found.progress}" if half else ""
 
 
 def swarm_figures(found):

@@ -9,12 +9,11 @@ from flocsim.commands.reporting.examples import examples_of
 from flocsim.commands.reporting.page import report_page, swarm_page
 from flocsim.ensembles.studies.opened import open_results
 from flocsim.errors import UsageError
+from flocsim.io.contents import READERS, RESULTS, SWARM, content_of
 from flocsim.io.files import held, write_file
-from flocsim.io.opening import kind_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.own_mark import marked
 from flocsim.io.results.file import read_overview
-from flocsim.io.results.swarm_file import FORMAT, read_swarm
 
 DESCRIPTION = """\
 Write one HTML page that needs no other file: the figures of flocsim plot, the probabilities with
@@ -44,12 +43,13 @@ def run(args: argparse.Namespace) -> int:
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.results])
     source, examples = held(args.results), []
-    if kind_of(source) == FORMAT:
-        page = swarm_page(str(args.results), read_swarm(source))
+    kind, found = content_of(source, (RESULTS, SWARM), READERS | {RESULTS: read_overview})
+    if kind == SWARM:
+        page = swarm_page(str(args.results), found)
     else:
-        results, totals = read_overview(source)
         if not args.no_motion:
             examples = examples_of(open_results(source, args.folder))
+        results, totals = found
         page = report_page(str(args.results), results, totals, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:

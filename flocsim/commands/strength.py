@@ -53,6 +53,7 @@ def places(args: Namespace) -> tuple[Path, Path]:
 
 def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
     """What is run, as a config; on the ``first`` rank what it writes is seen to be possible."""
+    from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.strength.survey import Bonds, config_of
     from flocsim.ensembles.studies.opened import open_results
     from flocsim.io.journal.journal import SUFFIX
@@ -83,10 +84,3 @@ def run(args: Namespace) -> int:
         if not args.quiet:
             tell(str(figure))
     return code
-
-
-WAYS = (
-    "go on with it by --resume if it is of this study, or add --overwrite, which keeps the old one "
-    "under another name"
-)
-"""What a user can do about a file in the way."""

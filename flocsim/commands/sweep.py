@@ -5,6 +5,7 @@ import re
 import signal
 from argparse import Namespace
 from pathlib import Path
+from shlex import quote
 from types import FrameType
 from typing import Any
 
@@ -68,8 +69,8 @@ def run(args: Namespace) -> int:
     output = args.output or f"{Path(args.config).stem}-sweep.h5"
     if args.dry_run:
         for path, part in planned(study, over, Path(output)).items():
-            words = " ".join(f"--set {quoted(f'{k}={v}')}" for k, v in settings_of(part.overrides))
-            tell(f"flocsim ensemble {quoted(args.config)} {words} -o {quoted(str(path))}")
+            words = " ".join(f"--set {quote(f'{k}={v}')}" for k, v in settings_of(part.overrides))
+            tell(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
     signal.signal(signal.SIGTERM, interrupt)
     try:
@@ -87,10 +88,3 @@ def run(args: Namespace) -> int:
 def interrupt(number: int, frame: FrameType | None) -> None:
     """What a batch system's SIGTERM does: as Ctrl-C, so that the part that runs saves its rows."""
     raise KeyboardInterrupt
-
-
-def quoted(text: str) -> str:
-    """A word as a shell takes it."""
-    import shlex
-
-    return shlex.quote(text)

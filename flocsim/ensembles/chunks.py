@@ -8,6 +8,7 @@ Replicates of one condition are kept as intervals: sorted, disjoint pairs [first
 
 import json
 from collections.abc import Iterable
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +47,15 @@ class Condition(NamedTuple):
     type: str
     vertices: int
     delta: float
+
+
+def places_in(*axes: Iterable) -> dict[Condition, tuple[int, ...]]:
+    """Where each condition stands in arrays along these types, numbers of vertices and δ."""
+    found = product(*map(enumerate, axes))
+    return {
+        Condition(str(name), int(n), float(share)): (t, v, d)
+        for (t, name), (v, n), (d, share) in found
+    }
 
 
 class Chunk(NamedTuple):

@@ -103,20 +103,15 @@ def read_config(arguments, sources, first):
     config = load_any_config(arguments.config, overrides(arguments), sources)
     if not first:
         return config
-    refuse_other_kinds(arguments, config)
-    kind_of(config).check(config)
-    if not arguments.dry_run:
-        check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
-    return config
-
-
-def refuse_other_kinds(arguments, config):
-    """UsageError where `flocsim kernel` is given a config of anything else."""
     if getattr(arguments, "command", "") == "kernel" and not config.is_kernel:
         raise UsageError(
             f'{arguments.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
             'kind = "kernel" with sizes, as examples/kernel.toml has'
         )
+    kind_of(config).check(config)
+    if not arguments.dry_run:
+        check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
+    return config
 
 
 def results_of(config, arguments):

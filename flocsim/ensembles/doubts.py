@@ -7,11 +7,23 @@ Of flocs of measured sizes it looks at the largest of each collision type, which
 from collections.abc import Sequence
 
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import pairings, sphere_pairs
+from flocsim.forces import Force
 from flocsim.plausibility.doubts import Names, doubts_of
 from flocsim.plausibility.ranges import ROUNDING
 from flocsim.plausibility.reynolds import settled
+
+
+def names_in(config: Config, acting: Sequence[Force]) -> Names:
+    """What a config calls the fluid, the bodies, and those of its forces that are acting."""
+    known = [id(force) for force in acting]
+    forces = zip(config.force_names, config.forces, strict=True)
+    return Names(
+        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
+        forces=tuple(f"forces.{name}" for name, force in forces if id(force) in known),
+    )  # fmt: skip
 
 
 def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[str]:
@@ -19,19 +31,7 @@ def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[st
     usual."""
     systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
     # In a flow bodies meet without their weight.
-    acting = [id(force) for force in systems[0].forces]
-    names = Names(
-        fluid="fluid",
-        body="bodies",
-        forces=tuple(
-            f"forces.{name}"
-            for name, force in zip(config.force_names, config.forces, strict=True)
-            if id(force) in acting
-        ),
-        buoyancy="fluid.buoyancy = true",
-        drop="give {} = false",
-    )
-    lines = doubts_of(systems, names)
+    lines = doubts_of(systems, names_in(config, systems[0].forces))
     options = config.shapes
     if options.own is None and options.size == "scene" and max(options.vertices) > 1:
         least = min(min(each.radii) for each in pairings(config, flocs))

@@ -8,7 +8,8 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts, class_words
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.equivalent_spheres import sphere_facts, sphere_words
 from flocsim.ensembles.kernels.study import study_of
@@ -30,7 +31,7 @@ from flocsim.ensembles.preflight import (
     placed_system,
     sphere_pairs,
 )
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.interruption import INTERRUPTION, stop_requested
@@ -165,7 +166,7 @@ def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[st
     """(Study, its Forecast for so many ranks, lines on a choice of its methods, seconds that
     compiling or loading took), from a pilot that is run here."""
     began = time.process_time()
-    study = study_of(config, flocs_of(config), first_methods(config))
+    study = study_of(config, methods=first_methods(config))
     grown = time.process_time() - began
     compiled = -time.monotonic()
     study.compile(study.kinds)
@@ -237,7 +238,7 @@ def piloted(config, ranks):
 
 def way_words(scene):
     """How the bodies of a scene meet, in words."""
-    if scene.meetings == (BROWNIAN,):
+    if scene.meeting == BROWNIAN:
         return f"brownian: from {scene.release:g} to {scene.escape:g} (r_i + r_j) apart"
     return (
         f"delta {list(scene.delta)} of the {scene.delta_max} delta_max, receiver {scene.receiver}"

@@ -15,7 +15,8 @@ import numpy as np
 from flocsim.brownian.splitting import splitting_probability, stability_ratio
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.forces.thermal import thermal_in
 

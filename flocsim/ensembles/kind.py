@@ -31,20 +31,6 @@ Going = Callable[[str], object]
 """Is told in words how far a replicate is."""
 
 
-@attrs.frozen(eq=False)
-class OldRows:
-    """Rows of an older results file: its scalars ``run``; {column: array}, each of which ends in
-    the replicates; where each condition stands in them; replicates of each; what else the kind
-    takes from it; which replicates there are of each condition, where these are not all."""
-
-    run: Mapping[str, Any]
-    columns: Mapping[str, Any]
-    places: Mapping[Condition, tuple[int, ...]]
-    count: int
-    more: Any = None
-    there: Mapping[Condition, list[Interval]] | None = None
-
-
 class StudyKind:
     """What every rank asks of a study. All that is random follows from (seed, replicate).
 
@@ -61,6 +47,11 @@ class StudyKind:
     """Of a chunk; where it is 1 a replicate may go on from what was kept of it."""
     noun: ClassVar[str] = "replicates"
     """What progress counts."""
+
+    @property
+    def scene(self) -> Any:
+        """[scene] of the config, of the class that the kind has."""
+        return self.config.scene
 
     @property
     def pieces(self) -> int:
@@ -195,8 +186,8 @@ class Kind:
     """Lines on what is implausible in a study."""
     facts: Callable[[Any], dict[str, Any]]
     """(study) → what the results say of it besides their tables, as JSON can hold it."""
-    old_rows: Callable[[Any, ExitStack], OldRows]
-    """(path, resources) → the rows of its results file that is to be extended."""
+    old_rows: Callable[[Any, ExitStack], Any]
+    """(path, resources) → the rows of its results file that is to be extended, an OldTable."""
     results: Callable[..., Any]
     """(study, beginning, count, run, communicator, output or None, warn, whether all rows are to
     be in memory) → results, written to the output."""
@@ -210,5 +201,9 @@ class Kind:
     """(exit code, what to say of replicates without an outcome; "" for nothing)."""
     dry_run: Callable[[Config, int, bool], str]
     """(config, ranks, with a pilot) → what a study would do."""
+    so_far: Callable[..., Any]
+    """(path, sessions, records) of a journal → Unfinished, what it has so far."""
+    asked: dict[str, Any] = attrs.Factory(dict)
+    """What a session of a study of this kind alone says of what was asked, as a pattern."""
     enough: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda count: False
     """(study, store) → whether so many replicates of each condition are enough."""

@@ -2,14 +2,15 @@
 
 from typing import Any
 
-from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.schema import Config, SceneConfig
+from flocsim.ensembles.config.schema import SCENES, Config
 from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.kind import Kind, StudyKind
 from flocsim.ensembles.pairs import PAIRS
+from flocsim.ensembles.strength.survey import STRENGTHS, Bonds
 from flocsim.ensembles.swarms.kind import SWARMS
 
-KINDS: dict[type, Kind] = {SceneConfig: PAIRS, KernelScene: PAIRS, SwarmScene: SWARMS}
+KINDS: dict[type, Kind] = dict.fromkeys(SCENES.values(), PAIRS)
+KINDS |= {SwarmScene: SWARMS, Bonds: STRENGTHS}
 """Class of [scene] → its Kind; rates are pairs with other draws and conditions."""
 
 

@@ -9,17 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, Condition
+from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
+from flocsim.ensembles.estimates.numerical import numerical_errors
+from flocsim.ensembles.estimates.statistics import COUNTED, probabilities
 from flocsim.ensembles.estimates.stop_rule import StopRule
 from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
 from flocsim.ensembles.kernels.study import KernelStudy, study_of
-from flocsim.ensembles.kind import Kind, OldRows
+from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study
@@ -32,31 +34,33 @@ from flocsim.ensembles.report import (
     undecided_line,
 )
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
+from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.storage.row_store import OldTable, RowStore
+from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, done_in, store_of
 from flocsim.ensembles.study import Study, flocs_of
-from flocsim.errors import FlocsimError
+from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import WITHHELD
+from flocsim.io.journal.records import CHUNK, Record
+from flocsim.io.json_text import matches
+from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import opened, read_results, scalar_of
 from flocsim.io.results.kernel_group import Kernel
+from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results, as_words
 
 
-def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The table of replicates of a results file, open until the resources are closed."""
     file = resources.enter_context(opened(output))
     rows = file["replicates"]
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its codes of failures have other words")
-    axes = rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()]
-    places = {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
+    places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
     run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
-    return OldRows(run, rows, places, len(rows["replicate"]))
+    return OldTable(rows, places, len(rows["replicate"]), run)
 
 
 def results(
@@ -135,10 +139,75 @@ def verdict(found: Results) -> tuple[int, str]:
     return (WITHHELD if has_withheld(found) else 0), f"warning: {line}"
 
 
+def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
+    """What a journal has of pairs: their counts and probabilities."""
+    axes = axes_of(sessions[-1], [
+        condition_of(each.description) for each in found
+        if each.kind == CHUNK and fits(each.description, each.length)
+    ])  # fmt: skip
+    checked = partial(check_rows, failures=len(FAILURES), flocs=2**31)
+    with ReadOnlyJournal(str(path)) as journal:
+        store, notes, unread = store_of(journal, sessions, found, axes, ROW, checked)
+        table = tables(store, tuple(len(axes[name]) for name in ORDER))
+    found_so = Results(
+        types=axes["types"], vertices=axes["vertices"], delta=axes["delta"], replicates=None,
+        probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
+    )  # fmt: skip
+    asked = axes["replicates"] * len(store.conditions)
+    return Unfinished(path, FORMAT, found_so, done_in(store), asked, notes, sessions, unread)
+
+
+def axes_of(session: dict, found: list[Condition]) -> dict[str, Any]:
+    """ASKED of a session; of one that does not say it, what was found, and 0 replicates."""
+    asked = session.get("asked")
+    if matches(asked, ASKED):
+        assert asked is not None
+        return asked
+    return {
+        "types": list(dict.fromkeys(each.type for each in found)),
+        "vertices": sorted({each.vertices for each in found}),
+        "delta": sorted({each.delta for each in found}),
+        "replicates": 0,
+    }
+
+
+def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """The table of probabilities from all rows of a store, whose conditions have this shape."""
+    each = [counts_of(store, place) for place in range(len(store.conditions))]
+    counts = {
+        name: np.stack([one[name] for one in each]).reshape(*shape, *each[0][name].shape)
+        for name in each[0]
+    }
+    return counts | probabilities(counts) | numerical_errors(counts)
+
+
+def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
+    """{n_…: count} of a condition, its replicates in whatever pieces they are there."""
+
+    def codes(first: int, stop: int) -> tuple[np.ndarray, ...]:
+        near = [(max(a, first), min(b, stop)) for a, b in runs if a < stop and b > first]
+        found = []
+        for name in COUNTED:
+            parts = [store.read(place, name, *each) for each in near]
+            values = np.concatenate([np.empty(0, "i8"), *parts]).astype("i8")
+            found.append(values.reshape(1, 1, 1, -1))
+        return tuple(found)
+
+    runs = store.intervals(place)
+    end = runs[-1][1] if runs else 0
+    try:
+        sums = sums_of(codes, 1, 0, end)
+    except UsageError as error:
+        raise FileError(f"{store.journal.path} holds no readable rows: {error}") from error
+    return {
+        name: values[0, 0, 0] for name, values in sums.items() if name.startswith("n_")
+    }  # fmt: skip
+
+
 PAIRS = Kind(
     make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
     prepare=lambda study, comm: None, doubts=lambda study: study_doubts(study.config, study.flocs),
     facts=facts, old_rows=old_rows, results=results, read=partial(read_results, replicates=False),
     table=table, total=lambda found: int(found.probabilities["n_total"].sum()), verdict=verdict,
-    dry_run=dry_run, enough=lambda study, store: StopRule(study.config.stop, store),
+    dry_run=dry_run, enough=lambda study, store: StopRule(study.config.stop, store), so_far=so_far,
 )  # fmt: skip

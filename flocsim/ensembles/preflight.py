@@ -11,8 +11,10 @@ from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
+from flocsim.ensembles.collision.thermal.release import refuse_release
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.impact import too_deep
 from flocsim.errors import ConfigError, KernelError
 from flocsim.forces import ContactForce
@@ -75,7 +77,7 @@ def check_study(config: Config) -> None:
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
             f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
         )
-    if config.scene.meetings == (BROWNIAN,):
+    if config.scene.meeting == BROWNIAN:
         check_release(config, flocs)
     for name, pair in sphere_pairs(config, flocs):
         check_approach(config, name, pair)
@@ -94,20 +96,15 @@ def check_study(config: Config) -> None:
 
 def check_release(config: Config, flocs: Sequence[Floc]) -> None:
     """ConfigError where outlines may touch as they are let go; of grown flocs it is not known."""
-    release, pool = config.scene.release, pool_of(config.shapes, flocs)
-    assert release is not None
+    pool = pool_of(config.shapes, flocs)
     shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
     shapes += [
         pool.shape(place, n, radius)
         for each in pairings(config, flocs) for radius in each.radii
         for place, floc in enumerate(flocs) for n in floc.shapes
     ]  # fmt: skip
-    farthest = max(shape.bounding_radius / shape.equivalent_radius for shape in shapes)
-    if farthest >= release:
-        raise ConfigError(
-            f"scene.release = {release:g} (r_i + r_j) lets outlines touch that reach up to "
-            f"{farthest:.3g} r_eq: give a larger one, and scene.escape above it"
-        )
+    farthest = max(shapes, key=lambda shape: shape.bounding_radius / shape.equivalent_radius)
+    refuse_release(config.scene, [farthest, farthest])
 
 
 def check_compilable(pair: Encounter) -> None:

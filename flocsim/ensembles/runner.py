@@ -16,7 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
-from flocsim.ensembles.chunks import Interval, merged
+from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import borders
 from flocsim.ensembles.kind import StudyKind
@@ -227,18 +227,11 @@ def share_jobs(study: Any, comm: Communicator, jobs: Sequence[Job], leads: bool 
     return [shares[place % comm.size][place // comm.size] for place in range(len(jobs))]
 
 
-def facts_of(study: StudyKind) -> Facts:
-    """The Facts of this rank."""
-    return Facts(identity_of(study))
-
-
 def own_facts(study: StudyKind, comm: Communicator) -> tuple[Facts | None, str]:
     """(Facts of this rank, ""), or (None, why there are none); rank 0 speaks for itself."""
-    if comm.rank == 0:
-        with sharing_errors(comm):
-            return facts_of(study), ""
     try:
-        return facts_of(study), ""
+        with sharing_errors(comm) if comm.rank == 0 else contextlib.nullcontext():
+            return Facts(identity_of(study)), ""
     except FlocsimError as error:
         return None, f"rank {comm.rank}: {error}"
 
@@ -344,12 +337,13 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     found, failed = start.found(replicates), 0
     for place, intervals in enumerate(found):
         for each in intervals:
-            read = partial(read_rows, start.store, place, each)
+            read = partial(start.store.read, place, first=each[0], stop=each[1])
             failed += int(np.sum(study.has_failed(read)))
     done = [merged([*each, *study.unneeded(place)]) for place, each in enumerate(found)]
+    # Where the rule looks, and nowhere below what the results file has of each condition.
+    looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
     state = StudyState(
-        Schedule.of(done, looks(borders(stop, replicates), start.at_least), ranks,
-                    study.most_rows),
+        Schedule.of(done, looks, ranks, study.most_rows),
         start.store,
         kind_of(study.config).enough(study, start.store),
         allowed=study.allowed,
@@ -364,16 +358,6 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
         if replicate < replicates and not there:
             state.begun[task] = sum(study.counts_part(each.description) for each in records)
     return state
-
-
-def read_rows(store: RowStore, place: int, interval: Interval, name: str) -> np.ndarray:
-    """A column of some replicates of a condition."""
-    return store.read(place, name, *interval)
-
-
-def looks(borders: list[int], least: int) -> list[int]:
-    """Where the rule looks, and nowhere below what the results file has of each condition."""
-    return sorted({max(border, least) for border in borders})
 
 
 def make_results(

@@ -15,7 +15,8 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_o
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, class_words, pairings_of
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.config.schema import BROWNIAN, Config
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape

@@ -7,6 +7,7 @@ it runs uncompiled for debugging and compiled at the speed of hand-written code.
 values never recompile.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, ClassVar
 
@@ -17,13 +18,14 @@ from flocsim.body import Fluid
 
 
 @attrs.frozen
-class Force:
-    """What all forces share; subclass one of the four kinds below."""
+class Force(ABC):
+    """What all forces share; subclass one of the four kinds, BodyForce, CentreForce, SurfaceForce
+    and ContactForce, and give it a static method ``kernel``, its law."""
 
     @staticmethod
+    @abstractmethod
     def kernel(view):
         """The law itself; each kind says what it returns."""
-        raise NotImplementedError("a force needs a static method `kernel`")
 
     def kernel_in(self, fluid: Fluid) -> Callable:
         """The kernel to use in this fluid; a subclass may have a cheaper one for some fluids."""
@@ -55,9 +57,9 @@ class PairForce(Force):
     slope: ClassVar[Any] = None
 
     @property
+    @abstractmethod
     def acts_on(self) -> str:
         """ "centres" (along the line of centres) or "surfaces" (between the outlines)."""
-        raise NotImplementedError("subclass CentreForce or SurfaceForce")
 
     @property
     def reach(self) -> float:

@@ -112,6 +112,16 @@ def write_file(path: str | os.PathLike, data: bytes, rule: Rule = keep) -> None:
         new.file.write(data)
 
 
+def make_folder(path: str | os.PathLike, option: str = "") -> None:
+    """Make a folder where there is none; FileError, which names the option, if it cannot be."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"{option}{path} could not be made: {error.strerror}; name another folder"
+        ) from error
+
+
 def fresh_beside(target: Path, length: int = 0) -> tuple[Path, int]:
     """(path, open descriptor) of a new file in the target's folder, locked while it is open.
 

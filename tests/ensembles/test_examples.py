@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.swarms.kind import check_swarm
+from flocsim.ensembles.swarms.kind import check_study as check_swarms
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library
@@ -72,7 +72,7 @@ def test_a_reduced_example_runs(path, examples):
 
 @pytest.mark.parametrize("path", SWARMS, ids=lambda path: path.stem)
 def test_a_swarm_describes_itself(path, examples):
-    check_swarm(load_any_config(examples / path.name))
+    check_swarms(load_any_config(examples / path.name))
     done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
     assert (done.returncode, done.stderr) == (0, "")
     assert SWARMS[path] in done.stdout and "N = 16" in done.stdout

@@ -63,11 +63,14 @@ REFUSED = {
     ("sweep", "strengths"): "pairs.h5",
     ("Study", "strengths"): "pairs.h5",
     ("compare", "strengths"): "two results of pairs, or two of swarms, can be compared",
-    ("report", "strengths"): "is not a results file, it holds a flocsim strength",
+    (
+        "report",
+        "strengths",
+    ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
     ("dry run", "strengths"): "unrecognized arguments: --dry-run",
     ("export", "pairs"): "is of no kernel study and has no rates",
-    ("export", "swarms"): "is not a results file, it holds a flocsim swarm",
-    ("export", "strengths"): "is not a results file, it holds a flocsim strength",
+    ("export", "swarms"): "holds a flocsim swarm",
+    ("export", "strengths"): "holds a flocsim strength",
 }
 """What is refused, and the words that say why."""
 

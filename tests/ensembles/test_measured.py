@@ -84,7 +84,7 @@ def test_which_flocs_are_drawn_follows_from_seed_and_replicate_alone(folder):
          'study.toml:4: scene.pairs: "measured" draws flocs that were measured, but shapes.source '
          'is no library: give source = "library" and file, which `flocsim fit` wrote'),
         ('"measured"', '"measurd"',
-         "study.toml:4: scene.pairs must be 'measured' or a list, found 'measurd' (did you mean "
+         "study.toml:4: scene.pairs must be 'measured', found 'measurd' (did you mean "
          "'measured'?)"),
     ],
 )  # fmt: skip

@@ -4,6 +4,7 @@ import numpy as np
 
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import NOT_APPLICABLE, Results
+from flocsim.io.results.schema import BLANKS, REPLICATES
 
 FAILURES = ("none", "overlap_too_deep", "step_budget")
 
@@ -60,7 +61,8 @@ def make_results(
     again = draw_second_runs((outcome, inside, bond))
     failure = np.select([outcome == 6, outcome == 5], [1, 2], 0)
     zone = rng.uniform(30e-6, 50e-6, shape)
-    replicates = {
+    blank = {name: np.full(shape, BLANKS[kind]) for name, (kind, _, _) in REPLICATES.items()}
+    replicates = blank | {
         "r_i": rng.uniform(4e-6, 20e-6, shape),
         "r_j": rng.uniform(4e-6, 20e-6, shape),
         "D_0": zone,

@@ -7,6 +7,7 @@ rung of both methods and takes the time.
 import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -22,7 +23,7 @@ from flocsim.ensembles.pilot.sample import sample_of
 from flocsim.ensembles.pilot.trials import Job, Trial, try_out
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.studies.replicates import with_one_count
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.io.confidence import wilson
@@ -74,10 +75,10 @@ class Measured:
 def part_of(config: Config, args: Namespace) -> Config:
     """The config with the type, N and δ alone that were named."""
     place, vertices, delta = select(config, args)
-    scene = config.scene
+    scene: Any = config.scene
     if args.type is not None:
         scene = scene.only([place])
-    if args.delta is not None:
+    if len(scene.delta) > 1 and args.delta is not None:
         scene = attrs.evolve(scene, delta=(delta,))
     if args.vertices is not None:
         config = with_one_count(config, vertices)
@@ -177,7 +178,7 @@ def run(args: Namespace) -> int:
         checked_format(path)
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
-    study = study_of(config, flocs_of(config), first_methods(config))
+    study = study_of(config, methods=first_methods(config))
     target = ALLOWED * sampling_error(config)
     climbed: list[Measured] = []
     panels: dict[str, list[Rung]] = {}

@@ -19,7 +19,8 @@ from flocsim.ensembles.collision.start import largest_displacement, orientations
 from flocsim.ensembles.collision.thermal import kicked
 from flocsim.ensembles.collision.thermal.cage import caged_between
 from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
-from flocsim.ensembles.config.schema import BROWNIAN, FLOWS, SETTLING, Config, SceneConfig
+from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
+from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
@@ -60,7 +61,7 @@ class Encounter:
     """
 
     system: System
-    options: SceneConfig
+    options: PairScene
     zone_distance: float
     meeting: str = SETTLING
     settling: tuple[tuple[np.ndarray, float], ...] = attrs.field(init=False)

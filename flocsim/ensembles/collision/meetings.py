@@ -24,7 +24,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.config.schema import BROWNIAN, EXTENSION, SETTLING, SHEAR
+from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR
 from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce

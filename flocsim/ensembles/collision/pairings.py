@@ -10,12 +10,14 @@ the order of their sizes, so that a number means the same quantile at any weight
 import abc
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, pool_of
-from flocsim.ensembles.config.schema import SETTLING, Config, SceneConfig
+from flocsim.ensembles.config.pair_scene import SETTLING, PairScene
+from flocsim.ensembles.config.schema import Config
 from flocsim.errors import ConfigError
 
 EXPONENTS = {"number": 0, "area": 2, "volume": 3}
@@ -141,17 +143,25 @@ def median(values, weights):
     return float(values[quantile(weights, 0.5)])
 
 
-def size_classes(scene: SceneConfig, flocs: Sequence[Floc]) -> list[SizeClass]:
-    """The classes of ``[scene] pairs = "measured"``; ConfigError for one without flocs."""
-    sizes = np.array([floc.size for floc in flocs], float)
+def within_limits(scene: Any, flocs: Sequence[Floc]) -> np.ndarray:
+    """Places of the measured flocs between `min_radius` and `max_radius` of a scene, in the order
+    of their sizes; ConfigError where there is none."""
+    sizes = np.array([floc.measured_size for floc in flocs], float)
     low, high = scene.min_radius or 0.0, scene.max_radius or math.inf
-    order = [k for k in np.argsort(sizes, kind="stable").tolist() if low <= sizes[k] <= high]
-    told = f"{len(flocs)} flocs of {in_words(sizes)}"
-    if not order:
+    order = np.argsort(sizes, kind="stable")
+    found = order[(sizes[order] >= low) & (sizes[order] <= high)]
+    if not len(found):
         raise ConfigError(
-            f"scene.min_radius and max_radius leave no floc of the library, which holds {told}"
+            "scene.min_radius and max_radius leave no floc of the library, which holds "
+            f"{len(flocs)} flocs of {in_words(sizes)}"
         )
-    chosen = sizes[order]
+    return found
+
+
+def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
+    """The classes of ``[scene] pairs = "measured"``; ConfigError for one without flocs."""
+    order = within_limits(scene, flocs)
+    chosen = np.array([flocs[place].measured_size for place in order.tolist()])
     weights = (chosen / chosen.max()) ** EXPONENTS[scene.weight or "number"]
     if isinstance(scene.classes, tuple):
         number = np.searchsorted(scene.classes, chosen, side="right")
@@ -167,7 +177,7 @@ def size_classes(scene: SceneConfig, flocs: Sequence[Floc]) -> list[SizeClass]:
                 "give fewer or wider classes, or a library of more flocs"
             )
         share = weights[mine] / weights[mine].sum()
-        classes.append(SizeClass(label, np.array(order)[mine], chosen[mine], share))
+        classes.append(SizeClass(label, order[mine], chosen[mine], share))
     return classes
 
 

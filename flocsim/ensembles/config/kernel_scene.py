@@ -6,15 +6,18 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.schema import (
-    KERNEL_REPLICATES,
+from flocsim.ensembles.config.pair_scene import (
+    CLASSES,
+    FLOWS,
     LARGEST_LENGTH,
     MEASURED,
     MECHANISMS,
     MOST_CLASSES,
     SETTLING,
-    SceneConfig,
-    contradictions,
+    WEIGHT,
+    DrivenScene,
+    FlowScene,
+    Problem,
     micrometres,
 )
 from flocsim.ensembles.config.values import (
@@ -26,16 +29,16 @@ from flocsim.ensembles.config.values import (
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
+from flocsim.forces.thermal import thermal_in
 
 MOST_SCRAMBLES = 64
 
-read_meeting = one_of(MECHANISMS)
-read_meetings = list_of(read_meeting, "one of, or a list of, 'settling', 'shear', 'extension'")
+KERNEL_REPLICATES = 4096
+"""Of every condition of a kernel study where nothing is said."""
 
-
-def read_meeting_or_list(value: Any) -> tuple[str, ...]:
-    """One mechanism or a list of them, as a tuple."""
-    return (read_meeting(value),) if isinstance(value, str) else read_meetings(value)
+read_meetings = list_of(
+    one_of(MECHANISMS), "one of, or a list of, 'settling', 'shear', 'extension'"
+)
 
 
 def as_tuple(value: Any) -> tuple[str, ...]:
@@ -43,33 +46,25 @@ def as_tuple(value: Any) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value)
 
 
-def inherited(name: str) -> Any:
-    """A field of SceneConfig whose default follows from one that is defined anew before it."""
-    field = attrs.fields_dict(SceneConfig)[name]
-    return attrs.field(default=field.default, validator=field.validator, metadata=field.metadata)
-
-
-def fixed(value: Any) -> Any:
-    """A field of SceneConfig that is no key here."""
-    return attrs.field(init=False, default=value)
-
-
 @attrs.frozen
-class KernelScene(SceneConfig):
+class KernelScene(DrivenScene):
     """With `kind = "kernel"`: what brings bodies of which sizes together, how their orientations
     and offsets are sampled, and how their meetings begin and end."""
 
     kind: str = choice("kernel", default="kernel", help="rates of encounters")
-    meeting: tuple[str, ...] = attrs.field(  # type: ignore[assignment]
+    meeting: tuple[str, ...] = attrs.field(
         default=(SETTLING,),
         converter=as_tuple,
         metadata={
-            "read": read_meeting_or_list,
+            "read": lambda value: read_meetings([value] if isinstance(value, str) else value),
             "allowed": '"settling", "shear" or "extension", or a list of them',
             "shown": '"settling"',
             "help": "mechanisms that bring bodies together, each by itself: weight alone, or a "
             "flow alone, u = (G y, 0) or u = (s x, -s y), without weight",
         },
+    )
+    rate: float | None = quantity(
+        "1/s", above=0.0, default=None, help="G or s of the flow in which they meet"
     )
     sizes: tuple[float, ...] | None = read_by(
         list_of(
@@ -86,14 +81,11 @@ class KernelScene(SceneConfig):
         default=None,
         help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
     )
-    weight: str | None = inherited("weight")
-    classes: int | tuple[float, ...] | None = inherited("classes")
-    types: None = fixed(None)
-    release: None = fixed(None)
-    escape: None = fixed(None)
-    delta: tuple[float, ...] = fixed((1.0,))
-    delta_max: str = fixed("radius")
-    receiver: str = fixed("free")
+    weight: str | None = WEIGHT
+    classes: int | tuple[float, ...] | None = CLASSES
+    types: None = attrs.field(init=False, default=None)
+    delta: tuple[float, ...] = attrs.field(init=False, default=(1.0,))
+    delta_max: str = attrs.field(init=False, default="radius")
     start_gap: float | str = word_or_quantity(  # type: ignore[assignment]
         "auto",
         "m",
@@ -119,6 +111,8 @@ class KernelScene(SceneConfig):
         "from whose scatter the intervals follow; replicates = scrambles times a power of 2",
     )
 
+    flow_in_fluid = FlowScene.flow_in_fluid
+
     def __attrs_post_init__(self):
         if not set(self.meeting) <= set(MECHANISMS):
             raise ConfigError(f"meeting must be of {', '.join(MECHANISMS)}")
@@ -136,12 +130,12 @@ class KernelScene(SceneConfig):
                 "bodies of one size settle alike and never meet: give several sizes, or a meeting "
                 "in shear or extension"
             )
+        if any(each in FLOWS for each in self.meeting) != (self.rate is not None):
+            raise ConfigError(
+                'rate is that of a flow, and meeting = "shear" or "extension" needs one, as in '
+                'rate = "10 1/s"'
+            )
         super().__attrs_post_init__()
-
-    @property
-    def meetings(self) -> tuple[str, ...]:
-        """The mechanisms."""
-        return self.meeting
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -191,19 +185,25 @@ class KernelScene(SceneConfig):
         """The scene as it is: its classes stay together."""
         return self
 
-
-def kernel_problems(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """(place, what is wrong) of what does not go together in a study of rates."""
-    yield from contradictions(parts)
-    scene, replicates = parts["scene"], parts.get("replicates", KERNEL_REPLICATES)
-    points, rest = divmod(replicates, scene.scrambles)
-    if rest or points < 1 or points & (points - 1):
-        least = scene.scrambles << (max(points, 1).bit_length() - 1)
-        text = (
-            f"must be scene.scrambles = {scene.scrambles} times a power of 2, as Sobol's points "
-            f"are even only so: found {replicates}, take {least} or {2 * least}"
-        )
-        yield ("replicates",), text
-    if parts["stop"] is not None and parts["stop"].half_width is not None:
-        text = "is for probabilities, and a study of rates runs all its points: "
-        yield ("stop", "half_width"), text + "give more replicates and --resume instead"
+    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+        """What does not go together with the other tables of a config, by their names."""
+        yield from super().problems(parts)
+        if thermal_in(parts["forces"]):
+            text = (
+                "brings bodies together from beyond the offsets that a study of rates samples, "
+                "which would cut its widths off: leave it out, or let two bodies meet by "
+                'scene.meeting = "brownian"'
+            )
+            yield ("forces", "thermal"), text
+        replicates = parts.get("replicates", KERNEL_REPLICATES)
+        points, rest = divmod(replicates, self.scrambles)
+        if rest or points < 1 or points & (points - 1):
+            least = self.scrambles << (max(points, 1).bit_length() - 1)
+            text = (
+                f"must be scene.scrambles = {self.scrambles} times a power of 2, as Sobol's points "
+                f"are even only so: found {replicates}, take {least} or {2 * least}"
+            )
+            yield ("replicates",), text
+        if parts["stop"] is not None and parts["stop"].half_width is not None:
+            text = "is for probabilities, and a study of rates runs all its points: "
+            yield ("stop", "half_width"), text + "give more replicates and --resume instead"

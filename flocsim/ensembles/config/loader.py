@@ -5,7 +5,6 @@ from pathlib import Path
 
 import attrs
 
-from flocsim.ensembles.config.kernel_scene import KernelScene, kernel_problems
 from flocsim.ensembles.config.overrides import lay_over
 from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.presets import PRESETS
@@ -18,23 +17,22 @@ from flocsim.ensembles.config.schema import (
     TABLES,
     TOP_KEYS,
     Config,
-    SceneConfig,
     contradictions,
+    elsewhere,
     implied,
     keys_of,
+    scene_class,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.swarm_scene import SwarmScene, swarm_problems
+from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 
-SCENES: dict[str, type] = {"binary": SceneConfig, "swarm": SwarmScene, "kernel": KernelScene}
-PROBLEMS = {SceneConfig: contradictions, SwarmScene: swarm_problems, KernelScene: kernel_problems}
-"""Kind of scene → class of the table [scene]."""
-
+DEFAULTS = {"source": "synthetic"}
+"""Of keys that others go with."""
 
 FOR_PAIRS = {"zone", "stop"}
 """Tables that a swarm has no use for."""
@@ -86,14 +84,6 @@ def load_any_config(
     return Config(text=text, folder=folder, overrides=overrides, **parts)
 
 
-def scene_class(table: dict) -> type:
-    """The class of a config's [scene], by its kind; an unknown kind is told as one of SceneConfig's
-    keys."""
-    scene = table.get("scene")
-    kind = scene.get("kind") if isinstance(scene, dict) else None
-    return SCENES.get(kind, SceneConfig) if isinstance(kind, str) else SceneConfig
-
-
 @attrs.frozen
 class Reader:
     """Reads the tables of one config file; what is wrong is noted in ``problems`` and left out.
@@ -112,14 +102,12 @@ class Reader:
                 self.problems.unknown((key,), TOP_KEYS)
         given = {key: table[key] for key in STUDY_KEYS if key in table}
         parts = self.values(STUDY_KEYS, given, ())
-        scene = scene_class(table)
-        for name, table_class in TABLES.items():
-            table_class = scene if name == "scene" else table_class
+        for name, table_class in (TABLES | {"scene": scene_class(table)}).items():
             parts[name] = self.table(name, table_class, table.get(name, {}))
         forces = self.forces(table.get("forces", {}))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
         if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
-            for place, text in PROBLEMS[scene](parts):
+            for place, text in contradictions(parts):
                 self.problems.note(place, text)
         return parts
 
@@ -137,6 +125,8 @@ class Reader:
             table = {key: table[key] for key in beside if key in table}
             kind = keys["class"].metadata["own"]
             own = {"own": self.own_object(kind, (name,), parameters, beside)}
+        if name == "scene":
+            table = self.without_keys_of_others(table_class, table)
         values = self.values(keys, table, (name,)) | own
         if "file" in values and values.get("source") == "library":
             values["file"] = self.library(values["file"])
@@ -144,6 +134,20 @@ class Reader:
         if self.problems.at(name) or (name == "bodies" and self.problems.at("preset")):
             return None
         return self.made(table_class, values, (name,))
+
+    def without_keys_of_others(self, scene, table):
+        """The table [scene] without the keys of other kinds of it, each of which is noted unless
+        it says what is so anyway."""
+        fixed = {each.name: each.default for each in attrs.fields(scene) if not each.init}
+        owners = {key: elsewhere(key, scene) for key in table if key not in keys_of(scene)}
+        for key, found in owners.items():
+            try:
+                if found and reader_of(found[0][1])(table[key]) != fixed.get(key):
+                    text = f"goes with {' or '.join(tag for tag, _ in found)}: remove it"
+                    self.problems.note(("scene", key), text)
+            except Misfit as error:
+                self.problems.misfit(("scene", key), error)
+        return {key: value for key, value in table.items() if not owners.get(key)}
 
     def check_alternatives(self, name, table, keys):
         present = [sorted(each & table.keys()) for each in ALTERNATIVES.get(name, ())]
@@ -156,12 +160,12 @@ class Reader:
             for other in sorted(against & table.keys()) if key in table and not others else ():
                 text = f"excludes {key}, which is given too: remove one of them"
                 self.problems.note((name, other), text)
-        source = table.get("source", "synthetic")
         for key in [key for key in table if key in keys and "class" not in table]:
-            needed = keys[key].metadata.get("only_for")
-            if needed not in (None, source):
-                text = f'goes with source = "{needed}", but source is {show(source)}: remove it'
-                self.problems.note((name, key), text)
+            other, word = keys[key].metadata.get("only_for", ("", ""))
+            given = table.get(other, DEFAULTS.get(other))
+            if other and given != word:
+                found = f"but {other} is {show(given)}" if given else f"and there is no {other}"
+                self.problems.note((name, key), f'goes with {other} = "{word}", {found}: remove it')
 
     def library(self, name):
         path = self.folder / name

@@ -21,7 +21,7 @@ from flocsim.ensembles.config.problems import misfit
 from flocsim.ensembles.config.sources import Neighbours, Sources
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number
-from flocsim.forces import BodyForce, ContactForce, Force, PairForce
+from flocsim.forces import BodyForce, ContactForce, PairForce
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import Integrator
 
@@ -96,8 +96,6 @@ def why_unfit(found, kind):
     """What is wrong with a class of this kind, in words; "" where nothing is."""
     if not (inspect.isclass(found) and issubclass(found, kind.bases)):
         return f"is no {kind.name}: subclass {kind.advice}"
-    if getattr(found, "kernel", None) is Force.kernel:
-        return "has no static method `kernel`, which computes the force"
     if inspect.isabstract(found):
         return f"does not define {', '.join(sorted(found.__abstractmethods__))}"
     if "__attrs_attrs__" not in vars(found):

@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.schema import LARGEST_LENGTH, weight_contradictions
+from flocsim.ensembles.config.pair_scene import LARGEST_LENGTH, Problem, size_limit
 from flocsim.ensembles.config.values import list_of, number, read_by, vector, whole_field
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, flag, number_range, quantity, word_or_quantity
@@ -87,12 +87,8 @@ class SwarmScene:
         help="how often a measured floc is drawn: number, each alike; area or volume, in "
         "proportion to r_eq² or r_eq³",
     )
-    min_radius: float | None = quantity(
-        "m", above=0.0, at_most=LARGEST_LENGTH, default=None, help="least r_eq that is drawn"
-    )
-    max_radius: float | None = quantity(
-        "m", above=0.0, at_most=LARGEST_LENGTH, default=None, help="largest r_eq that is drawn"
-    )
+    min_radius: float | None = size_limit("least")
+    max_radius: float | None = size_limit("largest")
     gap: float = quantity(
         "m", at_least=0.0, default=0.0, help="least distance of outlines at the start"
     )
@@ -186,23 +182,19 @@ class SwarmScene:
         """Whether bodies are flocs of a library, each at its own size."""
         return self.radius is None
 
-
-def swarm_problems(parts: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """(place, what is wrong) of what does not go together in a swarm."""
-    yield from weight_contradictions(parts["bodies"], parts["fluid"])
-    scene, shapes = parts["scene"], parts["shapes"]
-    if len(shapes.vertices) > 1:
-        text = (
-            f"a swarm has bodies of one number of vertices, found {list(shapes.vertices)}: give one"
-        )
-        yield ("shapes", "vertices"), text
-    if shapes.pairs_alike_in == "error":
-        yield ("shapes", "pairs_alike_in"), "is for pairs, and a swarm has none"
-    if scene.is_measured and shapes.source != "library":
-        text = 'needs radius, the median r_eq, or measured flocs (shapes.source = "library")'
-        yield ("scene",), text
-    if not scene.is_measured and shapes.size == "own":
-        text = '"own" takes every floc at its own size: leave out scene.radius'
-        yield ("shapes", "size"), text
-    if parts["integrator"] is not None and parts["integrator"].is_chosen:
-        yield ("integrator", "accuracy"), "is for studies of pairs: give name and tolerance"
+    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+        """What does not go together with the other tables of a config, by their names."""
+        shapes = parts["shapes"]
+        if len(shapes.vertices) > 1:
+            found = f"found {list(shapes.vertices)}: give one"
+            yield ("shapes", "vertices"), f"a swarm has bodies of one number of vertices, {found}"
+        if shapes.pairs_alike_in == "error":
+            yield ("shapes", "pairs_alike_in"), "is for pairs, and a swarm has none"
+        if self.is_measured and shapes.source != "library":
+            text = 'needs radius, the median r_eq, or measured flocs (shapes.source = "library")'
+            yield ("scene",), text
+        if not self.is_measured and shapes.size == "own":
+            text = '"own" takes every floc at its own size: leave out scene.radius'
+            yield ("shapes", "size"), text
+        if parts["integrator"] is not None and parts["integrator"].is_chosen:
+            yield ("integrator", "accuracy"), "is for studies of pairs: give name and tolerance"

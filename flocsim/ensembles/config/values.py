@@ -164,26 +164,9 @@ def list_of(
     return read
 
 
-def word_or(word: str, read_other: Reader) -> Reader:
-    """A reader of one word, or of what the other reader takes."""
-
-    def read(value):
-        if not isinstance(value, str):
-            return read_other(value)
-        if value != word:
-            raise misfit(f"{word!r} or a list", value, suggestion(value, (word,)))
-        return value
-
-    return read
-
-
-def count_or(read_count: Reader, read_list: Reader) -> Reader:
-    """A reader of a number, or of a list."""
-
-    def read(value):
-        return read_list(value) if isinstance(value, list | tuple) else read_count(value)
-
-    return read
+def either(kind: type, read_kind: Reader, read_other: Reader) -> Reader:
+    """A reader of values of a type, and of all others."""
+    return lambda value: (read_kind if isinstance(value, kind) else read_other)(value)
 
 
 def vector(length: int, unit: str = "", **limits: float) -> Reader:

@@ -32,7 +32,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.config.schema import SETTLING, SHEAR
+from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.kernels.sampling import as_draws, points_of
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore

@@ -1,9 +1,8 @@
-"""Outcomes that change at a tighter tolerance: of a study's own second runs, or of two studies."""
+"""Outcomes that change at a tighter tolerance, of a study's own second runs."""
 
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
 from flocsim.io.results.schema import CLASSES, NOT_APPLICABLE, Results
 
 
@@ -36,28 +35,3 @@ def second_run_changes(results: Results) -> OutcomeChanges:
     """The OutcomeChanges of a study's second runs; its table of replicates must be there."""
     assert results.replicates is not None, "the table of replicates was left on the disk"
     return changes_between(results.replicates["outcome"], results.replicates["checked_outcome"])
-
-
-def outcome_changes(found: Results, exact: Results) -> OutcomeChanges:
-    """The OutcomeChanges of the first runs of ``found`` against those of ``exact``.
-
-    Of the same conditions. Replicates are paired; the shorter of the two decides how many are
-    compared. UsageError where the conditions differ.
-    """
-    same = (
-        found.types == exact.types
-        and np.array_equal(found.vertices, exact.vertices)
-        and np.array_equal(found.delta, exact.delta)
-    )
-    if not same:
-        raise UsageError("the two results are not of the same conditions: name runs of one config")
-    outcomes = [each.replicates["outcome"] for each in (found, exact) if each.replicates]
-    count = min(each.shape[-1] for each in outcomes)
-    a, b = (each[..., :count] for each in outcomes)
-    return changes_between(a, b)
-
-
-def percent_changed(changed: np.ndarray, among: np.ndarray) -> float:
-    """Percent of what is in ``among`` that has changed; NaN of nothing."""
-    count = np.count_nonzero(among)
-    return 100.0 * np.count_nonzero(changed & among) / count if count else np.nan

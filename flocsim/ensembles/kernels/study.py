@@ -8,8 +8,8 @@ import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.schema import SETTLING, Config
+from flocsim.ensembles.config.pair_scene import SETTLING
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels.sampling import (
     as_draws,
     flow_offset,
@@ -35,12 +35,6 @@ class KernelStudy(Study):
     A replicate is a point of a scrambled Sobol sequence, the same in all conditions: orientations,
     flocs, and the offset b of j's way from i's centre, which is share · (R_i + R_j).
     """
-
-    @property
-    def scene(self) -> KernelScene:
-        """[scene] of the config."""
-        scene: Any = self.config.scene
-        return scene
 
     def numbers(self, replicate: int) -> np.ndarray:
         """The point of a replicate: two orientations, two choices of floc, the offset."""

@@ -36,7 +36,7 @@ from flocsim.ensembles.pilot.sample import expected_replicates, sample_of
 from flocsim.ensembles.pilot.trials import WEIGHTS, Job, Trial, try_out
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.storage.identity import identity_of, short
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import RangeError
 from flocsim.explain import STABLE, all_scales
 from flocsim.integrators import DormandPrince54, Implicit
@@ -333,7 +333,7 @@ def final_methods(config: Config) -> dict[str, Integrator]:
     """The methods that a study of the config has, a pilot run here where it is to choose them."""
     if not config.integrator.is_chosen:
         return first_methods(config)
-    return choose(study_of(config, flocs_of(config), first_methods(config))).methods
+    return choose(study_of(config, methods=first_methods(config))).methods
 
 
 def choice_lines(record: dict) -> list[str]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.ensembles.config.schema import SETTLING
+from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
@@ -102,11 +102,12 @@ def method_facts(study):
 
 def settings(table, values):
     """The fields of an attrs object under the names that the config file has for them."""
-    left_out = VARIABLE.get(table, ())
+    left_out, pair = VARIABLE.get(table, ()), getattr(values, "kind", None) == "binary"
     return {
         f"{table}.{field.name}": plain(getattr(values, field.name))
         for field in attrs.fields(type(values))
-        if field.name not in left_out and field.init
+        # Of pairs, what is fixed in one way to meet is a key in others.
+        if field.name not in left_out and (field.init or (table == "scene" and pair))
     }
 
 

@@ -26,7 +26,7 @@ from flocsim.ensembles.chunks import (
     rows_of,
     total,
 )
-from flocsim.ensembles.kind import OldRows, StudyKind
+from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
@@ -96,7 +96,7 @@ class Beginning:
         old = self.store.old
         return (
             old is not None
-            and old.whole
+            and old.there is None
             and count <= old.count
             and all(condition in old.places for condition in self.store.conditions)
         )
@@ -156,7 +156,7 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 
 def begin(
     study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
-    old_rows: Callable[..., OldRows], cpus: Sequence[dict] = (), overwrite: bool = False,
+    old_rows: Callable[..., OldTable], cpus: Sequence[dict] = (), overwrite: bool = False,
     accuracy: dict | None = None,
 ) -> Beginning:  # fmt: skip
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
@@ -170,10 +170,7 @@ def begin(
     start = Beginning(RowStore(journal, study.conditions, study.row), identity)
     start.cpus_now, start.rule, start.accuracy = list(cpus), rule_of(study), accuracy or {}
     start.resources.callback(journal.release)
-
-    def take_rows() -> None:
-        take_results(start, study, output, old_rows)
-
+    take_rows = partial(take_results, start, study, output, old_rows)
     try:
         take_journal(start, study)
         take_place(start, output, mode, overwrite, take_rows)
@@ -236,19 +233,16 @@ def refuse_fewer(start, output, replicates):
     asked = set(start.store.conditions)
     left_out = [condition for condition in old.places if condition not in asked]
     if left_out or old.count > replicates:
-        what = "; ".join(
-            ([f"{len(left_out)} conditions such as {spelled(left_out[0])}"] if left_out else [])
-            + ([f"{old.count} replicates of each"] if old.count > replicates else [])
-        )
+        what = [f"{old.count} replicates of each"] if old.count > replicates else []
+        if left_out:
+            name, n, share = left_out[0]
+            such = f"type {name}, N = {n}, delta {share:g}"
+            what.insert(0, f"{len(left_out)} conditions such as {such}")
         raise UsageError(
-            f"{output} has rows that this run does not ask for ({what}), and others are missing "
-            "in it: ask for all of them together, or name another output"
+            f"{output} has rows that this run does not ask for ({'; '.join(what)}), and others are "
+            "missing in it: ask for all of them together, or name another output"
         )
     start.at_least = old.count
-
-
-def spelled(condition):
-    return f"type {condition.type}, N = {condition.vertices}, delta {condition.delta:g}"
 
 
 def take_journal(start: Beginning, study: StudyKind) -> None:
@@ -365,17 +359,14 @@ def take_results(start, study, output, old_rows):
         if condition in old.places and count:
             for interval in [(0, count)] if old.there is None else old.there[condition]:
                 start.store.add(place, *interval, -1)
-    whole = old.there is None
-    start.store.old = OldTable(
-        old.columns, old.places, os.fspath(output), count, before, old.more, whole
-    )
+    start.store.old = attrs.evolve(old, path=os.fspath(output), before=before)
     start.notes += found["failed"]
     start.cpus_found = distinct([*found["cpus"], *start.cpus_found])
     earlier = {key: run[key] for key in HISTORY if key in run}
     start.history = [*found["history"], earlier, *start.history]
 
 
-def check_old(study: StudyKind, old: OldRows) -> None:
+def check_old(study: StudyKind, old: OldTable) -> None:
     """ValueError for rows of a results file that no run can have given."""
     for condition in study.conditions:
         for first in range(0, old.count if condition in old.places else 0, BLOCK):

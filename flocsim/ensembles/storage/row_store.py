@@ -25,26 +25,29 @@ MOST_HELD = 2**25
 """Bytes of checked chunks that are kept for the next column."""
 
 
-@attrs.define(eq=False)
+@attrs.frozen(eq=False)
 class OldTable:
-    """The table of replicates of a results file that is open: dataset by name.
+    """Rows of an older results file.
 
-    ``places``: Condition → its place in the arrays; ``path``: of the file; ``count``: replicates of
-    each; ``before``: what `stamp` said of the file before its checksum was found right; ``more``:
-    what else its kind of study takes from it; ``whole``: whether it has all replicates of these.
+    ``columns`` {name: array}, each of which ends in the replicates; ``places``: Condition → its
+    place in them; ``count``: replicates of each; ``run``: scalars of the file; ``more``: what else
+    its kind of study takes from it; ``there``: which replicates there are of each condition, where
+    these are not all; ``path``: of the file; ``before``: what `stamp` said of it before its
+    checksum was found right.
     """
 
-    datasets: Mapping[str, Any]
+    columns: Mapping[str, Any]
     places: Mapping[Condition, tuple[int, ...]]
-    path: str = ""
-    count: int = 0
-    before: tuple | None = None
+    count: int
+    run: Mapping[str, Any] = attrs.Factory(dict)
     more: Any = None
-    whole: bool = True
+    there: Mapping[Condition, list[Interval]] | None = None
+    path: str = ""
+    before: tuple | None = None
 
     def read(self, condition: Condition, name: str, first: int, stop: int) -> np.ndarray:
         """Values of a column; FileError where the open file has been written to meanwhile."""
-        values = self.datasets[name][(*self.places[condition], slice(first, stop))]
+        values = self.columns[name][(*self.places[condition], slice(first, stop))]
         now = stamp(self.path) if self.before else None
         # Another file of that name is none of ours: this one is open and cannot be reached.
         if self.before and now and now[0] == self.before[0] and now != self.before:

@@ -91,7 +91,7 @@ class OldColumns:
             name: Column(descriptor, name, offset, self.shape)
             for name, offset in self.offsets.items()
         }
-        return OldTable(columns, self.places, self.path, self.shape[-1], now)
+        return OldTable(columns, self.places, self.shape[-1], path=self.path, before=now)
 
 
 def ending_of(descriptor):
@@ -101,9 +101,9 @@ def ending_of(descriptor):
 
 def old_columns(table: OldTable) -> OldColumns | None:
     """Where others find the rows of an open table; None where these do not lie in a row."""
-    offsets, shape = {}, table.datasets[COLUMNS[0]].shape
+    offsets, shape = {}, table.columns[COLUMNS[0]].shape
     for name in COLUMNS:
-        dataset = table.datasets[name]
+        dataset = table.columns[name]
         offset = dataset.id.get_offset()
         if offset is None or dataset.dtype != ROW[name] or dataset.shape != shape:
             return None

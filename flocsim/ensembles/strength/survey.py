@@ -11,21 +11,24 @@ from typing import Any, ClassVar, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, Interval, missing
+from flocsim.ensembles.chunks import Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
 from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
-from flocsim.ensembles.kind import Code, Going, Keep, Kind, OldRows, Place, StudyKind
-from flocsim.ensembles.kinds import KINDS
+from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.storage.row_store import OldTable
+from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, done_in, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
-from flocsim.ensembles.studies.opened import StudyResults
-from flocsim.errors import UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
+from flocsim.io.journal.records import Record
 from flocsim.io.provenance import now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.strength_file import (
+    FORMAT,
     ROW,
     STATUS,
     Strengths,
@@ -52,7 +55,7 @@ class Bound(NamedTuple):
     bond: int
 
 
-def bound_doublets(results: StudyResults) -> Iterator[Bound]:
+def bound_doublets(results: Any) -> Iterator[Bound]:
     """The doublets that a study has found bound, in the order of the file."""
     outcomes, bonds = results.replicates["outcome"], results.replicates["bond"]
     codes = [OUTCOMES.index(name) for name in AGGREGATED]
@@ -66,7 +69,7 @@ class Bonds:
     """What stands in the place of [scene]: the bound doublets of ``results`` in a ``flow``, a key
     of FLOWS; ``count`` of every condition, all for None; ``precision`` of a rate."""
 
-    results: StudyResults
+    results: Any
     flow: str = "shear"
     count: int | None = None
     precision: float = 5e-3
@@ -131,11 +134,6 @@ class StrengthStudy(StudyKind):
         for place, replicate in self.bonds:
             if self.scene.count is None or len(self.wanted[place]) < self.scene.count:
                 self.wanted[place].append(replicate)
-
-    @property
-    def scene(self) -> Any:
-        """The Bonds."""
-        return self.config.scene
 
     @property
     def size(self) -> int:
@@ -234,7 +232,7 @@ def about_of(study: StrengthStudy, machine: dict | None = None) -> dict[str, Any
     }  # fmt: skip
 
 
-def digest_of(results: StudyResults) -> str:
+def digest_of(results: Any) -> str:
     """A hash of what the doublets of a file follow from, and of which are bound by what."""
     found = hashlib.blake2b(digest_size=16)
     facts = results.stored("identity"), list(results.types)
@@ -247,7 +245,7 @@ def digest_of(results: StudyResults) -> str:
     return found.hexdigest()
 
 
-def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The doublets of an earlier survey, in arrays of all replicates."""
     found = read_strengths(output)
     axes = [found.conditions.axes[name].values.tolist() for name in AXES]
@@ -260,19 +258,14 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
         blank = NOT_APPLICABLE if name == "bond" else 0
         columns[name] = np.full((*map(len, axes), count), blank, ROW[name])
         columns[name][at] = found.column(name)
-    places = {
-        Condition(str(name), int(n), float(share)): (t, v, d)
-        for t, name in enumerate(axes[0])
-        for v, n in enumerate(axes[1])
-        for d, share in enumerate(axes[2])
-    }
+    places = places_in(*axes)
     there: dict[Condition, list[Interval]] = {condition: [] for condition in places}
     by_place = {place: condition for condition, place in places.items()}
     for t, v, d, replicate in zip(*(each.tolist() for each in at), strict=True):
         there[by_place[t, v, d]].append((replicate, replicate + 1))
     run = {"identity": json.dumps({name: found.about.get(name) for name in AGREED})}
     run |= {name: str(found.about[name]) for name in ("date", "cpus") if name in found.about}
-    return OldRows(run, columns, places, count, found, there)
+    return OldTable(columns, places, count, run, found, there)
 
 
 def results(
@@ -302,6 +295,25 @@ def in_words(opening: Opening) -> str:
     return f"a run failed behind {opening.holds:.4g} 1/s {runs}"
 
 
+SURVEY = {"bound": [int], "wanted": int, "about": {}}
+"""What a session says of strengths, as a pattern."""
+
+
+def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
+    """What a journal has of the strengths of bonds."""
+    asked = sessions[-1]["asked"]
+    survey, shape = asked["strength"], tuple(len(asked[name]) for name in ORDER)
+    if len(survey["bound"]) != np.prod(shape):
+        raise FileError(f"{path} does not say what is bound")
+    bound = np.array(survey["bound"], dtype=np.int64).reshape(shape)
+    about = survey["about"] | {"asked": survey["wanted"], "complete": False}
+    with ReadOnlyJournal(str(path)) as journal:
+        store, notes, unread = store_of(journal, sessions, found, asked, ROW, check_opened)
+        found_so = strengths_in(store, bound, about)
+    done, wanted = done_in(store), survey["wanted"]
+    return Unfinished(path, FORMAT, found_so, done, wanted, notes, sessions, unread, "doublets")
+
+
 STRENGTHS = Kind(
     make=lambda config, flocs=None, methods=None: StrengthStudy(config),
     flocs=lambda config: [], identity=about_of, code=TESTING, check=lambda config: None,
@@ -309,5 +321,5 @@ STRENGTHS = Kind(
     old_rows=old_rows, results=results, read=read_strengths, table=table_of,
     total=lambda found: len(found.column("status")), verdict=lambda found: (0, ""),
     dry_run=lambda config, ranks, pilot: StrengthStudy(config).title,
+    so_far=so_far, asked={"strength": SURVEY},
 )  # fmt: skip
-KINDS[Bonds] = STRENGTHS

@@ -199,14 +199,21 @@ def compare(
         np.array_equal(rows[0][name][..., :pairs], rows[1][name][..., :pairs], equal_nan=True)
         for name in ("angle_i", "angle_j")
     )
-    trials = [trials_in(each) for each in rows]
+    trials = [
+        events(each["outcome"], each["inside"], each["bond"])
+        | {PER_APPROACH: approaches(each["outcome"])}
+        for each in rows
+    ]
     arrays = {}
     for name in COMPARED:
         found = differences_of(trials[0][name], trials[1][name], pairs if paired else None)
         added = (
             [numerical_per_approach(each) for each in rows]
             if name == PER_APPROACH
-            else [numerical(each, name, wanted) for each in (first, second)]
+            else [
+                each.probabilities[f"{name}_numerical"][np.ix_(*places(each, wanted))]
+                for each in (first, second)
+            ]
         )
         arrays[name] = found | {"numerical": np.sum(added, axis=0)}
     return Comparison(
@@ -252,16 +259,6 @@ def picked(results, wanted):
     at = np.ix_(*places(results, wanted))
     names = ("angle_i", "angle_j", "outcome", "inside", "bond", "checked_outcome")
     return {name: results.replicates[name][at] for name in names}
-
-
-def numerical(results, name, wanted):
-    return results.probabilities[f"{name}_numerical"][np.ix_(*places(results, wanted))]
-
-
-def trials_in(rows):
-    """{probability: (whether a replicate counts in it, whether as a success)}, all of COMPARED."""
-    found = events(rows["outcome"], rows["inside"], rows["bond"])
-    return found | {PER_APPROACH: approaches(rows["outcome"])}
 
 
 def approaches(outcome):

@@ -23,18 +23,17 @@ from flocsim.ensembles.studies.replicates import (
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_whole
+from flocsim.io.contents import RESULTS, STRENGTH, SWARM, SWEEP, content_of
 from flocsim.io.files import held
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import kind_of
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
-from flocsim.io.results import strength_file, swarm_file, sweep_file
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import GROUPS, Results
-from flocsim.io.results.strength_file import Strengths, read_strengths
-from flocsim.io.results.swarm_file import SwarmResults, read_swarm
-from flocsim.io.results.sweep_file import SweepResults, read_sweep
+from flocsim.io.results.strength_file import Strengths
+from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.io.results.sweep_file import SweepResults
 from flocsim.trajectories.trajectory import Trajectory
 
 INDICES = {name: group.index for name, group in GROUPS.items()}
@@ -152,29 +151,28 @@ class StudyResults(Tables):
         return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
 
 
+Opened = StudyResults | SweepResults | SwarmResults | Strengths
+
+
 def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> StudyResults:
-    """A results file, checked; its table of replicates stays on the disk until it is asked for.
-
-    ``folder``: where the config lay, its shape library and its own modules (default: where the
-    results lie). FileError for a file that is absent, damaged, or of another kind.
-    """
-    source = held(path)
-    found = read_results(source, replicates=False)
-    return StudyResults(found, source, Path(path).parent if folder is None else Path(folder))
+    """A results file of pairs or rates; see `open_any`."""
+    found = opened(path, folder, (RESULTS,))
+    assert isinstance(found, StudyResults)
+    return found
 
 
-def open_any(
-    path: str | os.PathLike, folder: str | os.PathLike | None = None
-) -> StudyResults | SweepResults | SwarmResults | Strengths:
-    """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked.
+def open_any(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> Opened:
+    """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked;
+    the table of replicates of pairs stays on the disk until it is asked for.
 
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    source = held(path)
-    kind = kind_of(source)
-    if kind == swarm_file.FORMAT:
-        return read_swarm(source)
-    if kind == strength_file.FORMAT:
-        return read_strengths(source)
-    return read_sweep(source) if kind == sweep_file.FORMAT else open_results(source, folder)
+    return opened(path, folder, (RESULTS, SWARM, SWEEP, STRENGTH))
+
+
+def opened(path, folder, kinds):
+    """What a file of one of these kinds holds."""
+    source, where = held(path), Path(path).parent if folder is None else Path(folder)
+    kind, found = content_of(source, kinds)
+    return StudyResults(found, source, where) if kind == RESULTS else found

@@ -35,8 +35,9 @@ from flocsim.ensembles.storage.plan import (
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.studies.opened import StudyResults, open_any
 from flocsim.ensembles.studies.study import WAYS, Study
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
 from flocsim.fields import is_number
+from flocsim.io.files import make_folder
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
@@ -97,10 +98,7 @@ def sweep(
         for path, part in parts.items()
         if goes_on and os.path.lexists(path)
     }
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{folder} could not be made: {error.strerror}") from error
+    make_folder(folder)
     write_plan(folder, plan)
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.swarms.study import SwarmStudy, scene_of
+from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.explain import force_lines, scale_lines
 from flocsim.io.terminal import duration
 from flocsim.plausibility.reynolds import settled
@@ -17,7 +17,8 @@ BODY_BYTES = 8 * 6 + 4
 
 def dry_run(config: Config, ranks: int) -> str:
     """All that is known of a study before it is run."""
-    study, scene = SwarmStudy(config), scene_of(config)
+    study = SwarmStudy(config)
+    scene = study.scene
     swarm, drawn, (width, height) = study.swarm(0)
     radii = 1e6 * np.array([shape.equivalent_radius for shape in drawn.shapes])
     area = sum(shape.area for shape in drawn.shapes)

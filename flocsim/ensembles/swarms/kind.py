@@ -8,13 +8,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
-from flocsim.ensembles.chunks import Condition
+from flocsim.ensembles.chunks import Condition, is_chunk
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kind import Kind, OldRows
+from flocsim.ensembles.doubts import names_in
+from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import (
     PHYSICS,
@@ -24,14 +26,27 @@ from flocsim.ensembles.storage.identity import (
     shape_numbers,
 )
 from flocsim.ensembles.storage.resume import Beginning
+from flocsim.ensembles.storage.row_store import OldTable
+from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.unfinished import Unfinished
 from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from, table_of
+from flocsim.ensembles.swarms.checks import FORM, Form, check_part
 from flocsim.ensembles.swarms.dry_run import dry_run, largest_pair
-from flocsim.ensembles.swarms.records import Found
+from flocsim.ensembles.swarms.records import Found, part_of
 from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
-from flocsim.errors import ConfigError, FlocsimError, UsageError
+from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
+from flocsim.fields import is_whole
 from flocsim.forces import ContactForce
-from flocsim.io.results.swarm_file import ENDS, SwarmResults, read_swarm, write_swarm
-from flocsim.plausibility.doubts import Names, doubts_of
+from flocsim.io.journal.records import CHUNK, SNAPSHOT, Record
+from flocsim.io.results.swarm_file import (
+    ENDS,
+    FORMAT,
+    SwarmResults,
+    check_swarm,
+    read_swarm,
+    write_swarm,
+)
+from flocsim.plausibility.doubts import doubts_of
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import check_box
 
@@ -42,7 +57,7 @@ LEFT_OUT = ("scene.checkpoint",)
 """Keys that change nothing that is computed."""
 
 
-def check_swarm(config: Config) -> None:
+def check_study(config: Config) -> None:
     """Raise the FlocsimError that the study would meet: forces, sizes, library, room in the box."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
@@ -98,21 +113,18 @@ def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
 
 def doubts(study: SwarmStudy) -> list[str]:
     """Lines on what is implausible."""
-    names = Names(
-        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
-        forces=tuple(f"forces.{name}" for name in study.config.force_names),
-    )  # fmt: skip
+    names = names_in(study.config, study.config.forces)
     return doubts_of([largest_pair(study.first)], names)
 
 
-def old_rows(output: str | Path, resources: ExitStack) -> OldRows:
+def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The replicates of a results file."""
     found = read_swarm(output)
     ends, run = found.groups["ends"], found.run
     count, vertices = len(ends["finished"]), int(run.get("vertices", 0))
     trial = int(str(run.get("trial", "0")), 16)
     columns = {**ends, "trial": np.full(count, trial, "u8")}
-    return OldRows(run, columns, {Condition("swarm", vertices, 0.0): ()}, count, found)
+    return OldTable(columns, {Condition("swarm", vertices, 0.0): ()}, count, run, found)
 
 
 def results(
@@ -166,12 +178,63 @@ def verdict(found: SwarmResults) -> tuple[int, str]:
     return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
 
 
+def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
+    """What a journal has of swarms, of which those appear that have begun."""
+    asked, form, unread = sessions[-1]["asked"]["replicates"], form_of(sessions[-1]["asked"]), 0
+    if not form.times or form.bodies < 1:
+        raise FileError(f"{path} does not say what is kept of a swarm")
+    parts: dict[int, list[Record]] = {}
+    notes: list[dict] = []
+    with ReadOnlyJournal(str(path)) as journal:
+        for each in found:
+            about = each.description
+            if each.kind == CHUNK:
+                notes += about.get("notes", []) if is_chunk(about) else []
+            if each.kind != SNAPSHOT:
+                continue
+            try:
+                check_part(part_of(about, journal.read(each.offset, each.length)), form)
+            except ValueError:
+                unread += each.length
+                continue
+            replicate = about.get("replicate")
+            if replicate is not None and is_whole(replicate) and 0 <= replicate < asked:
+                parts.setdefault(replicate, []).append(each)
+        swarms = {replicate: Found.of(records) for replicate, records in sorted(parts.items())}
+        swarms = {replicate: each for replicate, each in swarms.items() if each.bodies}
+        done = sum(len(each.moments) for each in swarms.values())
+        if not done:
+            raise FileError(f"{path} has no snapshot yet: try again later")
+        known = max(max(each.moments, default=0) for each in swarms.values()) + 1
+        if known > done:
+            raise FileError(f"{path} holds no readable swarms: snapshots of it are missing")
+        seen = attrs.evolve(form, times=form.times[:known])
+        groups = groups_of(seen, list(swarms.values()), journal.read)
+    groups["ends"] = {name: np.zeros(len(swarms), kind) for name, (kind, _, _) in ENDS.items()}
+    made = results_from(seen, groups, {"periodic": form.periodic}, np.array(list(swarms)))
+    try:
+        check_swarm(made.scales, groups)
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable swarms: {error}") from error
+    return Unfinished(
+        path, FORMAT, made, done, asked * len(form.times), notes, sessions, unread, "snapshots"
+    )
+
+
+def form_of(asked: dict) -> Form:
+    """What the records of swarms look like, by what a session says."""
+    about = asked["swarm"]
+    times, bounds = (tuple(map(float, about[name])) for name in ("times", "bounds"))
+    return Form(about["bodies"], bounds, times, about["periodic"])
+
+
 SWARMS = Kind(
     make=lambda config, flocs=None, methods=None: SwarmStudy(
         config, **({} if flocs is None else {"flocs": flocs})
     ),
-    flocs=flocs_of, identity=identity_of, code=CODE, check=check_swarm, prepare=check_room,
+    flocs=flocs_of, identity=identity_of, code=CODE, check=check_study, prepare=check_room,
     doubts=doubts, facts=facts, old_rows=old_rows, results=results, read=read_swarm,
     table=table_of, total=lambda found: len(found.scales["replicate"]), verdict=verdict,
     dry_run=lambda config, ranks, pilot: dry_run(config, ranks),
+    so_far=so_far, asked={"swarm": FORM},
 )  # fmt: skip

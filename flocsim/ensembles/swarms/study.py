@@ -10,14 +10,13 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
-from flocsim.ensembles.collision.pairings import EXPONENTS, quantile
+from flocsim.ensembles.collision.pairings import EXPONENTS, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.ensembles.swarms.checks import Form, check_ends, check_part
 from flocsim.ensembles.swarms.records import MOMENT, Found, Left, Read, part_of
 from flocsim.ensembles.swarms.replicate import run_replicate
-from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
 from flocsim.io.journal.records import Record
@@ -50,22 +49,16 @@ class Drawn:
     shapes: list[Shape]
 
 
-def scene_of(config: Config) -> SwarmScene:
-    """[scene] of a config that is known to be of a swarm."""
-    scene: Any = config.scene
-    return scene
-
-
 def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's swarm needs: none for spheres of given sizes."""
-    scene, shapes = scene_of(config), shapes_of(config)
-    needed = scene.is_measured or max(shapes.vertices) > 1
+    shapes = shapes_of(config)
+    needed = config.scene.is_measured or max(shapes.vertices) > 1
     return load_flocs(shapes, config.seed) if needed else []
 
 
 def shapes_of(config: Config) -> ShapesConfig:
     """[shapes], measured flocs keeping their sizes."""
-    own = scene_of(config).is_measured
+    own = config.scene.is_measured
     return attrs.evolve(config.shapes, size="own") if own else config.shapes
 
 
@@ -79,6 +72,8 @@ class SwarmStudy(StudyKind):
         default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
     )
     pool: FlocPool = attrs.field(init=False)
+    choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
+    """Places of the measured flocs that bodies are drawn from."""
     any_swarm: Swarm | None = attrs.field(init=False, default=None)
     trial: int = attrs.field(init=False, default=0)
     row: ClassVar[np.dtype] = ROW
@@ -88,29 +83,13 @@ class SwarmStudy(StudyKind):
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
-        if self.scene.is_measured and not len(self.choosable):
-            sizes = [1e6 * floc.measured_size for floc in self.flocs]
-            raise ConfigError(
-                "scene.min_radius and max_radius leave no floc of the library, which holds "
-                f"{len(sizes)} of {min(sizes):.3g} to {max(sizes):.3g} um"
-            )
-
-    @property
-    def scene(self) -> SwarmScene:
-        return scene_of(self.config)
+        if self.scene.is_measured:
+            self.choosable = within_limits(self.scene, self.flocs)
 
     @property
     def vertices(self) -> int:
         """N of all bodies."""
         return self.config.shapes.vertices[0]
-
-    @property
-    def choosable(self) -> np.ndarray:
-        """Places of the measured flocs that are within the limits, in the order of their sizes."""
-        sizes = np.array([floc.measured_size for floc in self.flocs])
-        low, high = self.scene.min_radius or 0.0, self.scene.max_radius or math.inf
-        order = np.argsort(sizes, kind="stable")
-        return order[(sizes[order] >= low) & (sizes[order] <= high)]
 
     @property
     def stops(self) -> list[float]:

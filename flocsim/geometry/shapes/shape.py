@@ -66,6 +66,12 @@ class Shape:
         @property
         def radius(self) -> float: ...
 
+    def __new__(cls, *values: object, **named: object) -> "Shape":
+        """TypeError of Shape itself, which has no outline."""
+        if cls is Shape:
+            raise TypeError("Shape is abstract: subclass it, and give `core` and `radius`")
+        return super().__new__(cls)
+
     @cached_property
     def swept(self) -> Swept:
         for name in ("core", "radius"):

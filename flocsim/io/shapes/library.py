@@ -244,12 +244,6 @@ def reach_of(entry):
     )
 
 
-def is_library(path: str | os.PathLike) -> bool:
-    """Whether a file is a shape library, by its kind; FileError for one that cannot be opened."""
-    with opened(path) as (file, nodes):
-        return text_of(file, nodes, "kind") == KIND
-
-
 def read_settings(path: str | os.PathLike) -> dict[str, Any]:
     """{name: value} of what the fits of a shape library were made with."""
     with opened(path) as (file, _):

@@ -163,18 +163,6 @@ def test_pairs_alike_in_their_error_may_have_any_fit_of_the_library(library):
     assert all(list(floc.shapes) == list(floc.errors) == [4, 8] for floc in load_flocs(shapes, 1))
 
 
-@pytest.mark.parametrize(
-    ("words", "why"),
-    [
-        ({"size": "own"}, 'size = "own" goes with source = "library"'),
-        ({"own": ROD, "pairs_alike_in": "error"}, "was not fitted to a floc"),
-    ],
-)
-def test_what_cannot_be_read_so_is_refused(words, why):
-    with pytest.raises(ConfigError, match=why):
-        ShapesConfig(**words)
-
-
 def test_a_floc_that_is_kept_is_the_one_that_was_grown_bit_by_bit(tmp_path, monkeypatch):
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
     tmp_path.chmod(0o700)

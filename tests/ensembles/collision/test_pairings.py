@@ -10,7 +10,7 @@ from flocsim.ensembles.collision.pairings import (
     quantile,
     size_classes,
 )
-from flocsim.ensembles.config.schema import SceneConfig
+from flocsim.ensembles.config.pair_scene import SettlingScene
 from flocsim.errors import ConfigError
 
 SIZES = (9e-6, 2e-6, 4e-6, 4e-6, 6e-6, 12e-6)
@@ -22,7 +22,7 @@ def flocs_of(sizes):
 
 
 def pair_of(sizes=SIZES, places=(0, 0), **words):
-    classes = size_classes(SceneConfig(pairs="measured", **words), flocs_of(sizes))
+    classes = size_classes(SettlingScene(pairs="measured", **words), flocs_of(sizes))
     return TwoClasses("pair", *(classes[place] for place in places))
 
 
@@ -81,7 +81,7 @@ def test_limits_and_borders_choose_the_flocs():
 
 def test_classes_of_equal_weight_and_one_size_in_one_class():
     def numbers(count, sizes=SIZES, **words):
-        scene = SceneConfig(pairs="measured", classes=count, **words)
+        scene = SettlingScene(pairs="measured", classes=count, **words)
         return [each.sizes.tolist() for each in size_classes(scene, flocs_of(sizes))]
 
     assert numbers(2) == [[2e-6, 4e-6, 4e-6], [6e-6, 9e-6, 12e-6]]

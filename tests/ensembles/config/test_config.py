@@ -11,13 +11,12 @@ from flocsim.body import Body
 from flocsim.commands import init
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.pair_scene import TYPES, BrownianScene, FlowScene, SettlingScene
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
     FORCES,
-    TYPES,
     BodiesConfig,
     IntegratorConfig,
-    SceneConfig,
     ShapesConfig,
     ZoneConfig,
 )
@@ -55,22 +54,22 @@ def zone_number(config):
 
 
 def test_conditions_are_named_by_type_or_by_radii():
-    assert SceneConfig(types=("III", "I")).given == (
+    assert SettlingScene(types=("III", "I")).given == (
         ("III", (4.62e-6, 4.95e-6)),
         ("I", (16.41e-6, 23.02e-6)),
     )
     pairs = ((16.41e-6, 23.02e-6), (1e-6, 100e-6))
-    assert SceneConfig(pairs=pairs).given == (
+    assert SettlingScene(pairs=pairs).given == (
         ("16.41um-23.02um", pairs[0]),
         ("1um-100um", pairs[1]),
     )
-    assert SceneConfig(pairs=pairs).names == ("16.41um-23.02um", "1um-100um")
-    assert SceneConfig().names == ("I", "II", "III")
+    assert SettlingScene(pairs=pairs).names == ("16.41um-23.02um", "1um-100um")
+    assert SettlingScene().names == ("I", "II", "III")
 
 
 def test_size_classes_are_named_by_their_quantile_or_by_their_radii():
     def names(classes):
-        return SceneConfig(pairs="measured", classes=classes).names
+        return SettlingScene(pairs="measured", classes=classes).names
 
     assert names(1) == ("measured",)
     assert names(2) == ("q1-q1", "q1-q2", "q2-q2")
@@ -78,40 +77,40 @@ def test_size_classes_are_named_by_their_quantile_or_by_their_radii():
     assert names((1e-5, 2e-5))[3:] == (
         "10to20um-10to20um", "10to20um-from20um", "from20um-from20um",
     )  # fmt: skip
-    assert SceneConfig(pairs="measured").weight == "number"
-    assert SceneConfig().weight is SceneConfig().classes is None
+    assert SettlingScene(pairs="measured").weight == "number"
+    assert SettlingScene().weight is SettlingScene().classes is None
 
 
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ({"weight": "area"}, 'weight goes with pairs = "measured"'),
-        ({"pairs": ((1e-6, 2e-6),), "max_radius": 1e-6}, 'max_radius goes with pairs = "measured"'),
         ({"pairs": "measured", "min_radius": 2e-6, "max_radius": 1e-6}, "is not below max_radius"),
         ({"pairs": "measured", "classes": (2e-5, 1e-5)}, "ascending radii .* found 20 um, 10 um"),
         ({"pairs": "measured", "min_radius": 2e-5, "classes": (1e-5,)}, "ascending radii between"),
         ({"pairs": "measured", "classes": 0}, "from 1 to 20"),
-        ({"pairs": "meazured"}, "pairs must be 'measured' or a list"),
+        ({"pairs": "meazured"}, "pairs must be 'measured', found"),
     ],
 )
 def test_what_measured_pairs_cannot_be(words, why):
     with pytest.raises(ConfigError, match=why):
-        SceneConfig(**words)
+        SettlingScene(**words)
 
 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: SceneConfig(delta=(0.5, 0.5)),
-        lambda: SceneConfig(delta_max="projekted"),
-        lambda: SceneConfig(start_gap=0.0),
-        lambda: SceneConfig(escape_gap="auto"),
+        lambda: SettlingScene(delta=(0.5, 0.5)),
+        lambda: SettlingScene(delta_max="projekted"),
+        lambda: SettlingScene(meeting="brownian"),
+        lambda: FlowScene(meeting="settling", rate=1.0),
+        lambda: BrownianScene(release=4.0),
+        lambda: SettlingScene(start_gap=0.0),
+        lambda: SettlingScene(escape_gap="auto"),
         lambda: ShapesConfig(vertices=(4, 3.0)),
         lambda: ShapesConfig(vertices=(0,)),
         lambda: ShapesConfig(pool=True),
         lambda: ShapesConfig(fractal_dimension=2.0),
         lambda: ShapesConfig(source="library"),
-        lambda: ShapesConfig(file="x.h5"),
         lambda: BodiesConfig(),
         lambda: BodiesConfig(surface_density=2.0, density=2650.0),
         lambda: ZoneConfig(root="middle"),

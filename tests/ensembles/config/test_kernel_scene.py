@@ -55,7 +55,7 @@ def test_measured_classes_have_their_pairs(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"meeting": '"shear"'}, 'meeting = "shear" needs rate'),
+        ({"meeting": '"shear"'}, '"extension" needs one, as in rate = "10 1/s"'),
         ({"scene": 'rate = "1 1/s"'}, "rate is that of a flow"),
         ({"meeting": '"brownian"'}, "must be"),
         ({"replicates": 33}, "scene.scrambles = 4 times a power of 2"),

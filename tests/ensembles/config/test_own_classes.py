@@ -202,7 +202,7 @@ def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_module, monkeypat
         ("own:Yukawe", "", "has no 'Yukawe'; its forces: Yukawa, NoKernel, Undecorated"),
         ("own:Apple", "", "is no force: subclass flocsim.forces.BodyForce"),
         ("own:SCALE", "", "is no force: subclass flocsim.forces.BodyForce"),
-        ("own:NoKernel", "", "has no static method `kernel`"),
+        ("own:NoKernel", "", "does not define kernel"),
         ("own:Undecorated", "", "is not decorated: put @attrs.frozen"),
         ("math:pi", "", "is no force"),
         ("own.sub:A", "", "there is no module 'own.sub'"),

@@ -4,11 +4,8 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.outcome_changes import (
-    outcome_changes,
-    percent_changed,
-    second_run_changes,
-)
+from benchmarks.accuracy.tolerance import outcome_changes, percent_changed
+from flocsim.ensembles.estimates.outcome_changes import second_run_changes
 from flocsim.errors import UsageError
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.paper_like import paper_results, relabelled

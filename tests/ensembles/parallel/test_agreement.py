@@ -96,7 +96,7 @@ def test_a_kernel_that_cannot_be_hashed_ends_all_ranks(tmp_path, monkeypatch):
     def refuse(study):
         raise KernelError("mine.py:3: no")
 
-    monkeypatch.setattr(runner, "facts_of", refuse)
+    monkeypatch.setattr(runner, "identity_of", refuse)
     comm = Pair(lambda own: own)
     with pytest.raises(SharedError, match=r"mine.py:3: no"):
         run_to_file(small_config(tmp_path), comm, tmp_path / "r.h5", "new")

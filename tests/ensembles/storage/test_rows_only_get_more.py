@@ -347,7 +347,7 @@ def test_the_lock_is_held_before_anything_is_grown_and_to_the_end(tmp_path, monk
         busy.append(True)
         return original(*words)
 
-    for name in ("flocs_of", "facts_of", "make_results"):
+    for name in ("flocs_of", "own_facts", "make_results"):
         original = getattr(runner, name)
         monkeypatch.setattr(runner, name, lambda *words, o=original: probe(*words, original=o))
     go_on(tmp_path, NEW)

@@ -11,7 +11,7 @@ from flocsim.errors import FileError
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.hdf5.structure import Unfit, structure_of
 from flocsim.io.results.file import read_overview, read_results, write_results
-from flocsim.io.shapes.library import is_library, read_library, read_settings
+from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.small_study import write_star_library
 from tests.helpers.synthetic_results import make_results
 
@@ -121,7 +121,7 @@ def test_a_file_of_the_system_is_not_read_as_storage(results):
 
     changed(results, change)
     refused(results)
-    for reader in (read_overview, is_library):
+    for reader in (read_overview, read_settings):
         with pytest.raises(FileError, match=r"readable results|complete"):
             reader(results)
 

@@ -10,6 +10,9 @@ from flocsim.io.plots.style import save
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
 
+OF_COLLISIONS = ("4", "5", "6", "8", "bonds", "delta", "overview")
+"""Figures that have nothing to show where bodies miss each other."""
+
 
 def texts(axes):
     """All that is written inside a panel."""
@@ -158,7 +161,7 @@ def test_a_panel_without_events_says_so():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", [name for name in FIGURES if name not in ("efficiency", "size")])
+@pytest.mark.parametrize("name", OF_COLLISIONS)
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
     assert all("no " in texts(axes) for axes in figure.axes)
@@ -191,10 +194,11 @@ def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
     results = make_results(**conditions, count=5)
     figure = FIGURES[name](results)
     save(figure, tmp_path / "figure.svg")
-    assert len([axes for axes in figure.axes if axes.get_visible()]) in (
-        len(results.vertices) if name == "size" else len(results.types),
-        4 * len(results.types),
-    )
+    if name in OF_COLLISIONS or name == "size":  # others need not have a panel for each type
+        assert len([axes for axes in figure.axes if axes.get_visible()]) in (
+            len(results.vertices) if name == "size" else len(results.types),
+            4 * len(results.types),
+        )
 
 
 def pooled_sizes():

@@ -5,33 +5,34 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.ensembles.config.schema import SceneConfig
-from flocsim.errors import UsageError
+from flocsim.ensembles.config.pair_scene import PairScene
+from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
 
 
-def ends_of(options: SceneConfig, shapes: Sequence[Shape]) -> tuple[float, float]:
+def ends_of(options: PairScene, shapes: Sequence[Shape]) -> tuple[float, float]:
     """Distances of the centres [m] at which two bodies are let go, and at which they have missed
     each other."""
-    assert options.release is not None and options.escape is not None
     size = sum(shape.equivalent_radius for shape in shapes)
     return options.release * size, options.escape * size
 
 
-def refuse_release(options: SceneConfig, shapes: Sequence[Shape], diffusion: float) -> None:
-    """UsageError where two bodies do not diffuse, or their outlines may touch as they are let go.
+def refuse_release(
+    options: PairScene, shapes: Sequence[Shape], diffusion: float = math.inf
+) -> None:
+    """ConfigError where two bodies do not diffuse, or their outlines may touch as they are let go.
 
     ``diffusion``: D of the two against each other [m²/s].
     """
     if not diffusion > 0.0:
-        raise UsageError(
+        raise ConfigError(
             "two bodies that do not diffuse never meet: add [forces.thermal], of a temperature "
             "above 0 K"
         )
     size = sum(shape.equivalent_radius for shape in shapes)
     outer = sum(shape.bounding_radius for shape in shapes)
     if not outer < ends_of(options, shapes)[0]:
-        raise UsageError(
+        raise ConfigError(
             f"scene.release = {options.release:g} (r_i + r_j) lets outlines touch that reach "
             f"{outer / size:.3g} (r_i + r_j): give a larger one, and scene.escape above it"
         )

@@ -6,16 +6,16 @@ import pytest
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
-from flocsim.ensembles.config.schema import SceneConfig
+from flocsim.ensembles.config.pair_scene import BrownianScene
 from flocsim.errors import UsageError
 
 SPHERES = (Sphere(1e-6), Sphere(3e-6))
-SCENE = SceneConfig(meeting="brownian", release=1.5, escape=5.0)
+SCENE = BrownianScene(release=1.5, escape=5.0)
 
 
 def test_distances_are_multiples_of_the_sum_of_radii():
     assert ends_of(SCENE, SPHERES) == pytest.approx((6e-6, 2e-5))
-    usual = SceneConfig(meeting="brownian")
+    usual = BrownianScene()
     assert (usual.release, usual.escape, usual.delta) == (2.0, 4.0, (0.0,))
 
 

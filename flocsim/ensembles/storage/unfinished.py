@@ -1,0 +1,77 @@
+"""What the journal of an unfinished study holds, as a kind of study reads it, and its rows."""
+
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, rows_of, total
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.errors import FileError
+from flocsim.io.journal.records import CHUNK, Record
+
+ORDER = ("types", "vertices", "delta")
+"""Axes of conditions, as a session has them."""
+
+
+@attrs.frozen(eq=False)
+class Unfinished:
+    """What a journal holds. ``results``, as in a file of this ``kind``, have what is finished so
+    far, of pairs without replicates and pooled tables; ``done`` of ``asked`` replicates (0:
+    unknown), or what the ``noun`` says, are finished; ``notes`` tell of the failed ones;
+    ``sessions`` describe the runs that wrote it; ``unread`` bytes of chunks are damaged or of other
+    columns."""
+
+    path: Path
+    kind: str
+    results: Any
+    done: int
+    asked: int
+    notes: list[dict]
+    sessions: list[dict]
+    unread: int
+    noun: str = "replicates"
+
+    @property
+    def progress(self) -> str:
+        """ "unfinished: 120 of 400 replicates so far"."""
+        of = f" of {self.asked}" if self.asked >= self.done else ""
+        return f"unfinished: {self.done}{of} {self.noun} so far"
+
+
+def store_of(
+    journal: ReadOnlyJournal, sessions: list[dict], found: list[Record], axes: dict[str, Any],
+    row: np.dtype, check: Callable[[Callable[[str], np.ndarray]], None],
+) -> tuple[RowStore, list[dict], int]:  # fmt: skip
+    """(rows of a journal that can be believed, notes on failed ones, bytes that are damaged);
+    FileError where there is none."""
+    conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
+    places = {condition: place for place, condition in enumerate(conditions)}
+    store, notes, unread = RowStore(journal, conditions, row), [], 0
+    current = any(each["layout"] == layout(row) for each in sessions)
+    for each in found if current else ():
+        about = each.description
+        if each.kind != CHUNK or not fits(about, each.length, row):
+            continue
+        if (place := places.get(condition_of(about))) is None:
+            continue
+        try:
+            check(rows_of(journal.read(each.offset, each.length), row).__getitem__)
+        except ValueError:
+            unread += each.length
+            continue
+        first = about["first"]
+        store.add(place, first, first + about["count"], each.offset, each.digest)
+        notes += about.get("notes", [])
+    if not done_in(store):
+        raise FileError(f"{journal.path} has no finished replicate yet: try again later")
+    return store, notes, unread
+
+
+def done_in(store: RowStore) -> int:
+    """How many replicates there are."""
+    return sum(total(store.intervals(place)) for place in range(len(store.conditions)))
