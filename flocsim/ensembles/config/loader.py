@@ -139,15 +139,17 @@ class Reader:
         """The table [scene] without the keys of other kinds of it, each of which is noted unless
         it says what is so anyway."""
         fixed = {each.name: each.default for each in attrs.fields(scene) if not each.init}
-        owners = {key: elsewhere(key, scene) for key in table if key not in keys_of(scene)}
+        others = {key: elsewhere(key, scene) for key in table if key not in keys_of(scene)}
+        owners = {key: found for key, found in others.items() if found}
         for key, found in owners.items():
             try:
-                if found and reader_of(found[0][1])(table[key]) != fixed.get(key):
-                    text = f"goes with {' or '.join(tag for tag, _ in found)}: remove it"
-                    self.problems.note(("scene", key), text)
+                said = reader_of(next(iter(found.values())))(table[key])
             except Misfit as error:
                 self.problems.misfit(("scene", key), error)
-        return {key: value for key, value in table.items() if not owners.get(key)}
+                continue
+            if said != fixed.get(key):
+                self.problems.note(("scene", key), f"goes with {' or '.join(found)}: remove it")
+        return {key: value for key, value in table.items() if key not in owners}
 
     def check_alternatives(self, name, table, keys):
         present = [sorted(each & table.keys()) for each in ALTERNATIVES.get(name, ())]

@@ -504,14 +504,17 @@ def scene_class(table: Mapping[str, Any]) -> type:
     return PAIR_SCENES.get(meeting, SettlingScene)
 
 
-def elsewhere(key: str, scene: type) -> list[tuple[str, attrs.Attribute]]:
-    """(`meeting = "brownian"`, field) of every other kind of [scene] that has a key."""
-    of_pairs = issubclass(scene, tuple(PAIR_SCENES.values()))
-    return [
-        (f'{"meeting" if of_pairs and word in PAIR_SCENES else "kind"} = "{word}"', found)
-        for word, each in SCENES.items()
-        if (found := keys_of(each).get(key)) is not None
-    ]
+def elsewhere(key: str, scene: type) -> dict[str, attrs.Attribute]:
+    """{`meeting = "brownian"`: field} of every other kind of [scene] that has a key."""
+    found = {}
+    for word, each in SCENES.items():
+        if key in keys_of(each):
+            tag = f'kind = "{word}"'
+            if word in PAIR_SCENES:
+                binary = scene in PAIR_SCENES.values()
+                tag = f'meeting = "{word}"' if binary else 'kind = "binary"'
+            found[tag] = keys_of(each)[key]
+    return found
 
 
 def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:

@@ -62,7 +62,7 @@ def test_measured_classes_have_their_pairs(tmp_path):
         ({"replicates": 24}, "found 24, take 16 or 32"),
         ({"sizes": '["20 um", "10 um"]'}, "ascending"),
         ({"sizes": '["20 um"]'}, "settle alike"),
-        ({"scene": 'receiver = "fixed"'}, "receiver"),
+        ({"scene": 'receiver = "fixed"'}, 'receiver: goes with kind = "binary": remove it'),
         ({"scene": "delta = [0.0]"}, "delta"),
         ({"more": "[stop]\nhalf_width = 0.1"}, "stop.half_width"),
         ({"more": "[fluid]\ngradient = [0.0, 1.0, 0.0, 0.0]"}, "fluid.gradient"),
