@@ -258,8 +258,11 @@ class Reader:
                 values[key] = reader_of(keys[key])(value)
             except Misfit as error:
                 self.problems.misfit((*place, key), error)
-        needed = [key for key, field in keys.items() if field.default is attrs.NOTHING]
-        missing = [key for key in needed if key not in table]
+        missing = [
+            key + field.metadata.get("as_in", "")
+            for key, field in keys.items()
+            if field.default is attrs.NOTHING and key not in table
+        ]
         if missing:
             self.problems.note(place, f"needs {', '.join(missing)}")
         return values

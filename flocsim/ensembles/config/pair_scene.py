@@ -328,7 +328,12 @@ class FlowScene(DrivenScene):
 
     meeting: str = choice(*FLOWS, default=SHEAR, help="the flow, see above")
     rate: float = quantity(
-        "1/s", above=0.0, shown="none", help="G or s of the flow; needed", kw_only=True
+        "1/s",
+        above=0.0,
+        shown="none",
+        help="G or s of the flow; needed",
+        kw_only=True,
+        as_in=', how fast the flow shears or stretches, as in rate = "10 1/s"',
     )
 
     flow_in_fluid = (

@@ -8,7 +8,7 @@ other stand in ALTERNATIVES and INSTEAD_OF; what is checked between tables, in `
 scene. [scene] has a class for each kind of it, SCENES.
 Metadata of this schema alone: ``shown`` is the default where it depends on other keys, ``only_for``
 another key and the word that it must have; ``beside_class`` marks keys that stay where a class is
-named.
+named, and ``as_in`` says how a needed key is written.
 """
 
 import os

@@ -83,7 +83,7 @@ WRONG = {
     "[scene]\nkind = 'shear'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'shear'",
     "[scene]\nmeeting = 'swarm'": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = ['shear']": "scene.meeting must be 'settling', 'shear', 'extension' or ",
-    "[scene]\nmeeting = 'shear'": "scene: needs rate",
+    "[scene]\nmeeting = 'shear'": "scene: needs rate, how fast the flow shears or ",
     "[zone]\nroot = 'middle'": "zone.root must be 'inner' or 'outer', found 'middle'",
     "[zone]\nroot = 'inner'\ncentre = 1e-5": "zone.centre: excludes root, which is given too",
     "[zone]\ndistance = -1e-9": "must be a finite number at least 0 [m], found -1e-09",
