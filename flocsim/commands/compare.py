@@ -34,9 +34,11 @@ def add_parser(subparsers: Any) -> None:
 def run(args: Namespace) -> int:
     """Print the comparison; the exit code."""
     from flocsim.ensembles.studies.compare import SwarmComparison, compare
-    from flocsim.ensembles.studies.opened import open_any
+    from flocsim.ensembles.studies.opened import opened
+    from flocsim.io.contents import RESULTS, SWARM
 
-    comparison = compare(open_any(args.first), open_any(args.second))
+    first, second = (opened(path, (RESULTS, SWARM)) for path in (args.first, args.second))
+    comparison = compare(first, second)
     of_swarms = isinstance(comparison, SwarmComparison)
     print(comparison.table(args.quantity if of_swarms else args.probability))
     return 0

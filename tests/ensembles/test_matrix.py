@@ -62,7 +62,10 @@ KINDS = {
 REFUSED = {
     ("sweep", "strengths"): "pairs.h5",
     ("Study", "strengths"): "pairs.h5",
-    ("compare", "strengths"): "two results of pairs, or two of swarms, can be compared",
+    (
+        "compare",
+        "strengths",
+    ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
     (
         "report",
         "strengths",

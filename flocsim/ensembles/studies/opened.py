@@ -156,7 +156,7 @@ Opened = StudyResults | SweepResults | SwarmResults | Strengths
 
 def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> StudyResults:
     """A results file of pairs or rates; see `open_any`."""
-    found = opened(path, folder, (RESULTS,))
+    found = opened(path, (RESULTS,), folder)
     assert isinstance(found, StudyResults)
     return found
 
@@ -168,11 +168,11 @@ def open_any(path: str | os.PathLike, folder: str | os.PathLike | None = None) -
     ``folder``: where the config of a study lay, its shape library and its own modules (default:
     where the results lie). FileError for a file that is absent, damaged, or of another kind.
     """
-    return opened(path, folder, (RESULTS, SWARM, SWEEP, STRENGTH))
+    return opened(path, (RESULTS, SWARM, SWEEP, STRENGTH), folder)
 
 
-def opened(path, folder, kinds):
-    """What a file of one of these kinds holds."""
+def opened(path, kinds, folder=None):
+    """What a file of one of these kinds holds; see `open_any`."""
     source, where = held(path), Path(path).parent if folder is None else Path(folder)
     kind, found = content_of(source, kinds)
     return StudyResults(found, source, where) if kind == RESULTS else found
