@@ -38,7 +38,7 @@ from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, RowStore
 from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, done_in, store_of
+from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import WITHHELD
@@ -149,12 +149,12 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     with ReadOnlyJournal(str(path)) as journal:
         store, notes, unread = store_of(journal, sessions, found, axes, ROW, checked)
         table = tables(store, tuple(len(axes[name]) for name in ORDER))
-    found_so = Results(
+    made = Results(
         types=axes["types"], vertices=axes["vertices"], delta=axes["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
     )  # fmt: skip
     asked = axes["replicates"] * len(store.conditions)
-    return Unfinished(path, FORMAT, found_so, done_in(store), asked, notes, sessions, unread)
+    return Unfinished(path, FORMAT, made, store.there(), asked, notes, sessions, unread)
 
 
 def axes_of(session: dict, found: list[Condition]) -> dict[str, Any]:

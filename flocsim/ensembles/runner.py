@@ -287,7 +287,7 @@ def lead(
         start.journal.sync()
         progress.finish()
         final = state.schedule.final
-        kept = start.in_journal()
+        kept = start.store.there(in_journal=True)
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, kept)
         ended.count, ended.journal, ended.begun = final, str(start.journal.path), len(state.begun)
         ended.wall_time = time.monotonic() - began

@@ -24,7 +24,6 @@ from flocsim.ensembles.chunks import (
     layout,
     named,
     rows_of,
-    total,
 )
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.cpu_kind import distinct
@@ -104,11 +103,6 @@ class Beginning:
     def has_more(self, count: int) -> bool:
         """Whether the journal has rows that results of so many replicates will not have."""
         return bool(self.unasked) or self.farthest > count
-
-    def in_journal(self) -> int:
-        """How many replicates of these conditions the journal has."""
-        places = range(len(self.store.conditions))
-        return sum(total(self.store.intervals(place, in_journal=True)) for place in places)
 
     def found(self, count: int) -> list[list[Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""

@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, Condition, Interval, merged, missing, starts
+from flocsim.ensembles.chunks import ROW, Condition, Interval, merged, missing, starts, total
 from flocsim.errors import FileError
 from flocsim.io.journal.records import Record
 from flocsim.io.pieces import digest_of
@@ -110,6 +110,11 @@ class RowStore:
         known = self.known(place)
         known = known[known["offset"] >= 0] if in_journal else known
         return merged([(int(e["first"]), int(e["stop"])) for e in known])
+
+    def there(self, in_journal: bool = False) -> int:
+        """How many replicates exist, or how many of them the journal has."""
+        places = range(len(self.conditions))
+        return sum(total(self.intervals(place, in_journal)) for place in places)
 
     def read(
         self, place: int, name: str, first: int, stop: int, known: np.ndarray | None = None

@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, rows_of, total
+from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, rows_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
 from flocsim.errors import FileError
@@ -67,11 +67,6 @@ def store_of(
         first = about["first"]
         store.add(place, first, first + about["count"], each.offset, each.digest)
         notes += about.get("notes", [])
-    if not done_in(store):
+    if not store.there():
         raise FileError(f"{journal.path} has no finished replicate yet: try again later")
     return store, notes, unread
-
-
-def done_in(store: RowStore) -> int:
-    """How many replicates there are."""
-    return sum(total(store.intervals(place)) for place in range(len(store.conditions)))

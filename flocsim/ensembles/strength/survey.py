@@ -20,7 +20,7 @@ from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable
 from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, done_in, store_of
+from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
@@ -309,9 +309,9 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     about = survey["about"] | {"asked": survey["wanted"], "complete": False}
     with ReadOnlyJournal(str(path)) as journal:
         store, notes, unread = store_of(journal, sessions, found, asked, ROW, check_opened)
-        found_so = strengths_in(store, bound, about)
-    done, wanted = done_in(store), survey["wanted"]
-    return Unfinished(path, FORMAT, found_so, done, wanted, notes, sessions, unread, "doublets")
+        made = strengths_in(store, bound, about)
+    done, wanted = store.there(), survey["wanted"]
+    return Unfinished(path, FORMAT, made, done, wanted, notes, sessions, unread, "doublets")
 
 
 STRENGTHS = Kind(
