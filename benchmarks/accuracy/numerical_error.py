@@ -15,9 +15,10 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.numerical import count_changes, trials_of
+from flocsim.ensembles.estimates.numerical import count_changes
 from flocsim.ensembles.estimates.statistics import CODES
 from flocsim.ensembles.runner import run
+from flocsim.io.results.events import events_of
 
 QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
 GOAL = 90.0
@@ -38,9 +39,9 @@ def study(arguments, seed, **integrator):
 def compare(found, exact):
     """{probability: (stated, true)}: errors of all conditions with trials, as flat arrays."""
     codes = [[each.replicates[name] for name in CODES] for each in (found, exact)]
-    changes, trials = count_changes(*codes), trials_of(found.probabilities)
+    changes, trials = count_changes(*codes), events_of(found.probabilities)
     pairs = {}
-    for name, number in trials.items():
+    for name, (number, _, _) in trials.items():
         flips = changes[f"n_gained_{name}"] + changes[f"n_lost_{name}"]
         stated = found.probabilities[f"{name}_numerical"]
         seen = (number > 0) & np.isfinite(stated)

@@ -18,6 +18,7 @@ from flocsim.ensembles.equivalent_spheres import sphere_words
 from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
+    MOST_UNDECIDED,
     checked_line,
     efficiency_lines,
     format_table,
@@ -49,7 +50,8 @@ from flocsim.io.terminal import aligned
 from flocsim.io.trajectory import centre_distance
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "trial", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
+         "warnings", "trial", "settling", "size_classes", "equivalent_spheres",
+         MOST_UNDECIDED)  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -253,7 +255,8 @@ def pair_sweep_rows(found):
     for place in np.ndindex(*columns[0].shape):
         names = [axis[k] for axis, k in zip(axes, place, strict=True)]
         n, value, low, high = (column[place] for column in columns)
-        told = (f"{value:.3f}", f"[{low:.3f}, {high:.3f}]") if value == value else ("-", "-")
+        told = (f"{value:.3f}" if value == value else "-",
+                f"[{low:.3f}, {high:.3f}]" if high == high else "-")  # fmt: skip
         rows.append((*(visible(shown(each), "") for each in names), str(n), *told))
     return rows
 

@@ -26,10 +26,11 @@ from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.report import (
+    MOST_UNDECIDED,
     checked_line,
     format_table,
-    has_withheld,
     kernel_lines,
+    too_many_undecided,
     touch_lines,
     undecided_line,
 )
@@ -112,6 +113,7 @@ def facts(study: Study) -> dict[str, Any]:
     """What the results say of a study besides their tables."""
     given = study.config, study.flocs
     return {
+        MOST_UNDECIDED: study.config.stop.undecided,
         "size_classes": json.dumps(class_facts(study.pairings)),
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),
@@ -128,15 +130,15 @@ def table(found: Results) -> str:
 
 
 def verdict(found: Results) -> tuple[int, str]:
-    """0, or the code of an error where not one replicate has come to an outcome, or of rates that
-    are left open; and what to say of those that have none."""
+    """0, or the code of an error where not one replicate has come to an outcome, or where more are
+    undecided than may be; and what to say of those that have none."""
     line = undecided_line(found)
     if not line:
         return 0, ""
     counts = found.probabilities
     if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
         return FlocsimError.exit_code, line
-    return (WITHHELD if has_withheld(found) else 0), f"warning: {line}"
+    return (WITHHELD if too_many_undecided(found) else 0), f"warning: {line}"
 
 
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:

@@ -22,7 +22,7 @@ from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.schema import NOT_APPLICABLE, RADII
+from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 
 def methods_of(config: Config) -> dict[str, Integrator]:
@@ -39,6 +39,10 @@ def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's study needs: none for spheres alone, unless of measured sizes."""
     needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
     return load_flocs(config.shapes, config.seed) if needed else []
+
+
+TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
+"""Failures behind which more steps, or shorter ones, may come to an outcome."""
 
 
 @attrs.define(eq=False)
@@ -175,11 +179,34 @@ class Study(StudyKind):
         driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
         row = draw.run(driver, max_steps, halted)
         exact = self.exact[self.pairings[condition].name]
+        if row is not None and FAILURES[row["failure"]] in TRIED_AGAIN:
+            row = self.tried_again(draw, exact, row, halted)
         checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
         if row is None or exact is None or not checked:
             return row
         found = self.run_again(draw, exact, halted)
         return None if found is None else row | found
+
+    def tried_again(
+        self, draw: Draw, exact: Integrator | None, row: dict,
+        halted: Callable[[], bool] | None = None,
+    ) -> dict | None:  # fmt: skip
+        """A row that says nothing of the outcome, or that of a second try, where it does.
+
+        With more steps; more exactly, too, where the first did not end for lack of steps. None
+        where it was given up.
+        """
+        ran_out = FAILURES[row["failure"]] == "step budget"
+        if exact is None and not ran_out:
+            return row
+        steps = MORE_STEPS * self.config.integrator.max_steps
+        try:
+            found = draw.run(self.driver(draw.encounter), steps, halted, None if ran_out else exact)
+        except MemoryError:
+            raise
+        except Exception:
+            return row
+        return found if found is None or OUTCOMES[found["outcome"]] not in UNKNOWN else row
 
     def run_again(
         self, draw: Draw, exact: Integrator, halted: Callable[[], bool] | None = None

@@ -140,6 +140,6 @@ def with_errors(table, name, place):
         float(table[name + end][place]) for end in ("", "_low", "_high", "_numerical")
     )
     if math.isnan(value):
-        return "–"
+        return "–" if math.isnan(high) else f"[{low:.3f}, {high:.3f}]"
     added = "?" if math.isnan(numerical) else f"{numerical:.3f}"
     return f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}"

@@ -113,6 +113,15 @@ class StopConfig:
         default=0.1,
         help="share of all replicates that may fail; a study of more is given up, exit code 70",
     )
+    undecided: float = quantity(
+        "",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.05,
+        help="share of a condition's replicates, or of a rate's encounters, that may be undecided "
+        "or failed; a study of more is complete, but ends with exit code 65, and such rates have "
+        "an interval alone",
+    )
 
 
 LARGEST_SEED = 2**63 - 1
@@ -316,9 +325,9 @@ class IntegratorConfig:
         MOST_STEPS,
         default=200_000,
         beside_class=True,
-        help="steps after which a replicate ends undecided; of a swarm, those that an island may "
-        "try from one common time to the next, of more than 50 bodies 50 times so many over its "
-        "bodies",
+        help="steps that a replicate may take; one that has not ended, or has failed, is tried "
+        "once more with five times as many; of a swarm, those that an island may try from one "
+        "common time to the next, of more than 50 bodies 50 times so many over its bodies",
     )
     step: float | None = quantity(
         "s", above=0.0, default=None, help="for methods with a fixed step"

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flocsim.ensembles.estimates.events import INSIDE_CLASSES, OUTSIDE_CLASSES, events
 from flocsim.io.confidence import numerical_error
+from flocsim.io.results.events import events, events_of
 from flocsim.io.results.schema import NOT_APPLICABLE, last_axis
 
 
@@ -27,8 +27,8 @@ def count_changes(
     flipped = checked & ((first[0] != again[0]) | (first[1] != again[1]))
     counts = {"n_checked": np.sum(checked, axis=-1), "n_flipped": np.sum(flipped, axis=-1)}
     second = events(*again)
-    for name, (trial, success) in events(*first).items():
-        trial_again, success_again = second[name]
+    for name, (trial, success, _) in events(*first).items():
+        trial_again, success_again, _ = second[name]
         gained = (success_again & ~success) | (trial & ~success & ~trial_again)
         lost = (success & ~success_again) | (~trial & trial_again & ~success_again)
         for kind, flags in (
@@ -40,29 +40,13 @@ def count_changes(
     return counts
 
 
-def trials_of(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """{probability: trials in the first runs} from the counts of conditions."""
-    classes, bonds = np.asarray(counts["n_class"]), np.asarray(counts["n_bond"])
-    decided, aggregated = classes.sum(axis=-1), bonds.sum(axis=-1)
-    return {
-        "pr_inside": np.asarray(counts["n_collided"]),
-        "pr_a_given_inside": classes[..., list(INSIDE_CLASSES)].sum(axis=-1),
-        "pr_a_given_outside": classes[..., list(OUTSIDE_CLASSES)].sum(axis=-1),
-        "pr_a": decided,
-        "pr_sticks": decided,
-        "pr_hangs": decided,
-        "pr_class": np.broadcast_to(decided[..., np.newaxis], classes.shape),
-        "pr_bond": np.broadcast_to(aggregated[..., np.newaxis], bonds.shape),
-    }
-
-
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """{"pr_…_numerical": array} of every probability, from counts (type, …).
 
     `flocsim.io.confidence.numerical_error` says how. Counts may be sums over conditions.
     """
     found = {}
-    for name, trials in trials_of(counts).items():
+    for name, (trials, _, _) in events_of(counts).items():
         checked = counts[f"n_checked_{name}"]
         flipped = counts[f"n_gained_{name}"] + counts[f"n_lost_{name}"]
         arrays = (flipped, checked, trials)

@@ -11,19 +11,20 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.ensembles.estimates.events import (
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.errors import UsageError
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion, wilson
+from flocsim.io.results.events import (
     AGGREGATED,
     HELD,
-    HOOK,
     INSIDE_CLASSES,
     MISSED,
     OUTSIDE_CLASSES,
     UNDECIDED,
+    Events,
     events,
+    events_of,
 )
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
-from flocsim.errors import UsageError
-from flocsim.io.confidence import clustered_proportion, proportion, wilson
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
 from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES
 
@@ -83,7 +84,10 @@ def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str
 
 
 def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Probabilities with Wilson 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
+    """Probabilities with 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
+
+    Wilson's, from the low end for none to the high end for all of those that are undecided or have
+    failed (`flocsim.io.confidence.proportion`).
 
     pr_inside = n_inside / n_collided: where the outlines first touched is known for every one.
     pr_a_given_inside = A/(A+B), pr_a_given_outside = C/(C+D), pr_a = (A+C)/(A+B+C+D) and
@@ -92,22 +96,9 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     n_bond/(A+C). NaN where the denominator is 0. pr_inside equals A + B of pr_class, the paper's
     identity, exactly when every collision was decided.
     """
-    a, b, c, d = np.moveaxis(np.asarray(counts["n_class"]), -1, 0)
-    decided = a + b + c + d
-    hooks = np.asarray(counts["n_bond"])[..., HOOK - 1]
-    estimates = {
-        "pr_inside": (counts["n_inside"], counts["n_collided"]),
-        "pr_a_given_inside": (a, a + b),
-        "pr_a_given_outside": (c, c + d),
-        "pr_a": (a + c, decided),
-        "pr_sticks": (a + c - hooks, decided),
-        "pr_hangs": (hooks, decided),
-        "pr_class": (counts["n_class"], decided[..., np.newaxis]),
-        "pr_bond": (counts["n_bond"], (a + c)[..., np.newaxis]),
-    }
     table: dict[str, np.ndarray] = {}
-    for name, (successes, trials) in estimates.items():
-        values = proportion(successes, trials)
+    for name, (trials, successes, unknown) in events_of(counts).items():
+        values = proportion(successes, trials, unknown=unknown)
         table |= zip((name, f"{name}_low", f"{name}_high"), values, strict=True)
     return table
 
@@ -138,18 +129,12 @@ def checked_codes(
 
 
 def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
-    """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
-
-    S and M are a replicate's successes and trials over all displacements; sums are over
-    replicates. Codes are (type, vertices, delta, replicate).
-    """
+    """{estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is a
+    cluster. Codes are (type, vertices, delta, replicate)."""
     sums, counted = {}, events(outcome, inside, bond)
     for name in POOLED_PROBABILITIES:
-        trials, successes = counted[name]
-        m = np.sum(trials, axis=2, dtype=np.int64)
-        s = np.sum(successes, axis=2, dtype=np.int64)
-        terms = (s, m, s * s, s * m, m * m, m > 0)
-        sums[name] = np.stack([np.sum(term, axis=-1) for term in terms])
+        each = Events(*(flags.sum(axis=2, dtype=np.int64) for flags in counted[name]))
+        sums[name] = bounded_sums(each.successes, each.trials, each.unknown)
     return sums
 
 
@@ -157,7 +142,7 @@ def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     """The arrays of POOLED; NaN where there was no event."""
     table: dict[str, np.ndarray] = {}
     for name, each in sums.items():
-        share, low, high, effective = clustered_proportion(*each.astype(float))
+        share, low, high, effective = clustered_proportion(each)
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}
         table[f"n_effective_{name}"] = effective
     return table

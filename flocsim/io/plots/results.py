@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import clustered_proportion, numerical_error, proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion, numerical_error, proportion
 from flocsim.io.plots.style import (
     BOND_COLOURS,
     CLASS_COLOURS,
@@ -28,8 +28,8 @@ from flocsim.io.plots.style import (
     vertex_positions,
 )
 from flocsim.io.results.efficiency import efficiency
-from flocsim.io.results.file import CLASSES, Results
-from flocsim.io.results.schema import BONDS
+from flocsim.io.results.events import events, events_of
+from flocsim.io.results.file import Results
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
@@ -63,23 +63,15 @@ NO_EVENTS = {
     "classes": "no decided collision",
     "bonds": "no aggregation",
 }
-TRIALS = {
-    "pr_inside": ("n_collided", None),
-    "pr_a_given_inside": ("n_class", (0, 1)),
-    "pr_a_given_outside": ("n_class", (2, 3)),
-    "pr_a": ("n_class", (0, 1, 2, 3)),
-}
-"""Counts that a probability is of: their name, and the places of those that add up."""
-
 SIZE_COLOURS = "viridis"
 MOST_SIZES_NAMED = 6
 """Up to so many receiving sizes are all named beside their colours."""
 
 SHARES = {
-    "classes": ("n_class", "outcome", range(len(CLASSES)), CLASS_COLOURS),
-    "bonds": ("n_bond", "bond", range(1, 1 + len(BONDS)), BOND_COLOURS),
+    "classes": ("n_class", CLASS_COLOURS),
+    "bonds": ("n_bond", BOND_COLOURS),
 }
-"""What is drawn as shares of a whole: its counts, its column, the codes there, its colours."""
+"""What is drawn as shares of a whole: its counts, its colours."""
 
 
 def figure_4(results: Results) -> Figure:
@@ -285,9 +277,7 @@ def draw_probability(axes, results, number, name):
 
 def trials_of(results, name):
     """How many replicates a probability is of (type, vertices, delta)."""
-    counted, places = TRIALS[name]
-    counts = results.probabilities[counted]
-    return counts if places is None else counts[..., list(places)].sum(axis=-1)
+    return events_of(results.probabilities)[name].trials
 
 
 def draw_shares(axes, results, number, name):
@@ -325,15 +315,22 @@ def share_errors(table, name):
 
 def shares_of(results, number, name):
     """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
-    counted, column, codes, _ = SHARES[name]
+    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
     if results.replicates is None:
-        counts = results.probabilities[counted][number].sum(axis=1)
-        return proportion(counts, counts.sum(axis=1, keepdims=True))
-    found = results.replicates[column][number]
-    m = np.isin(found, codes).sum(axis=1, dtype=float)[:, None]
-    s = np.stack([(found == code).sum(axis=1) for code in codes], axis=1)
-    terms = np.broadcast_arrays(s, m, s * s, s * m, m * m, m > 0.0)
-    return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
+        counts = {
+            name: values[number].sum(axis=1)
+            for name, values in results.probabilities.items()
+            if name.startswith("n_")
+        }
+        trials, successes, unknown = events_of(counts)[share]
+        return proportion(successes, trials, unknown=unknown)
+    codes = (results.replicates[column][number] for column in ("outcome", "inside", "bond"))
+    # A replicate is a cluster: (class or bond, vertices, delta, replicate) → over delta.
+    trials, successes, unknown = (
+        np.sum(each, axis=2, dtype=np.int64) for each in events(*codes)[share]
+    )
+    found = clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
+    return tuple(np.moveaxis(each, 0, -1) for each in found)
 
 
 def draw_line(axes, vertices, bands, index, count, colour, few=None):

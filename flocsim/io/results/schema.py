@@ -18,6 +18,8 @@ OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
 """Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone;
 missed, held: the outlines never touched, and the bodies have parted, or rest so."""
 FAILED = OUTCOMES.index("failed")
+UNKNOWN = ("undecided", "failed")
+"""Outcomes of replicates that have come to none."""
 CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255

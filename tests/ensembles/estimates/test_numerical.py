@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import nbinom
 
-from flocsim.ensembles.estimates.events import events
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors, trials_of
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.ensembles.estimates.statistics import COUNTED, tabulate
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
 from flocsim.io.confidence import numerical_error
+from flocsim.io.results.events import events, events_of
 from flocsim.io.results.schema import PROBABILITIES
 from tests.helpers.synthetic_results import (
     bonds_of,
@@ -74,7 +74,7 @@ def test_no_probability_moves_further_than_its_flips(seed):
     again = [np.where(checked, *pair) for pair in zip(drawn.values(), codes, strict=True)]
     first, second = tabulate(*codes), tabulate(*again)
     changes = count_changes(codes, again)
-    trials = trials_of(first)
+    trials = {name: each.trials for name, each in events_of(first).items()}
     moved = 0
     for name in PROBABILITIES:
         flips = changes[f"n_gained_{name}"] + changes[f"n_lost_{name}"]
@@ -93,7 +93,7 @@ def test_events_are_what_the_probabilities_are_of():
     codes = draw_codes(np.random.default_rng(3), (2, 2, 2, 50))
     table = tabulate(*codes)
     assert set(events(*codes)) == set(PROBABILITIES)
-    for name, (trial, success) in events(*codes).items():
+    for name, (trial, success, _) in events(*codes).items():
         if name not in ("pr_class", "pr_bond"):
             counts = success.sum(-1), np.where(trial.any(-1), trial.sum(-1), np.nan)
             np.testing.assert_array_equal(table[name], counts[0] / counts[1])

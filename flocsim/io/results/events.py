@@ -1,0 +1,89 @@
+"""Which replicates count in a probability, which of these as successes, and which may yet.
+
+A replicate that is undecided or has failed could count in every probability that what is known of
+it leaves open: where it has touched inside the zone it says nothing of collisions outside.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from flocsim.io.results.schema import BONDS, CLASSES, NOT_APPLICABLE, OUTCOMES, UNKNOWN
+
+
+class Events(NamedTuple):
+    """Flags or counts: ``trials`` that are decided, ``successes`` among them, and what is
+    ``unknown``, which may be either or no trial."""
+
+    trials: np.ndarray
+    successes: np.ndarray
+    unknown: np.ndarray
+
+
+MISSED = OUTCOMES.index("missed")
+UNDECIDED = OUTCOMES.index("undecided")
+HELD = OUTCOMES.index("held")
+DECIDED = len(CLASSES)
+"""Outcomes below this code are classes A to D."""
+AGGREGATED = (0, 2)
+INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
+HOOK = 1 + BONDS.index("hook")
+
+
+WITHOUT_OUTCOME = tuple(OUTCOMES.index(name) for name in UNKNOWN)
+
+
+def events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, Events]:
+    """{probability: Events}, flags as the codes; (class, …), (bond, …) of those."""
+    decided, aggregated = outcome < DECIDED, np.isin(outcome, AGGREGATED)
+    within, without = np.isin(outcome, INSIDE_CLASSES), np.isin(outcome, OUTSIDE_CLASSES)
+    unknown, apart = np.isin(outcome, WITHOUT_OUTCOME), inside == NOT_APPLICABLE
+    classes = np.stack([outcome == code for code in range(len(CLASSES))])
+    bonds = np.stack([bond == 1 + place for place in range(len(BONDS))])
+
+    def of_each(flags: np.ndarray, like: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(flags, like.shape)
+
+    return {
+        "pr_inside": Events(~apart, inside == 1, unknown & apart),
+        "pr_a_given_inside": Events(within, within & aggregated, unknown & (inside != 0)),
+        "pr_a_given_outside": Events(without, without & aggregated, unknown & (inside != 1)),
+        "pr_a": Events(decided, aggregated, unknown),
+        "pr_sticks": Events(decided, aggregated & (bond != HOOK), unknown),
+        "pr_hangs": Events(decided, aggregated & (bond == HOOK), unknown),
+        "pr_class": Events(of_each(decided, classes), classes, of_each(unknown, classes)),
+        "pr_bond": Events(of_each(aggregated, bonds), bonds, of_each(unknown, bonds)),
+    }
+
+
+def approaches(outcome: np.ndarray) -> Events:
+    """Events of Pr[aggregation | decided approach]: misses count."""
+    return Events(
+        np.isin(outcome, [*range(DECIDED), MISSED, HELD]), np.isin(outcome, AGGREGATED),
+        np.isin(outcome, WITHOUT_OUTCOME),
+    )  # fmt: skip
+
+
+def events_of(counts: Mapping[str, np.ndarray]) -> dict[str, Events]:
+    """{probability: Events} as whole numbers, from the counts ``n_…`` of conditions."""
+    classes, bonds = np.asarray(counts["n_class"]), np.asarray(counts["n_bond"])
+    a, b, c, d = np.moveaxis(classes, -1, 0)
+    decided, aggregated, hooks = a + b + c + d, a + c, bonds[..., HOOK - 1]
+    unknown = np.asarray(counts["n_undecided"]) + counts["n_failed"]
+    touched, inside = np.asarray(counts["n_collided"]), np.asarray(counts["n_inside"])
+    unknown_inside, unknown_outside = inside - a - b, touched - inside - c - d
+
+    def of_each(numbers: np.ndarray, like: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(numbers[..., np.newaxis], like.shape)
+
+    return {
+        "pr_inside": Events(touched, inside, unknown - unknown_inside - unknown_outside),
+        "pr_a_given_inside": Events(a + b, a, unknown - unknown_outside),
+        "pr_a_given_outside": Events(c + d, c, unknown - unknown_inside),
+        "pr_a": Events(decided, aggregated, unknown),
+        "pr_sticks": Events(decided, aggregated - hooks, unknown),
+        "pr_hangs": Events(decided, hooks, unknown),
+        "pr_class": Events(of_each(decided, classes), classes, of_each(unknown, classes)),
+        "pr_bond": Events(of_each(aggregated, bonds), bonds, of_each(unknown, bonds)),
+    }
