@@ -22,6 +22,7 @@ from flocsim.ensembles.report import (
     checked_line,
     efficiency_lines,
     format_table,
+    graze_lines,
     kernel_lines,
     touch_lines,
     undecided_line,
@@ -42,6 +43,7 @@ from flocsim.io.contents import (
     content_of,
 )
 from flocsim.io.results import strength_file, swarm_file
+from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview
 from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.shapes.fit_report import format_errors
@@ -232,13 +234,15 @@ def trajectory_text(path, found):
 def sweep_text(path, found):
     """What the joined file of a sweep holds: Pr[A] at every value, the mean size of swarms."""
     swept = found.swept
-    lines = [f"{path}: a sweep", ""]
+    lines, rest = [f"{path}: a sweep", ""], []
     for name, each in swept.items():
         unit = "" if each.unit == "1" else f" {each.unit}"
         values = ", ".join(visible(shown(value), "") for value in each.values)
         lines.append(f"{visible(each.key, '')} (as {visible(name, '')}): {values}{unit}")
     rows = swarm_sweep_rows(found) if "counts" in found.groups else pair_sweep_rows(found)
-    return "\n".join([*lines, "", *aligned(rows)])
+    if "counts" not in found.groups:
+        rest = graze_lines(found.labelled("probabilities").axes["delta"].values)
+    return "\n".join([*lines, "", *aligned(rows), *rest])
 
 
 def shown(value):
@@ -247,9 +251,10 @@ def shown(value):
 
 
 def pair_sweep_rows(found):
-    """Pr[A] of every value and condition, heads first."""
+    """Outcomes and Pr[A] of every value and condition, heads first."""
     table = found.labelled("probabilities")
-    rows = [(*found.swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
+    ends = ends_of({name: table.columns[name].values for name in ENDS_COUNTED})
+    rows = [(*found.swept, "type", "N", "delta", "n", *ends, "Pr[A]", "[95 %]")]
     axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
     columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
     for place in np.ndindex(*columns[0].shape):
@@ -257,7 +262,8 @@ def pair_sweep_rows(found):
         n, value, low, high = (column[place] for column in columns)
         told = (f"{value:.3f}" if value == value else "-",
                 f"[{low:.3f}, {high:.3f}]" if high == high else "-")  # fmt: skip
-        rows.append((*(visible(shown(each), "") for each in names), str(n), *told))
+        counts = (str(each[place]) for each in ends.values())
+        rows.append((*(visible(shown(each), "") for each in names), str(n), *counts, *told))
     return rows
 
 

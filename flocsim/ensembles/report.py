@@ -56,7 +56,8 @@ def format_table(
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. Of the aggregations some hang by
+    "-" where there was no event to estimate a probability from. A line below says of delta = 1 that
+    it grazes. Of the aggregations some hang by
     their shapes, as statics shows, and the others stick. Returns text without a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
@@ -71,7 +72,15 @@ def format_table(
         if place[1:] == (0, 0):
             lines.append(f"type {types[place[0]]}")
         lines.append(align(row, widths))
-    return "\n".join(lines)
+    return "\n".join([*lines, *graze_lines(delta)])
+
+
+GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little of collisions"
+
+
+def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
+    """What to say of a displacement by all of delta_max, where there is one."""
+    return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
 def efficiency_rows(results: Results) -> list[tuple[str, int, str, str]]:

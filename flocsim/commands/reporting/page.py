@@ -12,7 +12,7 @@ from flocsim.commands.plot import swarm_figures
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
 from flocsim.commands.reporting.motion import SCRIPT, motion_of
-from flocsim.ensembles.report import EFFICIENCY, efficiency_rows
+from flocsim.ensembles.report import EFFICIENCY, efficiency_rows, graze_lines
 from flocsim.ensembles.swarms.assembly import table_rows
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import METADATA, house_style
@@ -31,7 +31,8 @@ SHOWN = {
 """The probabilities of a condition that have columns of their own, and their headings."""
 
 ERRORS_TEXT = (
-    "Each probability is followed by its 95 % interval from sampling (Wilson's) and, after ±, by "
+    "Each probability is followed by its 95 % interval, of sampling (Wilson's) and of what "
+    "undecided and failed replicates could have come to, and, after ±, by "
     "the numerical error: the 95 % bound of the share of replicates that would end otherwise if "
     "they were computed exactly. – where there was no event, ± ? where none was run again."
 )
@@ -84,8 +85,9 @@ def provenance_of(run: Mapping[str, Any], origin: Sequence[tuple[str, str]]) -> 
 
 
 def figures_of(figures: Mapping[str, Callable[..., Any]], results: Any) -> str:
-    """Figures of `flocsim plot`, that of everything first."""
-    names = sorted(figures, key=lambda name: name != "overview")
+    """Figures of `flocsim plot`, outcomes and that of everything first."""
+    first = ("outcomes", "overview")
+    names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
     return "\n".join(figure_of(name, figures[name], results) for name in names)
 
 
@@ -106,7 +108,8 @@ def tables_of(results: Results) -> str:
     places = list(np.ndindex(*results.shape))
     rows = [condition_row(results, table, place) for place in places]
     firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
-    parts = [f"<p>{text(ERRORS_TEXT)}</p>", table_of(heads, rows, firsts)]
+    told = [ERRORS_TEXT, *graze_lines(results.delta)]
+    parts = [*(f"<p>{text(line)}</p>" for line in told), table_of(heads, rows, firsts)]
     if results.pooled:
         heads = ["type", "N", *(PROBABILITIES[name] for name in POOLED_PROBABILITIES)]
         places = list(np.ndindex(*results.shape[:2]))

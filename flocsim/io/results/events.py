@@ -87,3 +87,16 @@ def events_of(counts: Mapping[str, np.ndarray]) -> dict[str, Events]:
         "pr_class": Events(of_each(decided, classes), classes, of_each(unknown, classes)),
         "pr_bond": Events(of_each(aggregated, bonds), bonds, of_each(unknown, bonds)),
     }
+
+
+NOT_COLLIDED = ("missed", "held", "undecided", "failed")
+ENDS_COUNTED = ("n_total", "n_class", *(f"n_{name}" for name in NOT_COLLIDED))
+"""Counts that ends_of follows from."""
+
+
+def ends_of(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """{end: how many replicates}, which add up to n_total."""
+    classes = np.asarray(counts["n_class"])
+    aggregated = classes[..., list(AGGREGATED)].sum(axis=-1)
+    found = {"aggregated": aggregated, "departed": classes.sum(axis=-1) - aggregated}
+    return found | {name: np.asarray(counts[f"n_{name}"]) for name in NOT_COLLIDED}
