@@ -19,6 +19,7 @@ from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
+    change_lines,
     checked_line,
     efficiency_lines,
     format_table,
@@ -170,6 +171,7 @@ def summary(path: str, results: Results, totals: Totals) -> Summary:
     try:
         facts = conditions(results) + sizes(results, totals) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+        facts += [("", line) for line in change_lines(results)]
         if choice := stored(run, "accuracy"):
             facts += [("accuracy", line) for line in choice_lines(choice)]
         warnings = [str(line) for line in stored(run, "warnings")]

@@ -265,6 +265,26 @@ def checked_line(results: Results) -> str:
     )
 
 
+def change_lines(results: Results) -> list[str]:
+    """Between what Pr[A] would change if all were run exactly, in the conditions where it is most.
+
+    One line, or none where it is not known.
+    """
+    if not results.numerics:
+        return []
+    low, high = (results.numerics[f"pr_a_change{end}"] for end in ("_low", "_high"))
+    if not np.isfinite(low).any():
+        return []
+    told = []
+    for values, worst in ((low, np.nanargmin(low)), (high, np.nanargmax(high))):
+        t, v, d = np.unravel_index(worst, values.shape)
+        told.append(
+            f"{values[t, v, d]:+.3f} (type {visible(results.types[t], '')}, "
+            f"N = {results.vertices[v]}, delta {results.delta[d]:g})"
+        )
+    return [f"run exactly, Pr[A] would change by {told[0]} to {told[1]} at most, 95 %"]
+
+
 def condition_row(vertices, delta, table, place, ends):
     _, v, d = place
     counts = ("n_total", "n_collided", "n_inside")

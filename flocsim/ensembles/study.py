@@ -22,6 +22,7 @@ from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
+from flocsim.io.results.events import flips_easily
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 
@@ -181,8 +182,11 @@ class Study(StudyKind):
         exact = self.exact[self.pairings[condition].name]
         if row is not None and FAILURES[row["failure"]] in TRIED_AGAIN:
             row = self.tried_again(draw, exact, row, halted)
-        checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
-        if row is None or exact is None or not checked:
+        if row is None or exact is None:
+            return row
+        easily = bool(flips_easily(row["outcome"], row["bond"]))
+        wanted = self.config.integrator.check_share
+        if not is_checked(self.config.seed, replicate, wanted, easily):
             return row
         found = self.run_again(draw, exact, halted)
         return None if found is None else row | found

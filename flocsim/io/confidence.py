@@ -172,41 +172,61 @@ def share_and_worth(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return p, np.where(m > 0, number, np.nan)
 
 
-def numerical_error(
-    flipped: ArrayLike, checked: ArrayLike, trials: ArrayLike, confidence: float = 0.95
+SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
+MEANS = np.geomspace(1e-5, 0.3, 16)
+"""Gamma distributions of rates over conditions: from a few that flip to all alike."""
+
+
+def further_flips(
+    flipped: ArrayLike, checked: ArrayLike, exposed: ArrayLike, confidence: float = 0.95
 ) -> np.ndarray:
-    """95 % bound of the share of a condition's trials that flip where run more exactly.
+    """How many more flip at most, with this probability, of what was not run again.
 
-    Arrays (type, …) of whole numbers, a place for each condition: ``flipped`` among ``checked``,
-    the trials that were run again, of ``trials`` in all. NaN without trials, and where nothing was
-    checked in any condition of the type.
+    Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
+    others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
 
-    f of c have flipped here, and F of C in the type's other conditions. Rates of flips scatter
-    over conditions like an exponential distribution with the mean (F + 1)/(C + 2) that the others
-    show (Laplace's rule), so that here, given f of c, the rate has a gamma distribution of shape
-    1 + f and rate b = (C + 2)/(F + 1) + c. How many more flip of the u = trials − c that were not
-    run again is then negative binomial: at most k with probability I_p(1 + f, k + 1), I the
-    incomplete beta function, p = b/(b + u). With q, the smallest k of probability
-    ``confidence``: (f + q)/(c + u), at most 1.
+    Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
+    k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
+    weighed by what all conditions show: f is negative binomial. Given f of c, the rate here has
+    shape k + f and rate k/m + c, and the number of further flips is at most q with probability
+    I_p(k + f, q + 1), I the incomplete beta function, p = b/(b + u), b = k/m + c; their mean over
+    k and m has its quantile here. So where flips sit in few conditions a condition in which few
+    were run again is in doubt, and where all are alike it borrows from the others.
     """
-    from scipy.special import betainc
+    from scipy.special import betainc, gammaln
 
-    f, c, n = (np.asarray(each, dtype=float) for each in (flipped, checked, trials))
-    rest = tuple(range(1, f.ndim))
-    others_flipped = f.sum(axis=rest, keepdims=True) - f
-    others = c.sum(axis=rest, keepdims=True) - c
-    # A trial may count in the second run alone: then there are more checked ones than trials.
-    unknown = np.maximum(n - c, 0.0)
-    rate = (others + 2.0) / (others_flipped + 1.0) + c
-    p = rate / (rate + unknown)
-    low, high = np.full(f.shape, -1.0), unknown.copy()
-    # The smallest k lies above low, and is no more than high: halve until they are neighbours.
+    f, c, u = np.broadcast_arrays(
+        *(np.asarray(each, float) for each in (flipped, checked, exposed))
+    )
+    if not np.any(c > 0.0):
+        return np.where(u > 0.0, np.nan, 0.0)
+    seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
+    k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
+    rate = (k / m)[:, np.newaxis]
+    f_seen, c_seen = seen
+    logs = (
+        gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
+        + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
+    )  # fmt: skip
+    logs = logs @ times + 0.5 * np.log(m)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    some = weights > NEGLIGIBLE
+    k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
+    cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
+                              return_inverse=True)  # fmt: skip
+    f_here, c_here, u_here = cases
+    shape, b = k[:, np.newaxis] + f_here, rate + c_here
+    low, high = np.full(f_here.shape, -1.0), np.ceil(u_here)
+    # The smallest q lies above low, and is no more than high: halve until they are neighbours.
     while np.any(high - low > 1.0):
         middle = np.floor(0.5 * (low + high))
-        enough = betainc(1.0 + f, middle + 1.0, p) >= confidence
+        enough = weights @ betainc(shape, middle + 1.0, b / (b + u_here)) >= confidence
         split = high - low > 1.0
         low = np.where(split & ~enough, middle, low)
         high = np.where(split & enough, middle, high)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.minimum((f + high) / n, 1.0)
-    return np.where((n > 0) & (c + others > 0), share, np.nan)
+    return high[places.reshape(f.shape)]
+
+
+NEGLIGIBLE = 1e-6
+"""Weight below which a distribution is left out."""

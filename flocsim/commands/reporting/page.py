@@ -32,9 +32,9 @@ SHOWN = {
 
 ERRORS_TEXT = (
     "Each probability is followed by its 95 % interval, of sampling (Wilson's) and of what "
-    "undecided and failed replicates could have come to, and, after ±, by "
-    "the numerical error: the 95 % bound of the share of replicates that would end otherwise if "
-    "they were computed exactly. – where there was no event, ± ? where none was run again."
+    "undecided and failed replicates could have come to, and by the least and the most by which it "
+    "would change if all replicates were computed exactly (95 %; of those pooled the larger, after "
+    "±). – where there was no event, ± ? where none was run again."
 )
 
 
@@ -132,17 +132,21 @@ def condition_row(results, table, place):
     ends = [int(table[f"n_{name}"][place]) for name in names]
     return [
         results.types[t], int(results.vertices[v]), f"{results.delta[d]:g}", *counts,
-        *(with_errors(table, name, place) for name in SHOWN),
+        *(with_errors(table, name, place, results.numerics) for name in SHOWN),
         *(int(number) for number in table["n_class"][place]), *ends,
     ]  # fmt: skip
 
 
-def with_errors(table, name, place):
-    """ "0.600 [0.571, 0.629] ± 0.004": value, sampling interval, numerical error."""
+def with_errors(table, name, place, numerics=None):
+    """ "0.600 [0.571, 0.629] −0.004 +0.010": value, sampling interval, by how much numerics change
+    it, or "± 0.010" where their sign is not known."""
     value, low, high, numerical = (
         float(table[name + end][place]) for end in ("", "_low", "_high", "_numerical")
     )
     if math.isnan(value):
         return "–" if math.isnan(high) else f"[{low:.3f}, {high:.3f}]"
-    added = "?" if math.isnan(numerical) else f"{numerical:.3f}"
-    return f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}"
+    added = "± ?" if math.isnan(numerical) else f"± {numerical:.3f}"
+    if numerics and not math.isnan(numerical):
+        down, up = (float(numerics[f"{name}_change{end}"][place]) for end in ("_low", "_high"))
+        added = f"{down:+.3f} {up:+.3f}".replace("-", "−")
+    return f"{value:.3f} [{low:.3f}, {high:.3f}] {added}"

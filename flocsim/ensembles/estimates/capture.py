@@ -35,16 +35,17 @@ import numpy as np
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
+from flocsim.ensembles.estimates.numerical import SECOND_RUNS, further_of_kinds
 from flocsim.ensembles.kernels.sampling import as_draws, points_of
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.confidence import numerical_error, wilson
-from flocsim.io.results.events import WITHOUT_OUTCOME
+from flocsim.io.confidence import wilson
+from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, kinds_of
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
-COLUMNS = ("outcome", "inside", "checked_outcome", "checked_inside", "floc_i", "floc_j")
+COLUMNS = ("outcome", "inside", "bond", "checked_outcome", "checked_inside", "floc_i", "floc_j")
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
 
@@ -194,13 +195,15 @@ def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, flo
 @attrs.define(eq=False)
 class Estimated:
     """The numbers of one condition, but for what numerics do: ``values`` {name: number},
-    ``flipped`` and ``checked`` {X: how many, of those that are known both times}, and ``trials``;
+    ``flipped`` and ``checked`` {X: how many of each kind (kind,), of those that are known both
+    times}, ``members`` (kind,), how many there are, and ``trials``;
     ``largest`` {name: how much a point that flips changes the estimate, over the share of those
     that do}."""
 
     values: dict[str, float]
-    flipped: dict[str, int]
-    checked: dict[str, int]
+    flipped: dict[str, np.ndarray]
+    checked: dict[str, np.ndarray]
+    members: np.ndarray
     trials: int
     largest: dict[str, float]
 
@@ -228,9 +231,8 @@ def estimate(
     again = became(rows["checked_outcome"], rows["checked_inside"])
     run_again = rows["checked_outcome"] != NOT_APPLICABLE
     checked = {name: run_again & chi[name].known & again[name].known for name in WHAT}
-    flipped = {
-        name: int(np.sum(checked[name] & (chi[name].least != again[name].least))) for name in WHAT
-    }
+    flipped = {name: checked[name] & (chi[name].least != again[name].least) for name in WHAT}
+    kinds = kinds_of(rows["outcome"], rows["bond"])
 
     def parts(values: np.ndarray) -> np.ndarray:
         """The means of the scrambles, which replicates belong to in turn."""
@@ -306,10 +308,12 @@ def estimate(
         "undecided": float(np.sum(points.plane * unknown) / np.sum(points.plane)),
         "edge": edge / caught if caught else 0.0,
     }
-    counts = {name: int(each.sum()) for name, each in checked.items()}
-    for name, count in flipped.items():
-        values[f"flips_{name}"] = count / counts[name] if counts[name] else math.nan
-    return Estimated(values, flipped, counts, n, largest)
+    flips, checks = ({name: np.sum(kinds & each, axis=-1) for name, each in flags.items()}
+                     for flags in (flipped, checked))  # fmt: skip
+    for name in WHAT:
+        count = int(checked[name].sum())
+        values[f"flips_{name}"] = int(flipped[name].sum()) / count if count else math.nan
+    return Estimated(values, flips, checks, kinds.sum(axis=-1), n, largest)
 
 
 def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi, most_unknown: float) -> float:
@@ -336,10 +340,14 @@ def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> di
     """{place: {name_numerical: bound}} of all conditions, by mechanism: axis 0 of the shape."""
     bounds = {}
     for what in WHAT:
-        counts = np.zeros((3, *shape))
+        f, c, members = (np.zeros((len(KINDS), *shape)) for _ in range(3))
+        trials = np.ones(shape)
         for place, each in found.items():
-            counts[(slice(None), *place)] = each.flipped[what], each.checked[what], each.trials
-        bounds[what] = numerical_error(*counts)
+            at = (slice(None), *place)
+            f[at], c[at], members[at] = each.flipped[what], each.checked[what], each.members
+            trials[place] = each.trials
+        more = further_of_kinds(f, c, members - (1.0 - SECOND_RUNS) * c)
+        bounds[what] = np.minimum((f.sum(axis=0) + more) / trials, 1.0)
     told: dict[tuple, dict] = {}
     for place, each in found.items():
         told[place] = {}

@@ -56,8 +56,9 @@ def tabulate(
         np.broadcast_to(np.asarray(codes), first[0].shape)
         for codes in (checked_outcome, checked_inside, checked_bond)
     )
-    counts = count(*first) | count_changes(first, again)
-    return counts | probabilities(counts) | numerical_errors(counts)
+    sums = count(*first) | count_changes(first, again)
+    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
+    return counts | probabilities(counts) | numerical_errors(sums)
 
 
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:

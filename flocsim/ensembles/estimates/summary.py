@@ -5,7 +5,14 @@ from collections.abc import Callable, Iterable
 import attrs
 import numpy as np
 
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.ensembles.estimates.numerical import (
+    change_columns,
+    change_intervals,
+    count_changes,
+    numerical_errors,
+    numerical_of,
+    over_displacements,
+)
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
     CODES,
@@ -17,7 +24,10 @@ from flocsim.ensembles.estimates.statistics import (
     probabilities,
 )
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.results.schema import POOLED
+from flocsim.io.results.schema import POOLED, POOLED_PROBABILITIES
+
+JOINT = "joint"
+"""Name of the joint_counts among Sums."""
 
 BLOCK_ROWS = 262_144
 """Rows, of all conditions together, that are looked at together."""
@@ -73,7 +83,7 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
             **count(outcome, inside, bond),
             **count_changes((outcome, inside, bond), again),
             **pooled_sums(outcome, inside, bond),
-            "joint": joint_counts(outcome, inside),
+            JOINT: joint_counts(outcome, inside),
         }
         sums = added(sums, found)
     return sums
@@ -84,14 +94,40 @@ def added(sums: Sums, more: Sums) -> Sums:
     return {name: sums[name] + more[name] for name in sums} if sums else more
 
 
-def tables_of(sums: Sums) -> tuple[dict, dict, dict]:
-    """(probabilities, pooled, differences) from the Sums of a whole study."""
-    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
-    pooled = {name: values for name, values in sums.items() if name.startswith("pr_")}
-    together = numerical_errors({name: values.sum(axis=2) for name, values in counts.items()})
-    return (
-        counts | probabilities(counts) | numerical_errors(counts),
+@attrs.frozen
+class AllTables:
+    """The arrays of the groups of a results file that follow from Sums."""
+
+    probabilities: dict[str, np.ndarray]
+    pooled: dict[str, np.ndarray]
+    differences: dict[str, np.ndarray]
+    numerics: dict[str, np.ndarray]
+
+
+POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
+
+
+def tables_of(sums: Sums) -> AllTables:
+    """AllTables from the Sums of a whole study."""
+    pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
+    counted = {name: values for name, values in sums.items()
+               if name not in POOLED_NAMES and name != JOINT}  # fmt: skip
+    together = numerical_errors(over_displacements(counted))
+    changes = change_intervals(counted)
+    return AllTables(
+        table_from(counted, changes),
         pooled_probabilities(pooled)
         | {name: values for name, values in together.items() if name in POOLED},
-        paired_differences(sums["joint"]),
+        paired_differences(sums[JOINT]),
+        change_columns(changes),
     )
+
+
+def table_from(
+    counted: Sums, changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None
+) -> dict[str, np.ndarray]:
+    """The table of probabilities from what is counted of conditions; ``changes``: its
+    change_intervals, where they are there."""
+    counts = {name: values for name, values in counted.items() if name.startswith("n_")}
+    changes = change_intervals(counted) if changes is None else changes
+    return counts | probabilities(counts) | numerical_of(changes)

@@ -7,14 +7,14 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.ensembles.estimates.numerical import share_that_flips
 from flocsim.ensembles.estimates.paired import between, bounded_cells, bounded_newcombe
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
-from flocsim.io.confidence import numerical_error
 from flocsim.io.labelled import Column, Labelled, Tables, about_of
-from flocsim.io.results.events import Events, approaches, events
+from flocsim.io.results.events import Events, approaches, events, kinds_of
 from flocsim.io.results.schema import (
     AXES,
     COMPARED,
@@ -267,8 +267,8 @@ def numerical_per_approach(rows):
     checked = again != NOT_APPLICABLE
     (trial, success, _), (trial_again, success_again, _) = map(approaches, (rows["outcome"], again))
     flipped = checked & ((trial != trial_again) | (success != success_again))
-    counted = checked & (trial | trial_again)
-    return numerical_error(*(np.sum(each, axis=-1) for each in (flipped, counted, trial)))
+    kinds = kinds_of(rows["outcome"], rows["bond"])
+    return share_that_flips(flipped, checked, kinds, trial.sum(axis=-1))
 
 
 def differences_of(first, second, pairs):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import bounded_sums, clustered_proportion, numerical_error, proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
 from flocsim.io.plots.outcomes import (
     causes_of,
     draw_ends,
@@ -177,7 +177,7 @@ def against_delta(results: Results) -> Figure:
                 axes.axvline(1.0, color="0.85", zorder=0)
                 axes.text(1.0, 1.02, "grazes", color="0.4", fontsize=6.5, ha="right")
             for index, colour in enumerate(colours[: len(results.vertices)]):
-                bands = [results.probabilities["pr_a" + end][number, index][order] for end in ENDS]
+                bands = [band[number, index][order] for band in bands_of(results, "pr_a")]
                 shift = POINTS * dodge(index, len(results.vertices))
                 few = trials_of(results, "pr_a")[number, index][order] < FEW
                 draw_bars(axes, places, bands, index, colour, few, shift)
@@ -233,7 +233,7 @@ def efficiencies(results: Results) -> Figure:
                 if found is None:
                     note_if_empty(axes, np.array([np.nan]), "delta does not\nreach from 0 to 1")
                     continue
-                bands = [*(each[number] for each in found), np.zeros(len(results.vertices))]
+                bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
         add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
         return figure
@@ -270,7 +270,7 @@ def against_size(results: Results) -> Figure:
             for index, receiver in enumerate(receivers):
                 rows = np.flatnonzero(known & (r_i.round(9) == receiver))
                 rows = rows[np.argsort(r_j[rows])]
-                bands = [results.pooled["pr_a" + end][rows, number] for end in ENDS]
+                bands = [band[rows, number] for band in bands_in(results.pooled, "pr_a")]
                 draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
         if known.any() and results.pooled:
             bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
@@ -316,7 +316,7 @@ def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$
 def draw_probability(axes, results, number, name):
     """The lines of a type, for each delta; the causes of what has no value."""
     causes, marked = causes_of(results.probabilities, name)[number], set()
-    bands = [results.probabilities[name + end][number] for end in ENDS]
+    bands = [band[number] for band in bands_of(results, name)]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
@@ -346,24 +346,33 @@ def draw_shares(axes, results, number, name):
 
 
 def share_bands(results, number, name):
-    """(share, low, high, numerical error) (vertices, class or bond) of one type."""
+    """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
+    type."""
     errors = share_errors(results.probabilities, name)[number]
-    return (*shares_of(results, number, name), errors)
+    return (*shares_of(results, number, name), -errors, errors)
+
+
+def bands_in(table, name):
+    """[value, low, high, least and most change by numerics] of a probability in a table."""
+    value, low, high, numerical = (table[name + end] for end in ENDS)
+    return [value, low, high, -numerical, numerical]
+
+
+def bands_of(results, name):
+    """The same of the conditions of results, which may know the sign of what numerics change."""
+    bands = bands_in(results.probabilities, name)
+    signed = [results.numerics[f"{name}_change{end}"] for end in ENDS[1:3] if results.numerics]
+    return [*bands[:3], *signed] if signed else bands
 
 
 def share_errors(table, name):
-    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta."""
-    counted = SHARES[name][0]
-    share = f"pr_{counted.removeprefix('n_')}"
-    gained, lost, checked = (
-        np.moveaxis(table[f"n_{kind}_{share}"].sum(axis=2), -1, 0)
-        for kind in ("gained", "lost", "checked")
-    )
-    trials = table[counted].sum(axis=(2, 3))
-    parts = [
-        numerical_error(g + v, c, trials) for g, v, c in zip(gained, lost, checked, strict=True)
-    ]
-    return np.stack(parts, axis=-1)
+    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta: the mean of
+    those at each, by their trials."""
+    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+    trials = events_of(table)[share].trials
+    errors = np.where(trials > 0, table[f"{share}_numerical"], 0.0)
+    with np.errstate(invalid="ignore"):
+        return (trials * errors).sum(axis=2) / trials.sum(axis=2)
 
 
 def shares_of(results, number, name):
@@ -400,12 +409,13 @@ def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None
 
 
 def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
-    """A line of points with bars at these places: value, low, high, numerical error.
+    """A line of points with bars at these places: value, low, high, and by how much numerics may
+    lower and raise it.
 
     ``shift``: to the right, in points, whatever the axis. Where there is an interval, but no value,
     it is dotted.
     """
-    value, low, high, numerical = bands
+    value, low, high, lowers, raises = bands
     reach = np.clip([value - low, high - value], 0.0, None)
     size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
     where = shifted(axes, shift)
@@ -420,9 +430,9 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
     if alone.any():
         axes.vlines(places[alone], low[alone], high[alone], color=colour, linestyle=":",
                     linewidth=0.6 * width, transform=where)  # fmt: skip
-    if np.any(numerical > 0.0):
-        beyond = np.nan_to_num(numerical)
-        outer = [value - np.maximum(low - beyond, 0.0), np.minimum(high + beyond, 1.0) - value]
+    if np.any((lowers < 0.0) | (raises > 0.0)):
+        down, up = np.minimum(np.nan_to_num(lowers), 0.0), np.maximum(np.nan_to_num(raises), 0.0)
+        outer = [value - np.maximum(low + down, 0.0), np.minimum(high + up, 1.0) - value]
         thin = 0.2 * width
         axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
                       fmt="none", ecolor=colour, elinewidth=thin, capthick=thin,

