@@ -15,6 +15,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
+from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.capture import estimate, weighted
 from flocsim.ensembles.estimates.statistics import (
@@ -23,7 +24,6 @@ from flocsim.ensembles.estimates.statistics import (
     probabilities,
     tabulate,
 )
-from flocsim.ensembles.kernels.sampling import points_of
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.runner import run
 from flocsim.io.results.efficiency import efficiency

@@ -78,13 +78,13 @@ def results(
     output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates; written to ``output``, if any, by all ranks."""
-    reader = Reader(start.store, (*study.shape[:3], count))
+    reader = Reader(start.store, (*study.shape[:3], count), study.scrambles)
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     if output is None:
-        sums = sums_of(reader.codes, len(study.conditions), 0, count)
+        sums = sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
         rows = reader.arrays(COLUMNS) if in_memory else None
         return results_of(study, count, sums, run, rows, kernel)
-    nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
+    nothing = sums_of(reader.codes, len(study.conditions), 0, 0, study.scrambles)
     # Its tables have no values yet, but their places: where the rows go follows from them.
     draft = results_of(study, count, nothing, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:

@@ -13,6 +13,7 @@ from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, class_words, pairings_of
+from flocsim.ensembles.collision.points import point, point_facts
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
@@ -99,12 +100,20 @@ class Study(StudyKind):
         return class_words(class_facts(self.pairings))
 
     def numbers(self, replicate: int) -> np.ndarray:
-        """The random numbers of a replicate in [0, 1), see draws."""
+        """The random numbers of a replicate in [0, 1), see draws, or a point of Sobol's."""
+        if self.scrambles:
+            return point(self.config.seed, self.scrambles, replicate)
         return draws(self.config.seed, replicate)
+
+    @property
+    def scrambles(self) -> int:
+        """Of how many scrambles the replicates of a condition are points; 0 for independent ones,
+        and where rates follow from the points."""
+        return self.config.scrambles
 
     def facts(self) -> dict[str, Any]:
         """{name: value} of what rows follow from besides the config."""
-        return {}
+        return point_facts(self.config.seed, self.scrambles) if self.scrambles else {}
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray

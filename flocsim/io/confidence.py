@@ -172,6 +172,40 @@ def share_and_worth(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return p, np.where(m > 0, number, np.nan)
 
 
+def scrambled_proportion(
+    successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(low, high, n) of Σ S/Σ M over independent scrambles, along the last axis, whose points are
+    more even than independent ones; n: the independent events that it is worth.
+
+    The variance is that of a ratio between scrambles, each taken to scatter by half a point at
+    least; at the n events of which it is p (1 − p)/n the interval is Wilson's, at Student's
+    quantile of the scrambles in the place of the normal one. Where all agree n is the trials.
+    """
+    from scipy.special import stdtrit
+
+    count = successes.shape[-1]
+    t = float(stdtrit(count - 1, 0.975))
+    known, least, most = (
+        scrambled_worth(sums, count) for sums in bounded_sums(successes, trials, unknown)
+    )
+    low, high = score_interval(*least, t)[0], score_interval(*most, t)[1]
+    return low, high, known[1]
+
+
+def scrambled_worth(sums: np.ndarray, scrambles: int) -> tuple[np.ndarray, np.ndarray]:
+    """(p, n) of cluster_sums, NaN without trials."""
+    s, m, ss, sm, mm, _ = sums.astype(float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = s / m
+        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, LEAST_SCATTER * (scrambles - 1.0))
+        number = p * (1.0 - p) * m * m * (scrambles - 1.0) / (scrambles * spread)
+    return p, np.where((p == 0.0) | (p == 1.0), m, number)
+
+
+LEAST_SCATTER = 0.25
+"""Square of half a point."""
+
 SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
 MEANS = np.geomspace(1e-5, 0.3, 16)
 """Gamma distributions of rates over conditions: from a few that flip to all alike."""

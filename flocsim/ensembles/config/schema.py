@@ -32,9 +32,12 @@ from flocsim.ensembles.config.pair_scene import (
     LARGEST_LENGTH,
     MEASURED,
     PAIR_SCENES,
+    SOBOL,
+    SOBOL_SCRAMBLES,
     PairScene,
     Problem,
     SettlingScene,
+    uneven_points,
 )
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.swarm_scene import SwarmScene
@@ -123,6 +126,9 @@ class StopConfig:
         "an interval alone",
     )
 
+
+SOBOL_REPLICATES = 128
+"""Of every condition where nothing is said."""
 
 LARGEST_SEED = 2**63 - 1
 MOST_REPLICATES = 10**9
@@ -401,6 +407,14 @@ class Config:
     replicates: int = whole_field(
         1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
     )
+    sampling: str = choice(
+        "random",
+        SOBOL,
+        default="random",
+        help="how orientations and flocs of two bodies are drawn: independently, or evenly, by the "
+        f"points of {SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the intervals "
+        "follow (studies of rates draw so in any case)",
+    )
     scene: PairScene = attrs.Factory(SettlingScene)
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)
@@ -419,6 +433,12 @@ class Config:
     def is_swarm(self) -> bool:
         """Whether the scene is a SwarmScene, and the study one of many bodies."""
         return bool(self.scene.kind == "swarm")
+
+    @property
+    def scrambles(self) -> int:
+        """Of how many scrambles of a Sobol sequence the replicates of two bodies are points; 0
+        where they are drawn independently."""
+        return SOBOL_SCRAMBLES if self.sampling == SOBOL and self.scene.kind == "binary" else 0
 
     @property
     def is_kernel(self) -> bool:
@@ -496,6 +516,8 @@ def implied(table: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(scene, Mapping) and scene.get("kind") == "kernel":
         found["replicates"] = KERNEL_REPLICATES
+    elif table.get("sampling") == SOBOL:
+        found["replicates"] = SOBOL_REPLICATES
     if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
         return found
     if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
@@ -527,6 +549,8 @@ def elsewhere(key: str, scene: type) -> list[tuple[str, attrs.Attribute]]:
 def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
     """What does not go together though each is right by itself; ``parts``: a config's tables."""
     yield from weight_contradictions(parts["bodies"], parts["fluid"])
+    if parts.get("sampling") == SOBOL and isinstance(parts["scene"], tuple(PAIR_SCENES.values())):
+        yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
     yield from parts["scene"].problems(parts)
 
 

@@ -33,10 +33,11 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.numerical import SECOND_RUNS, further_of_kinds
-from flocsim.ensembles.kernels.sampling import as_draws, points_of
+from flocsim.ensembles.kernels.sampling import as_draws
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.confidence import wilson

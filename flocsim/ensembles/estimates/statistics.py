@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.errors import UsageError
-from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion, wilson
+from flocsim.io.confidence import (
+    bounded_sums,
+    clustered_proportion,
+    proportion,
+    scrambled_proportion,
+    wilson,
+)
 from flocsim.io.results.events import (
     AGGREGATED,
     HELD,
@@ -26,7 +32,7 @@ from flocsim.io.results.events import (
     events_of,
 )
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
-from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES
+from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES, last_axis
 
 __all__ = ["probabilities", "tabulate", "wilson"]
 
@@ -146,4 +152,47 @@ def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
         share, low, high, effective = clustered_proportion(each)
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}
         table[f"n_effective_{name}"] = effective
+    return table
+
+
+OF_SCRAMBLES = " of scrambles"
+"""Behind the name of a probability: what is summed of it for every scramble."""
+
+
+def scrambled_sums(
+    codes: tuple[np.ndarray, np.ndarray, np.ndarray], first: int, scrambles: int
+) -> dict[str, np.ndarray]:
+    """{"pr_a of scrambles": whole numbers (3, type, …, scramble)} of trials, successes and unknown.
+
+    ``codes``: outcome, inside, bond of replicates from the ``first`` on, replicate k of scramble k
+    mod ``scrambles``; nothing for none.
+    """
+    if not scrambles:
+        return {}
+    found = {}
+    for name, each in events(*codes).items():
+        flags = np.stack(each)
+        parts = [flags[..., (s - first) % scrambles :: scrambles].sum(axis=-1, dtype=np.int64)
+                 for s in range(scrambles)]  # fmt: skip
+        sums = np.stack(parts, axis=-1)
+        found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if last_axis(name) else sums
+    return found
+
+
+def scrambled_probabilities(
+    sums: Mapping[str, np.ndarray], pooled: bool = False
+) -> dict[str, np.ndarray]:
+    """Ends of the intervals of replicates that are points of scrambles, from scrambled_sums, in
+    the place of those for independent ones; also n_effective where all displacements are
+    ``pooled``."""
+    table: dict[str, np.ndarray] = {}
+    for key, each in sums.items():
+        name = key.removesuffix(OF_SCRAMBLES)
+        if pooled and name not in POOLED_PROBABILITIES:
+            continue
+        trials, successes, unknown = each.sum(axis=3) if pooled else each
+        low, high, effective = scrambled_proportion(successes, trials, unknown)
+        table |= {f"{name}_low": low, f"{name}_high": high}
+        if pooled:
+            table[f"n_effective_{name}"] = effective
     return table

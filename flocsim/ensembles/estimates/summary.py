@@ -17,11 +17,14 @@ from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
     CODES,
     COUNTED,
+    OF_SCRAMBLES,
     checked_codes,
     count,
     pooled_probabilities,
     pooled_sums,
     probabilities,
+    scrambled_probabilities,
+    scrambled_sums,
 )
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.results.schema import POOLED, POOLED_PROBABILITIES
@@ -37,11 +40,13 @@ BLOCK_ROWS = 262_144
 class Reader:
     """All rows of a finished study, in the order of the results file.
 
-    ``shape``: how many types, vertices, delta, replicates.
+    ``shape``: how many types, vertices, delta, replicates, and of how many ``scrambles`` these are
+    points.
     """
 
     store: RowStore
     shape: tuple[int, ...]
+    scrambles: int = 0
     known: list[np.ndarray] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -71,8 +76,8 @@ Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
 
 
-def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
-    """The Sums of replicates [first, stop) of so many conditions."""
+def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int = 0) -> Sums:
+    """The Sums of replicates [first, stop) of so many conditions, points of ``scrambles``."""
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
@@ -84,6 +89,7 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
             **count_changes((outcome, inside, bond), again),
             **pooled_sums(outcome, inside, bond),
             JOINT: joint_counts(outcome, inside),
+            **scrambled_sums((outcome, inside, bond), start, scrambles),
         }
         sums = added(sums, found)
     return sums
@@ -110,13 +116,15 @@ POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
 def tables_of(sums: Sums) -> AllTables:
     """AllTables from the Sums of a whole study."""
     pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
+    of_scrambles = {name: values for name, values in sums.items() if name.endswith(OF_SCRAMBLES)}
     counted = {name: values for name, values in sums.items()
-               if name not in POOLED_NAMES and name != JOINT}  # fmt: skip
+               if not (name in POOLED_NAMES or name == JOINT or name in of_scrambles)}  # fmt: skip
     together = numerical_errors(over_displacements(counted))
     changes = change_intervals(counted)
     return AllTables(
-        table_from(counted, changes),
+        table_from(counted, changes) | scrambled_probabilities(of_scrambles),
         pooled_probabilities(pooled)
+        | scrambled_probabilities(of_scrambles, pooled=True)
         | {name: values for name, values in together.items() if name in POOLED},
         paired_differences(sums[JOINT]),
         change_columns(changes),

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
     estimate,
@@ -15,7 +16,6 @@ from flocsim.ensembles.estimates.capture import (
     weighted,
     widened,
 )
-from flocsim.ensembles.kernels.sampling import points_of
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
 from flocsim.ensembles.runner import run
