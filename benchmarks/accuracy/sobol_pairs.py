@@ -1,6 +1,6 @@
 """How much less the probabilities of pairs vary by Sobol's points than by independent draws.
 
-    python -m benchmarks.accuracy.sobol_pairs [--seeds 6] [--points 128] [--studies 1000]
+    python -m benchmarks.accuracy.sobol_pairs [--seeds 6] [--points 64] [--pool 10]
 
 runs `sampling = "sobol"` of Types I to III of tang2014 at N = 16, δ = .5, with a pool of ten flocs,
 for some seeds, whose scrambles are all independent. The variance of independent draws over that of
@@ -26,11 +26,11 @@ TYPES = ("I", "II", "III")
 NAMES = ("pr_inside", "pr_a")
 
 
-def scrambles_of(seed, points):
+def scrambles_of(seed, points, pool):
     """{probability: (3, type, points, scramble)} of trials, successes and unknown, flags."""
     config = load_config(QUICKSTART, {
         "seed": seed, "sampling": SOBOL, "replicates": points * SOBOL_SCRAMBLES,
-        "scene": {"types": list(TYPES), "delta": [0.5]}, "shapes": {"vertices": [16], "pool": 10},
+        "scene": {"types": list(TYPES), "delta": [0.5]}, "shapes": {"vertices": [16], "pool": pool},
         "integrator": {"check_share": 0.0},
     })  # fmt: skip
     rows = run(config).replicates
@@ -59,13 +59,14 @@ def main():
     """Print the table, and whether the goals are reached."""
     parser = parser_of(__doc__)
     parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--points", type=int, default=128)
+    parser.add_argument("--points", type=int, default=64)
+    parser.add_argument("--pool", type=int, default=10)
     parser.add_argument("--studies", type=int, default=1000)
     arguments = parser.parse_args()
     if arguments.quick:
         arguments.seeds, arguments.points = 2, 16
     print_heading()
-    parts = [scrambles_of(seed, arguments.points) for seed in range(1, 1 + arguments.seeds)]
+    parts = [scrambles_of(seed, arguments.points, arguments.pool) for seed in range(1, 1 + arguments.seeds)]
     flags = {name: np.concatenate([each[name] for each in parts], axis=-1) for name in NAMES}
     rng = np.random.default_rng(1)
     columns = ("probability", "points", "a study", *(f"ratio {each}" for each in TYPES), "mean",
