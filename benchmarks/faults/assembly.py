@@ -70,7 +70,9 @@ def write_study(folder, replicates, first=0, longest=16_384):
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "study.toml").write_text(
+        # Of rows that are made up many have no outcome.
         STUDY.replace("replicates = 200", f"replicates = {replicates}")
+        + "[stop]\nundecided = 1.0\n"
     )
     study = Study(load_config(folder / "study.toml"))
     identity = identity_of(study)

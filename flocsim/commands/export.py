@@ -17,6 +17,7 @@ from flocsim.io.plots.swarm import last_known, shape_of
 from flocsim.io.results.curvilinear import CORRECTIONS
 from flocsim.io.results.kernel_tables import (
     MODELS,
+    OF_MODELS,
     QUANTITIES,
     REFERENCES,
     kernel_csv,
@@ -120,10 +121,10 @@ def run_matrices(args):
     kernel, rule = kernel_in(args.source), data_rule(args.overwrite)
     start = Path(args.output or Path(args.source).stem)
     start = start.with_suffix("") if start.suffix.lower() == ".csv" else start
-    ending = (args.model, args.curvilinear) if args.what == "efficiency" else ()
+    ending = (args.model, args.curvilinear) if args.what in OF_MODELS else ()
     texts, without = {}, []
     for mechanism in kernel.mechanisms:
-        if args.what == "efficiency" and args.model not in REFERENCES.get(mechanism, {}):
+        if args.what in OF_MODELS and args.model not in REFERENCES.get(mechanism, {}):
             continue
         if args.curvilinear and mechanism not in CORRECTIONS[args.curvilinear].mechanisms:
             without.append(mechanism)

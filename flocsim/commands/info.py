@@ -18,9 +18,12 @@ from flocsim.ensembles.equivalent_spheres import sphere_words
 from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
+    MOST_UNDECIDED,
+    change_lines,
     checked_line,
     efficiency_lines,
     format_table,
+    graze_lines,
     kernel_lines,
     touch_lines,
     undecided_line,
@@ -41,6 +44,7 @@ from flocsim.io.contents import (
     content_of,
 )
 from flocsim.io.results import strength_file, swarm_file
+from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview
 from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.shapes.fit_report import format_errors
@@ -49,7 +53,8 @@ from flocsim.io.terminal import aligned
 from flocsim.io.trajectory import centre_distance
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "trial", "settling", "size_classes", "equivalent_spheres")  # fmt: skip
+         "warnings", "trial", "settling", "size_classes", "equivalent_spheres",
+         MOST_UNDECIDED)  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -166,6 +171,7 @@ def summary(path: str, results: Results, totals: Totals) -> Summary:
     try:
         facts = conditions(results) + sizes(results, totals) + outcomes(results, totals)
         facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+        facts += [("", line) for line in change_lines(results)]
         if choice := stored(run, "accuracy"):
             facts += [("accuracy", line) for line in choice_lines(choice)]
         warnings = [str(line) for line in stored(run, "warnings")]
@@ -230,13 +236,15 @@ def trajectory_text(path, found):
 def sweep_text(path, found):
     """What the joined file of a sweep holds: Pr[A] at every value, the mean size of swarms."""
     swept = found.swept
-    lines = [f"{path}: a sweep", ""]
+    lines, rest = [f"{path}: a sweep", ""], []
     for name, each in swept.items():
         unit = "" if each.unit == "1" else f" {each.unit}"
         values = ", ".join(visible(shown(value), "") for value in each.values)
         lines.append(f"{visible(each.key, '')} (as {visible(name, '')}): {values}{unit}")
     rows = swarm_sweep_rows(found) if "counts" in found.groups else pair_sweep_rows(found)
-    return "\n".join([*lines, "", *aligned(rows)])
+    if "counts" not in found.groups:
+        rest = graze_lines(found.labelled("probabilities").axes["delta"].values)
+    return "\n".join([*lines, "", *aligned(rows), *rest])
 
 
 def shown(value):
@@ -245,16 +253,19 @@ def shown(value):
 
 
 def pair_sweep_rows(found):
-    """Pr[A] of every value and condition, heads first."""
+    """Outcomes and Pr[A] of every value and condition, heads first."""
     table = found.labelled("probabilities")
-    rows = [(*found.swept, "type", "N", "delta", "n", "Pr[A]", "[95 %]")]
+    ends = ends_of({name: table.columns[name].values for name in ENDS_COUNTED})
+    rows = [(*found.swept, "type", "N", "delta", "n", *ends, "Pr[A]", "[95 %]")]
     axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
     columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
     for place in np.ndindex(*columns[0].shape):
         names = [axis[k] for axis, k in zip(axes, place, strict=True)]
         n, value, low, high = (column[place] for column in columns)
-        told = (f"{value:.3f}", f"[{low:.3f}, {high:.3f}]") if value == value else ("-", "-")
-        rows.append((*(visible(shown(each), "") for each in names), str(n), *told))
+        told = (f"{value:.3f}" if value == value else "-",
+                f"[{low:.3f}, {high:.3f}]" if high == high else "-")  # fmt: skip
+        counts = (str(each[place]) for each in ends.values())
+        rows.append((*(visible(shown(each), "") for each in names), str(n), *counts, *told))
     return rows
 
 

@@ -31,11 +31,17 @@ def add_parser(subparsers: Any) -> None:
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add(
-        "--over", action="append", required=True, metavar="KEY=VALUE,…",
+        "--over", action="append", default=[], metavar="KEY=VALUE,…",
         help="a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be repeated",
     )  # fmt: skip
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
         help="any value instead of the config's; may be repeated")  # fmt: skip
+    add("--elasticities", metavar="KEY,KEY…",
+        help="instead of --over: which parameter matters. Each by itself is multiplied and "
+        "divided by the root of --ratio, on the same draws: a table and a figure (-o, "
+        "NAME-elasticities.png) of d Pr[A]/d ln p")  # fmt: skip
+    add("--ratio", type=float, metavar="R",
+        help="of elasticities: the larger value over the smaller (default: 2)")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
     add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
     add("--resume", action="store_true", help="go on with a sweep, extend it, or join its parts")
@@ -59,9 +65,15 @@ def run(args: Namespace) -> int:
     from flocsim.ensembles.studies.study import Study, settings_of
     from flocsim.ensembles.studies.sweep import planned, sweep
 
+    if bool(args.elasticities) == bool(args.over):
+        raise UsageError("sweep needs one of --over KEY=VALUE,VALUE and --elasticities KEY,KEY")
     study = Study(args.config)
     if args.settings:
         study = study.with_(nested(map(parse_setting, args.settings)))
+    if args.elasticities:
+        return run_elasticities(args, study)
+    if args.ratio is not None:
+        raise UsageError("--ratio is for --elasticities: leave it out")
     pairs = [values_of(text) for text in args.over]
     over = dict(pairs)
     if len(over) < len(pairs):
@@ -82,6 +94,37 @@ def run(args: Namespace) -> int:
         tell("flocsim: stopped; what is finished is kept: go on with --resume")
         return STOPPED
     tell(os.fspath(output))
+    return 0
+
+
+def run_elasticities(args: Namespace, study: Any) -> int:
+    """Run both values of each key, print the table and write the figure; the exit code."""
+    from flocsim.ensembles.storage.resume import WAYS
+    from flocsim.ensembles.studies.elasticity import RATIO, elasticities
+    from flocsim.io.outputs import Output, check_outputs, figure_rule
+    from flocsim.io.plots.elasticity import elasticities as figure_of
+    from flocsim.io.plots.style import checked_format, save
+
+    if args.dry_run:
+        raise UsageError("--dry-run is for --over: leave it out")
+    picture = Path(args.output or f"{Path(args.config).stem}-elasticities.png")
+    checked_format(picture, "--output ")
+    rule = figure_rule(args.overwrite)
+    check_outputs([Output(picture, rule)], [args.config])
+    keys = [key.strip() for key in args.elasticities.split(",") if key.strip()]
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        found = elasticities(
+            study, keys, picture, ratio=RATIO if args.ratio is None else args.ratio,
+            jobs=args.jobs, mode="resume" if args.resume else "new", overwrite=args.overwrite,
+            tell=tell, ways=WAYS,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        tell("flocsim: stopped; what is finished is kept: go on with --resume")
+        return STOPPED
+    tell(found.table())
+    save(figure_of(found), picture, rule)
+    tell(os.fspath(picture))
     return 0
 
 

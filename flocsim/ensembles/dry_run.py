@@ -6,7 +6,7 @@ from math import inf
 
 import numpy as np
 
-from flocsim.ensembles.collision.checking import count_checks, exact_method
+from flocsim.ensembles.collision.checking import EASILY, count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts, class_words
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import Config
@@ -117,9 +117,12 @@ def checked_words(config):
 
 
 def checks_of(config, count, how):
+    more = f", {EASILY} times as many of those that flip easily," * (
+        config.integrator.check_share == "auto"
+    )
     return (
         f"{count} of the {config.replicates} replicates of each condition "
-        f"({100.0 * count / config.replicates:.2g} %), at {how}"
+        f"({100.0 * count / config.replicates:.2g} %){more or ','} at {how}"
     )
 
 

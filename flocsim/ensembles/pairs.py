@@ -16,20 +16,30 @@ from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
-from flocsim.ensembles.estimates.numerical import numerical_errors
-from flocsim.ensembles.estimates.statistics import COUNTED, probabilities
+from flocsim.ensembles.estimates.numerical import leading_axes
+from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.stop_rule import StopRule
-from flocsim.ensembles.estimates.summary import Reader, Sums, sums_of, tables_of
+from flocsim.ensembles.estimates.summary import (
+    JOINT,
+    POOLED_NAMES,
+    Reader,
+    Sums,
+    sums_of,
+    table_from,
+    tables_of,
+)
 from flocsim.ensembles.kernels.study import KernelStudy, study_of
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.report import (
+    MOST_UNDECIDED,
+    change_lines,
     checked_line,
     format_table,
-    has_withheld,
     kernel_lines,
+    too_many_undecided,
     touch_lines,
     undecided_line,
 )
@@ -68,13 +78,13 @@ def results(
     output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates; written to ``output``, if any, by all ranks."""
-    reader = Reader(start.store, (*study.shape[:3], count))
+    reader = Reader(start.store, (*study.shape[:3], count), study.scrambles)
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     if output is None:
-        sums = sums_of(reader.codes, len(study.conditions), 0, count)
+        sums = sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
         rows = reader.arrays(COLUMNS) if in_memory else None
         return results_of(study, count, sums, run, rows, kernel)
-    nothing = sums_of(reader.codes, len(study.conditions), 0, 0)
+    nothing = sums_of(reader.codes, len(study.conditions), 0, 0, study.scrambles)
     # Its tables have no values yet, but their places: where the rows go follows from them.
     draft = results_of(study, count, nothing, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:
@@ -90,18 +100,19 @@ def results_of(
 ) -> Results:  # fmt: skip
     """The Results of so many replicates of each condition from their Sums."""
     config = study.config
-    probabilities, pooled, differences = tables_of(sums)
+    tables = tables_of(sums)
     return Results(
         types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=replicates,
-        probabilities=probabilities,
+        probabilities=tables.probabilities,
         run=run,
         failures=FAILURES,
         flocs=tuple(floc.name for floc in study.flocs),
-        pooled=pooled,
-        differences=differences,
+        pooled=tables.pooled,
+        differences=tables.differences,
+        numerics=tables.numerics,
         count=count,
         radii=study.radii,
         kernel=kernel,
@@ -112,6 +123,7 @@ def facts(study: Study) -> dict[str, Any]:
     """What the results say of a study besides their tables."""
     given = study.config, study.flocs
     return {
+        MOST_UNDECIDED: study.config.stop.undecided,
         "size_classes": json.dumps(class_facts(study.pairings)),
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),
@@ -124,19 +136,21 @@ def table(found: Results) -> str:
         lines = kernel_lines(found.kernel)
     else:
         lines = [format_table(found.types, found.vertices, found.delta, found.probabilities)]
-    return "\n".join([*lines, *filter(None, [*touch_lines(found), checked_line(found)])])
+    return "\n".join(
+        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
+    )
 
 
 def verdict(found: Results) -> tuple[int, str]:
-    """0, or the code of an error where not one replicate has come to an outcome, or of rates that
-    are left open; and what to say of those that have none."""
+    """0, or the code of an error where not one replicate has come to an outcome, or where more are
+    undecided than may be; and what to say of those that have none."""
     line = undecided_line(found)
     if not line:
         return 0, ""
     counts = found.probabilities
     if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
         return FlocsimError.exit_code, line
-    return (WITHHELD if has_withheld(found) else 0), f"warning: {line}"
+    return (WITHHELD if too_many_undecided(found) else 0), f"warning: {line}"
 
 
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
@@ -174,15 +188,17 @@ def axes_of(session: dict, found: list[Condition]) -> dict[str, Any]:
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     """The table of probabilities from all rows of a store, whose conditions have this shape."""
     each = [counts_of(store, place) for place in range(len(store.conditions))]
-    counts = {
-        name: np.stack([one[name] for one in each]).reshape(*shape, *each[0][name].shape)
-        for name in each[0]
-    }
-    return counts | probabilities(counts) | numerical_errors(counts)
+    counts = {}
+    for name in each[0]:
+        axis = leading_axes(name)
+        joined = np.concatenate([one[name] for one in each], axis=axis)
+        counts[name] = joined.reshape(*joined.shape[:axis], *shape, *joined.shape[axis + 3 :])
+    return table_from(counts)
 
 
 def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
-    """{n_…: count} of a condition, its replicates in whatever pieces they are there."""
+    """What is counted of a condition (…, 1, 1, 1, …), its replicates in whatever pieces they are
+    there."""
 
     def codes(first: int, stop: int) -> tuple[np.ndarray, ...]:
         near = [(max(a, first), min(b, stop)) for a, b in runs if a < stop and b > first]
@@ -199,9 +215,7 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
         sums = sums_of(codes, 1, 0, end)
     except UsageError as error:
         raise FileError(f"{store.journal.path} holds no readable rows: {error}") from error
-    return {
-        name: values[0, 0, 0] for name, values in sums.items() if name.startswith("n_")
-    }  # fmt: skip
+    return {name: values for name, values in sums.items() if name not in (*POOLED_NAMES, JOINT)}
 
 
 PAIRS = Kind(

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flocsim.ensembles.collision.failures import describe_note
-from flocsim.ensembles.estimates.capture import MOST_UNKNOWN
-from flocsim.ensembles.estimates.statistics import HOOK
+from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
 from flocsim.io.confidence import wilson
 from flocsim.io.results.efficiency import efficiency
+from flocsim.io.results.events import HOOK
 from flocsim.io.results.file import CLASSES
-from flocsim.io.results.kernel_group import Kernel
+from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.schema import Results
 
 ENDS = {
@@ -56,7 +56,8 @@ def format_table(
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. Of the aggregations some hang by
+    "-" where there was no event to estimate a probability from. A line below says of delta = 1 that
+    it grazes. Of the aggregations some hang by
     their shapes, as statics shows, and the others stick. Returns text without a final line end.
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
@@ -71,7 +72,15 @@ def format_table(
         if place[1:] == (0, 0):
             lines.append(f"type {types[place[0]]}")
         lines.append(align(row, widths))
-    return "\n".join(lines)
+    return "\n".join([*lines, *graze_lines(delta)])
+
+
+GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little of collisions"
+
+
+def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
+    """What to say of a displacement by all of delta_max, where there is one."""
+    return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
 def efficiency_rows(results: Results) -> list[tuple[str, int, str, str]]:
@@ -182,28 +191,46 @@ def touch_lines(results: Results) -> list[str]:
     return lines
 
 
-def has_withheld(results: Results) -> bool:
-    """Whether rates are left open, as too many of their points are undecided or failed."""
+MOST_UNDECIDED = "most_undecided"
+"""Name in the group ``run`` of the share of a condition that may be undecided or failed."""
+
+
+def most_undecided(results: Results) -> float:
+    """That share; of files that do not say, the default."""
+    return float(results.run.get(MOST_UNDECIDED, StopConfig().undecided))
+
+
+def shares_undecided(results: Results) -> np.ndarray:
+    """What share of each condition is undecided or failed: of its replicates; of the encounters
+    where there are rates."""
+    if results.kernel is not None:
+        return results.kernel.arrays["undecided"]
+    table = results.probabilities
+    with np.errstate(invalid="ignore"):
+        return (table["n_undecided"] + table["n_failed"]) / table["n_total"]
+
+
+def too_many_undecided(results: Results) -> bool:
+    """Whether more of a condition is undecided or failed than may be, or a rate is left open."""
+    if np.any(shares_undecided(results) > most_undecided(results)):
+        return True
     if results.kernel is None:
         return False
     arrays = results.kernel.arrays
-    unknown = [np.isnan(arrays[name]) & ~np.isnan(arrays[f"{name}_high"]) for name in OPEN]
-    return bool(np.any(unknown))
-
-
-OPEN = ("alpha", "beta2", "beta3", "efficiency3")
-"""What is looked at for that."""
+    return any(
+        np.any(np.isnan(arrays[name]) & ~np.isnan(arrays[f"{name}_high"])) for name in ESTIMATES
+    )
 
 
 def undecided_line(results: Results) -> str:
-    """What to say where no replicate has missed or come to a class, and of rates where there is any
-    such; "" else."""
+    """What to say where replicates are undecided or have failed: of pairs where there are more of
+    them than may be, of rates where there are any; "" else."""
     table = results.probabilities
     total, failed, undecided = (
         int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
     )
-    none_known = failed + undecided == total
-    if not failed + undecided or (results.kernel is None and not none_known):
+    too_many = too_many_undecided(results)
+    if not failed + undecided or not (too_many or results.kernel is not None):
         return ""
     notes = json.loads(str(results.run.get("failed", "[]")))
     first = f"; the first: {describe_note(notes[0])}" if notes else ""
@@ -211,13 +238,16 @@ def undecided_line(results: Results) -> str:
         ": raise integrator.max_steps or scene.time_limit, for another output" if undecided else ""
     )
     ends = f"{failed} failed and {undecided} are undecided"
-    if none_known or results.kernel is None:
+    if failed + undecided == total:
         return f"no replicate has come to an outcome, {ends}{advice}{first}"
-    share = np.nanmax(results.kernel.arrays["undecided"], initial=0.0)
-    limit = f"; where they are more than {100.0 * MOST_UNKNOWN:g} % no estimate is given"
-    open_ = limit if has_withheld(results) else ""
+    share = np.nanmax(shares_undecided(results), initial=0.0)
+    what, of_what = ("points", "a pair's encounters") if results.kernel is not None else (
+        "replicates", "those of a condition"
+    )  # fmt: skip
+    limit = f", more than stop.undecided = {most_undecided(results):g} allows" if too_many else ""
+    open_ = ", so that rates have no estimate" if too_many and results.kernel is not None else ""
     return (
-        f"of {total} points {ends}, up to {100.0 * share:.2g} % of a pair's encounters: intervals "
+        f"of {total} {what} {ends}, up to {100.0 * share:.2g} % of {of_what}{limit}: intervals "
         f"hold whatever they could have come to{open_}{advice}{first}"
     )
 
@@ -233,6 +263,26 @@ def checked_line(results: Results) -> str:
         f"{checked} replicates were run again more exactly, {flipped} of them flipped: "
         f"{100.0 * flipped / checked:.2g} % [{low:.2g}, {high:.2g}]"
     )
+
+
+def change_lines(results: Results) -> list[str]:
+    """Between what Pr[A] would change if all were run exactly, in the conditions where it is most.
+
+    One line, or none where it is not known.
+    """
+    if not results.numerics:
+        return []
+    low, high = (results.numerics[f"pr_a_change{end}"] for end in ("_low", "_high"))
+    if not np.isfinite(low).any():
+        return []
+    told = []
+    for values, worst in ((low, np.nanargmin(low)), (high, np.nanargmax(high))):
+        t, v, d = np.unravel_index(worst, values.shape)
+        told.append(
+            f"{values[t, v, d]:+.3f} (type {visible(results.types[t], '')}, "
+            f"N = {results.vertices[v]}, delta {results.delta[d]:g})"
+        )
+    return [f"run exactly, Pr[A] would change by {told[0]} to {told[1]} at most, 95 %"]
 
 
 def condition_row(vertices, delta, table, place, ends):
@@ -253,13 +303,14 @@ def condition_row(vertices, delta, table, place, ends):
 def with_errors(table, name, place):
     """A probability +- sampling error +- numerical error, e.g. ".600 +-.031 +-.004".
 
-    The longer side of the 95 % interval; "-" for a numerical error of which nothing is known.
+    The longer side of the 95 % interval; "-" for a numerical error of which nothing is known, and
+    the interval alone where the value is not.
     """
     value, low, high, numerical = (
         table[name + end][place] for end in ("", "_low", "_high", "_numerical")
     )
     if np.isnan(value):
-        return "-"
+        return "-" if np.isnan(high) else f"[{share(low)}, {share(high)}]"
     added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
     return f"{share(value)} +-{share(max(value - low, high - value))} {added:>6}"
 

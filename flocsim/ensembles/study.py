@@ -13,6 +13,7 @@ from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, class_words, pairings_of
+from flocsim.ensembles.collision.points import point, point_facts
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
@@ -22,7 +23,8 @@ from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.schema import NOT_APPLICABLE, RADII
+from flocsim.io.results.events import flips_easily
+from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 
 def methods_of(config: Config) -> dict[str, Integrator]:
@@ -39,6 +41,10 @@ def flocs_of(config: Config) -> list[Floc]:
     """The flocs that a config's study needs: none for spheres alone, unless of measured sizes."""
     needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
     return load_flocs(config.shapes, config.seed) if needed else []
+
+
+TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
+"""Failures behind which more steps, or shorter ones, may come to an outcome."""
 
 
 @attrs.define(eq=False)
@@ -94,12 +100,20 @@ class Study(StudyKind):
         return class_words(class_facts(self.pairings))
 
     def numbers(self, replicate: int) -> np.ndarray:
-        """The random numbers of a replicate in [0, 1), see draws."""
+        """The random numbers of a replicate in [0, 1), see draws, or a point of Sobol's."""
+        if self.scrambles:
+            return point(self.config.seed, self.scrambles, replicate)
         return draws(self.config.seed, replicate)
+
+    @property
+    def scrambles(self) -> int:
+        """Of how many scrambles the replicates of a condition are points; 0 for independent ones,
+        and where rates follow from the points."""
+        return self.config.scrambles
 
     def facts(self) -> dict[str, Any]:
         """{name: value} of what rows follow from besides the config."""
-        return {}
+        return point_facts(self.config.seed, self.scrambles) if self.scrambles else {}
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
@@ -175,11 +189,37 @@ class Study(StudyKind):
         driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
         row = draw.run(driver, max_steps, halted)
         exact = self.exact[self.pairings[condition].name]
-        checked = is_checked(self.config.seed, replicate, self.config.integrator.check_share)
-        if row is None or exact is None or not checked:
+        if row is not None and FAILURES[row["failure"]] in TRIED_AGAIN:
+            row = self.tried_again(draw, exact, row, halted)
+        if row is None or exact is None:
+            return row
+        easily = bool(flips_easily(row["outcome"], row["bond"]))
+        wanted = self.config.integrator.check_share
+        if not is_checked(self.config.seed, replicate, wanted, easily):
             return row
         found = self.run_again(draw, exact, halted)
         return None if found is None else row | found
+
+    def tried_again(
+        self, draw: Draw, exact: Integrator | None, row: dict,
+        halted: Callable[[], bool] | None = None,
+    ) -> dict | None:  # fmt: skip
+        """A row that says nothing of the outcome, or that of a second try, where it does.
+
+        With more steps; more exactly, too, where the first did not end for lack of steps. None
+        where it was given up.
+        """
+        ran_out = FAILURES[row["failure"]] == "step budget"
+        if exact is None and not ran_out:
+            return row
+        steps = MORE_STEPS * self.config.integrator.max_steps
+        try:
+            found = draw.run(self.driver(draw.encounter), steps, halted, None if ran_out else exact)
+        except MemoryError:
+            raise
+        except Exception:
+            return row
+        return found if found is None or OUTCOMES[found["outcome"]] not in UNKNOWN else row
 
     def run_again(
         self, draw: Draw, exact: Integrator, halted: Callable[[], bool] | None = None

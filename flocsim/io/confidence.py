@@ -24,36 +24,94 @@ def wilson(
     are NaN where trials = 0.  Raises UsageError unless 0 ≤ successes ≤ trials, both whole, and
     0 < confidence < 1.  Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212.
     """
-    successes, trials = checked_counts(successes, trials)
-    if not 0.0 < confidence < 1.0:
-        raise UsageError(f"confidence must lie between 0 and 1, found {confidence!r}")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        low, high = score_interval(successes / trials, trials, confidence)
-    # At the ends the formula gives 0 and 1, but only up to rounding.
-    low = np.where((successes == 0) & (trials > 0), 0.0, low)
-    high = np.where((successes == trials) & (trials > 0), 1.0, high)
-    return low, high
+    return proportion(successes, trials, confidence)[1:]
+
+
+def normal_quantile(confidence: float) -> float:
+    """z of a two-sided interval."""
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+Z = normal_quantile(0.95)
 
 
 def score_interval(
-    share: np.ndarray, trials: np.ndarray, confidence: float = 0.95
+    share: np.ndarray, trials: np.ndarray, z: ArrayLike = Z
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's score interval (low, high) of a share among ``trials``, which need not be whole."""
-    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+    """Wilson's score interval (low, high) of a share among ``trials``, which need not be whole.
+
+    ``z``: normal quantile. At the ends 0 and 1, which the formula gives but for rounding.
+    """
+    z = np.asarray(z, dtype=float)
     spread = z * np.sqrt(share * (1.0 - share) / trials + (z / (2.0 * trials)) ** 2)
     scale = 1.0 + z * z / trials
     centre = share + z * z / (2.0 * trials)
-    return (centre - spread) / scale, (centre + spread) / scale
+    low, high = (centre - spread) / scale, (centre + spread) / scale
+    return np.where(share == 0.0, 0.0, low), np.where(share == 1.0, 1.0, high)
 
 
 def proportion(
-    successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95
+    successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95, unknown: ArrayLike = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(successes/trials, low, high) with Wilson's interval; all NaN where trials = 0."""
-    low, high = wilson(successes, trials, confidence)
+    """(successes/trials, low, high) with Wilson's interval; NaN where there are no trials.
+
+    ``unknown``: how many more there are that may be trials, and successes. The interval then holds
+    whatever they would have come to, none of them a success or all (C. F. Manski, Am. Econ. Rev. 80
+    (1990) 319-323): it goes from Wilson's low end for S of M + U to the high one for S + U of
+    M + U, at the quantile of `bounds_quantile`. Of nothing but unknown ones it is [0, 1] about NaN.
+    """
+    successes, trials = checked_counts(successes, trials)
+    successes, trials, unknown = np.broadcast_arrays(
+        successes, trials, np.asarray(unknown, dtype=float)
+    )
+    if not 0.0 < confidence < 1.0:
+        raise UsageError(f"confidence must lie between 0 and 1, found {confidence!r}")
+    most = trials + unknown
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.true_divide(successes, trials)
-    return share, low, high
+        ends = successes / most, (successes + unknown) / most
+        return successes / trials, *between_bounds(*ends, most, most, confidence)
+
+
+def between_bounds(
+    least: np.ndarray, most: np.ndarray, trials_least: np.ndarray, trials_most: np.ndarray,
+    confidence: float = 0.95,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(low, high) of a share that lies between two, each known from so many trials."""
+    two_sided = normal_quantile(confidence)
+    error = [
+        np.diff(score_interval(share, trials, two_sided), axis=0)[0] / (2.0 * two_sided)
+        for share, trials in ((least, trials_least), (most, trials_most))
+    ]
+    z = bounds_quantile(most - least, np.maximum(*error), confidence)
+    low, high = score_interval(least, trials_least, z)[0], score_interval(most, trials_most, z)[1]
+    return low, high
+
+
+def bounds_quantile(width: np.ndarray, error: np.ndarray, confidence: float = 0.95) -> np.ndarray:
+    """By how many standard errors an interval reaches beyond two bounds ``width`` apart.
+
+    The c of Φ(c + width/error) − Φ(−c) = confidence: that of a two-sided interval where the bounds
+    are one, of a one-sided one where they are far apart, as the truth cannot be beyond both.
+    Source: G. W. Imbens and C. F. Manski, Econometrica 72 (2004) 1845-1857.
+    """
+    from scipy.special import ndtr
+
+    width, error = np.broadcast_arrays(width, error)
+    c = np.full(width.shape, normal_quantile(confidence))
+    apart = (width > 0.0) & (error > 0.0)
+    ratio = width[apart] / error[apart]
+    low = np.full(ratio.shape, NormalDist().inv_cdf(confidence))
+    high = c[apart]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        enough = ndtr(middle + ratio) - ndtr(-middle) >= confidence
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    c[apart] = high
+    return c
+
+
+HALVINGS = 40
+"""Of an interval of .3 until it is one of rounding."""
 
 
 def checked_counts(successes: ArrayLike, trials: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -71,68 +129,138 @@ def checked_counts(successes: ArrayLike, trials: ArrayLike) -> tuple[np.ndarray,
     return successes, trials
 
 
-def clustered_proportion(
-    s: np.ndarray,
-    m: np.ndarray,
-    ss: np.ndarray,
-    sm: np.ndarray,
-    mm: np.ndarray,
-    clusters: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(p, low, high, n): p = Σ S/Σ M, and Wilson's interval at the n events that it is worth.
+def cluster_sums(successes: np.ndarray, trials: np.ndarray) -> np.ndarray:
+    """Σ S, Σ M, Σ S², Σ S M, Σ M² and the number of clusters with trials (6, …), whole numbers.
 
-    S successes of M trials in each cluster; arguments: Σ S, Σ M, Σ S², Σ S M, Σ M² and the number
-    of clusters with trials, as floats (W. G. Cochran, Sampling Techniques, 1977, ch. 6). At n
-    independent events p (1 − p)/n is the variance between clusters; n is no more than the trials
-    there were, and the number of clusters where all agree.
+    ``successes``, ``trials``: S and M of each cluster, clusters along the last axis.
     """
+    s, m = np.broadcast_arrays(np.asarray(successes, "i8"), np.asarray(trials, "i8"))
+    return np.stack([np.sum(each, axis=-1) for each in (s, m, s * s, s * m, m * m, m > 0)])
+
+
+def bounded_sums(successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray) -> np.ndarray:
+    """cluster_sums (3, 6, …): as known, and with all ``unknown`` as trials that fail or succeed."""
+    most = trials + unknown
+    parts = (successes, trials), (successes, most), (successes + unknown, most)
+    return np.stack([cluster_sums(*each) for each in parts])
+
+
+def clustered_proportion(
+    sums: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(p, low, high, n): p = Σ S/Σ M, and an interval at the n events that it is worth.
+
+    ``sums``: those of bounded_sums. S successes of M trials in each cluster (W. G. Cochran,
+    Sampling Techniques, 1977, ch. 6): at n independent events p (1 − p)/n is the variance between
+    clusters; n is no more than the trials there were, and the number of clusters where all agree.
+    The interval is that of `proportion`, unknown ones included.
+    """
+    known, least, most = (share_and_worth(each) for each in np.asarray(sums, dtype=float))
+    low, high = between_bounds(least[0], most[0], least[1], most[1])
+    return known[0], low, high, known[1]
+
+
+def share_and_worth(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(p, n) of cluster_sums, NaN without trials."""
+    s, m, ss, sm, mm, clusters = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         p = s / m
         spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, 0.0)
         variance = clusters / (clusters - 1.0) * spread / (m * m)
         number = np.minimum(p * (1.0 - p) / variance, m)
         number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
-        number = np.where(m > 0, number, np.nan)
-        low, high = score_interval(p, number)
-    # At the ends the formula gives 0 and 1, but only up to rounding.
-    return p, np.where(p == 0.0, 0.0, low), np.where(p == 1.0, 1.0, high), number
+        return p, np.where(m > 0, number, np.nan)
 
 
-def numerical_error(
-    flipped: ArrayLike, checked: ArrayLike, trials: ArrayLike, confidence: float = 0.95
-) -> np.ndarray:
-    """95 % bound of the share of a condition's trials that flip where run more exactly.
+def scrambled_proportion(
+    successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(low, high, n) of Σ S/Σ M over independent scrambles, along the last axis, whose points are
+    more even than independent ones; n: the independent events that it is worth.
 
-    Arrays (type, …) of whole numbers, a place for each condition: ``flipped`` among ``checked``,
-    the trials that were run again, of ``trials`` in all. NaN without trials, and where nothing was
-    checked in any condition of the type.
-
-    f of c have flipped here, and F of C in the type's other conditions. Rates of flips scatter
-    over conditions like an exponential distribution with the mean (F + 1)/(C + 2) that the others
-    show (Laplace's rule), so that here, given f of c, the rate has a gamma distribution of shape
-    1 + f and rate b = (C + 2)/(F + 1) + c. How many more flip of the u = trials − c that were not
-    run again is then negative binomial: at most k with probability I_p(1 + f, k + 1), I the
-    incomplete beta function, p = b/(b + u). With q, the smallest k of probability
-    ``confidence``: (f + q)/(c + u), at most 1.
+    The variance is that of a ratio between scrambles, each taken to scatter by half a point at
+    least; at the n events of which it is p (1 − p)/n the interval is Wilson's, at Student's
+    quantile of the scrambles in the place of the normal one. Where all agree n is the trials.
     """
-    from scipy.special import betainc
+    from scipy.special import stdtrit
 
-    f, c, n = (np.asarray(each, dtype=float) for each in (flipped, checked, trials))
-    rest = tuple(range(1, f.ndim))
-    others_flipped = f.sum(axis=rest, keepdims=True) - f
-    others = c.sum(axis=rest, keepdims=True) - c
-    # A trial may count in the second run alone: then there are more checked ones than trials.
-    unknown = np.maximum(n - c, 0.0)
-    rate = (others + 2.0) / (others_flipped + 1.0) + c
-    p = rate / (rate + unknown)
-    low, high = np.full(f.shape, -1.0), unknown.copy()
-    # The smallest k lies above low, and is no more than high: halve until they are neighbours.
+    count = successes.shape[-1]
+    t = float(stdtrit(count - 1, 0.975))
+    known, least, most = (
+        scrambled_worth(sums, count) for sums in bounded_sums(successes, trials, unknown)
+    )
+    low, high = score_interval(*least, t)[0], score_interval(*most, t)[1]
+    return low, high, known[1]
+
+
+def scrambled_worth(sums: np.ndarray, scrambles: int) -> tuple[np.ndarray, np.ndarray]:
+    """(p, n) of cluster_sums, NaN without trials."""
+    s, m, ss, sm, mm, _ = sums.astype(float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = s / m
+        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, LEAST_SCATTER * (scrambles - 1.0))
+        number = p * (1.0 - p) * m * m * (scrambles - 1.0) / (scrambles * spread)
+    return p, np.where((p == 0.0) | (p == 1.0), m, number)
+
+
+LEAST_SCATTER = 0.25
+"""Square of half a point."""
+
+SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
+MEANS = np.geomspace(1e-5, 0.3, 16)
+"""Gamma distributions of rates over conditions: from a few that flip to all alike."""
+
+
+def further_flips(
+    flipped: ArrayLike, checked: ArrayLike, exposed: ArrayLike, confidence: float = 0.95
+) -> np.ndarray:
+    """How many more flip at most, with this probability, of what was not run again.
+
+    Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
+    others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
+
+    Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
+    k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
+    weighed by what all conditions show: f is negative binomial. Given f of c, the rate here has
+    shape k + f and rate k/m + c, and the number of further flips is at most q with probability
+    I_p(k + f, q + 1), I the incomplete beta function, p = b/(b + u), b = k/m + c; their mean over
+    k and m has its quantile here. So where flips sit in few conditions a condition in which few
+    were run again is in doubt, and where all are alike it borrows from the others.
+    """
+    from scipy.special import betainc, gammaln
+
+    f, c, u = np.broadcast_arrays(
+        *(np.asarray(each, float) for each in (flipped, checked, exposed))
+    )
+    if not np.any(c > 0.0):
+        return np.where(u > 0.0, np.nan, 0.0)
+    seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
+    k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
+    rate = (k / m)[:, np.newaxis]
+    f_seen, c_seen = seen
+    logs = (
+        gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
+        + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
+    )  # fmt: skip
+    logs = logs @ times + 0.5 * np.log(m)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    some = weights > NEGLIGIBLE
+    k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
+    cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
+                              return_inverse=True)  # fmt: skip
+    f_here, c_here, u_here = cases
+    shape, b = k[:, np.newaxis] + f_here, rate + c_here
+    low, high = np.full(f_here.shape, -1.0), np.ceil(u_here)
+    # The smallest q lies above low, and is no more than high: halve until they are neighbours.
     while np.any(high - low > 1.0):
         middle = np.floor(0.5 * (low + high))
-        enough = betainc(1.0 + f, middle + 1.0, p) >= confidence
+        enough = weights @ betainc(shape, middle + 1.0, b / (b + u_here)) >= confidence
         split = high - low > 1.0
         low = np.where(split & ~enough, middle, low)
         high = np.where(split & enough, middle, high)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.minimum((f + high) / n, 1.0)
-    return np.where((n > 0) & (c + others > 0), share, np.nan)
+    return high[places.reshape(f.shape)]
+
+
+NEGLIGIBLE = 1e-6
+"""Weight below which a distribution is left out."""

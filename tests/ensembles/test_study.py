@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from flocsim import run
+from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.geometry.shapes.parts import table_of
-from flocsim.io.results.schema import REPLICATES
+from flocsim.io.results.schema import OUTCOMES, REPLICATES
 from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import framed
 from tests.helpers.small_study import (
@@ -55,6 +57,37 @@ def test_a_replicate_that_is_given_up_has_no_row(study, monkeypatch):
     assert len(looks) > 2
     np.testing.assert_equal(whole, study.run(0, 4, 0.0, 0))
     assert study.run(0, 4, 0.0, 0, halted=lambda: True) is None
+
+
+def test_what_runs_out_of_steps_is_tried_again_with_more(study, tmp_path):
+    full = study.run(0, 16, 0.0, 0)
+    taken = full["steps"] + full["rejected"]
+    few = small_study(tmp_path, {"integrator": {"max_steps": taken // 3}})
+    assert few.run(0, 16, 0.0, 0) == full
+    fewer = small_study(tmp_path, {"integrator": {"max_steps": taken // 20}}).run(0, 16, 0.0, 0)
+    assert OUTCOMES[fewer["outcome"]] == "undecided"
+    assert fewer["steps"] + fewer["rejected"] <= taken // 20
+
+
+def test_what_fails_is_tried_again_more_exactly(study, monkeypatch):
+    tried, run = [], Draw.run
+
+    def failing(draw, driver, max_steps, halted=None, integrator=None):
+        tried.append((max_steps, integrator))
+        row = run(draw, driver, max_steps, halted, integrator)
+        if integrator is None:
+            row |= {"outcome": FAILED, "failure": FAILURES.index("too deep")}
+        return row
+
+    right = study.run(0, 4, 0.0, 1)
+    monkeypatch.setattr(Draw, "run", failing)
+    row = study.run(0, 4, 0.0, 1)
+    steps = study.config.integrator.max_steps
+    assert tried[:2] == [(steps, None), (5 * steps, study.exact["I"])]
+    assert (row["outcome"], row["failure"]) == (right["outcome"], 0)
+    # A second try that fails, too, leaves the first as it was.
+    monkeypatch.setattr(Draw, "run", lambda draw, *_, **__: failing(draw, *_[:2]))
+    assert study.run(0, 4, 0.0, 1)["outcome"] == FAILED
 
 
 def test_an_encounter_is_made_once_for_each_pair_of_shapes(study):

@@ -30,7 +30,7 @@ from flocsim.io.confidence import wilson
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.plots.work_precision import Rung, draw_ladders
-from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.results.schema import OUTCOMES, UNKNOWN
 from flocsim.io.terminal import tell
 
 COUNT = 60
@@ -150,7 +150,7 @@ def rung_of(climbed: Measured, rung: float) -> Rung:
     distances = climbed.distances[rung]
     known = distances[np.isfinite(distances)]
     median, most = np.quantile(known, [0.5, 0.9]) if len(known) else (math.nan, math.nan)
-    undecided = sum(OUTCOMES[each.outcome] in ("undecided", "failed") for each in trials)
+    undecided = sum(OUTCOMES[each.outcome] in UNKNOWN for each in trials)
     return Rung(
         type(ladder.method).__name__, at_rung(ladder.method, rung * ladder.length).tolerance,
         len(trials), flips, low, high, float(median), float(most), 1e-3 * ladder.cost(rung),

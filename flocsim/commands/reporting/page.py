@@ -12,7 +12,7 @@ from flocsim.commands.plot import swarm_figures
 from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
 from flocsim.commands.reporting.motion import SCRIPT, motion_of
-from flocsim.ensembles.report import EFFICIENCY, efficiency_rows
+from flocsim.ensembles.report import EFFICIENCY, efficiency_rows, graze_lines
 from flocsim.ensembles.swarms.assembly import table_rows
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import METADATA, house_style
@@ -31,9 +31,10 @@ SHOWN = {
 """The probabilities of a condition that have columns of their own, and their headings."""
 
 ERRORS_TEXT = (
-    "Each probability is followed by its 95 % interval from sampling (Wilson's) and, after ±, by "
-    "the numerical error: the 95 % bound of the share of replicates that would end otherwise if "
-    "they were computed exactly. – where there was no event, ± ? where none was run again."
+    "Each probability is followed by its 95 % interval, of sampling (Wilson's) and of what "
+    "undecided and failed replicates could have come to, and by the least and the most by which it "
+    "would change if all replicates were computed exactly (95 %; of those pooled the larger, after "
+    "±). – where there was no event, ± ? where none was run again."
 )
 
 
@@ -84,8 +85,9 @@ def provenance_of(run: Mapping[str, Any], origin: Sequence[tuple[str, str]]) -> 
 
 
 def figures_of(figures: Mapping[str, Callable[..., Any]], results: Any) -> str:
-    """Figures of `flocsim plot`, that of everything first."""
-    names = sorted(figures, key=lambda name: name != "overview")
+    """Figures of `flocsim plot`, outcomes and that of everything first."""
+    first = ("outcomes", "overview")
+    names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
     return "\n".join(figure_of(name, figures[name], results) for name in names)
 
 
@@ -106,7 +108,8 @@ def tables_of(results: Results) -> str:
     places = list(np.ndindex(*results.shape))
     rows = [condition_row(results, table, place) for place in places]
     firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
-    parts = [f"<p>{text(ERRORS_TEXT)}</p>", table_of(heads, rows, firsts)]
+    told = [ERRORS_TEXT, *graze_lines(results.delta)]
+    parts = [*(f"<p>{text(line)}</p>" for line in told), table_of(heads, rows, firsts)]
     if results.pooled:
         heads = ["type", "N", *(PROBABILITIES[name] for name in POOLED_PROBABILITIES)]
         places = list(np.ndindex(*results.shape[:2]))
@@ -129,17 +132,21 @@ def condition_row(results, table, place):
     ends = [int(table[f"n_{name}"][place]) for name in names]
     return [
         results.types[t], int(results.vertices[v]), f"{results.delta[d]:g}", *counts,
-        *(with_errors(table, name, place) for name in SHOWN),
+        *(with_errors(table, name, place, results.numerics) for name in SHOWN),
         *(int(number) for number in table["n_class"][place]), *ends,
     ]  # fmt: skip
 
 
-def with_errors(table, name, place):
-    """ "0.600 [0.571, 0.629] ± 0.004": value, sampling interval, numerical error."""
+def with_errors(table, name, place, numerics=None):
+    """ "0.600 [0.571, 0.629] −0.004 +0.010": value, sampling interval, by how much numerics change
+    it, or "± 0.010" where their sign is not known."""
     value, low, high, numerical = (
         float(table[name + end][place]) for end in ("", "_low", "_high", "_numerical")
     )
     if math.isnan(value):
-        return "–"
-    added = "?" if math.isnan(numerical) else f"{numerical:.3f}"
-    return f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}"
+        return "–" if math.isnan(high) else f"[{low:.3f}, {high:.3f}]"
+    added = "± ?" if math.isnan(numerical) else f"± {numerical:.3f}"
+    if numerics and not math.isnan(numerical):
+        down, up = (float(numerics[f"{name}_change{end}"][place]) for end in ("_low", "_high"))
+        added = f"{down:+.3f} {up:+.3f}".replace("-", "−")
+    return f"{value:.3f} [{low:.3f}, {high:.3f}] {added}"

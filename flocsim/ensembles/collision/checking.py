@@ -1,8 +1,10 @@
 """Which replicates are run again, more exactly, so that what numerics change is seen and counted.
 
-The choice follows from the seed and the replicate's index alone: whatever ranks, kills, and later
-extensions there are, the same ones are run again. An index does nothing but name random numbers, so
-that any choice which does not look at them is a random sample of the replicates.
+The choice follows from the seed, the replicate's index and how it ended: whatever ranks, kills, and
+later extensions there are, the same ones are run again. An index does nothing but name random
+numbers, so that a choice which does not look at them is a random sample of those that ended alike.
+More are taken of those that flip easily (`io.results.events.flips_easily`), and each kind counts
+for as many as there are of it (`estimates.numerical`).
 """
 
 import math
@@ -28,19 +30,25 @@ Z = 1.959963984540054
 LEAST_SHARE = 0.01
 """Of the replicates that "auto" has run again."""
 
+EASILY = 3
+"""Times as many "auto" has run again of those that flip easily."""
+
 STREAM = (0, 0, 1)
 """Spawn key of the number that the choice starts from; replicates have keys of one part."""
 
 
-def expected_checks(replicates: int, share: float | str) -> float:
+def expected_checks(replicates: int, share: float | str, easily: bool = False) -> float:
     """How many of the first so many replicates of a condition are run again, before rounding.
+
+    ``easily``: if all of them were of those that flip easily, EASILY times as many by "auto".
 
     "auto": where no outcome flips, Wilson's interval of the flip rate at m is as wide as that of a
     probability of ½ at n replicates, z²/(m + z²) = z/√(n + z²), so m = z √(n + z²) − z²; and at
     least 1 %. Never falls, nor rises by more than 1 from one replicate to the next.
     """
     if isinstance(share, str):
-        return max(Z * math.sqrt(replicates + Z * Z) - Z * Z, LEAST_SHARE * replicates)
+        wanted = max(Z * math.sqrt(replicates + Z * Z) - Z * Z, LEAST_SHARE * replicates)
+        return min(EASILY * wanted, replicates) if easily else wanted
     return share * replicates
 
 
@@ -51,13 +59,14 @@ def beginning(seed: int) -> float:
     return float(np.random.Generator(np.random.Philox(stream)).random())
 
 
-def is_checked(seed: int, replicate: int, share: float | str) -> bool:
+def is_checked(seed: int, replicate: int, share: float | str, easily: bool = False) -> bool:
     """Whether a replicate is run again: a systematic sample from a random beginning.
 
-    Of the first n of any condition expected_checks(n) are, up or down to a whole number.
+    Of the first n of any condition expected_checks(n) would be, up or down to a whole number, if
+    all ended alike; ``easily``: whether it is of those that flip easily.
     """
     start = beginning(seed)
-    before, after = (expected_checks(n, share) for n in (replicate, replicate + 1))
+    before, after = (expected_checks(n, share, easily) for n in (replicate, replicate + 1))
     return math.floor(after + start) > math.floor(before + start)
 
 

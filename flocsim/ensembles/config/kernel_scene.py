@@ -19,6 +19,7 @@ from flocsim.ensembles.config.pair_scene import (
     FlowScene,
     Problem,
     micrometres,
+    uneven_points,
 )
 from flocsim.ensembles.config.values import (
     list_of,
@@ -195,15 +196,5 @@ class KernelScene(DrivenScene):
                 'scene.meeting = "brownian"'
             )
             yield ("forces", "thermal"), text
-        replicates = parts.get("replicates", KERNEL_REPLICATES)
-        points, rest = divmod(replicates, self.scrambles)
-        if rest or points < 1 or points & (points - 1):
-            least = self.scrambles << (max(points, 1).bit_length() - 1)
-            text = (
-                f"must be scene.scrambles = {self.scrambles} times a power of 2, as Sobol's points "
-                f"are even only so: found {replicates}, take {least} or {2 * least}"
-            )
-            yield ("replicates",), text
-        if parts["stop"] is not None and parts["stop"].half_width is not None:
-            text = "is for probabilities, and a study of rates runs all its points: "
-            yield ("stop", "half_width"), text + "give more replicates and --resume instead"
+        given = {"replicates": KERNEL_REPLICATES, **parts}
+        yield from uneven_points(given, self.scrambles, f"scene.scrambles = {self.scrambles}")

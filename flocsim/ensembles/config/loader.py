@@ -34,7 +34,7 @@ from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 DEFAULTS = {"source": "synthetic"}
 """Of keys that others go with."""
 
-FOR_PAIRS = {"zone", "stop"}
+FOR_PAIRS = {"zone", "stop", "sampling"}
 """Tables that a swarm has no use for."""
 
 

@@ -106,6 +106,29 @@ def one_tag(word: str, of: tuple[str, ...], help: str) -> Any:
     )  # fmt: skip
 
 
+SOBOL = "sobol"
+SOBOL_SCRAMBLES = 16
+"""Of studies of pairs: with fewer the intervals are wider, with more the points are less even."""
+
+
+def uneven_points(parts: Mapping[str, Any], scrambles: int, of_what: str) -> Iterator[Problem]:
+    """What does not go with replicates that are points of ``scrambles`` Sobol sequences."""
+    replicates = parts.get("replicates")
+    if replicates is None:  # it is wrong by itself
+        return
+    points, rest = divmod(replicates, scrambles)
+    if rest or points < 1 or points & (points - 1):
+        least = scrambles << (max(points, 1).bit_length() - 1)
+        text = (
+            f"must be {of_what} times a power of 2, as Sobol's points are even only so: found "
+            f"{replicates}, take {least} or {2 * least}"
+        )
+        yield ("replicates",), text
+    if parts["stop"] is not None and parts["stop"].half_width is not None:
+        text = "is for probabilities of independent replicates, and Sobol's points are all run: "
+        yield ("stop", "half_width"), text + "give more replicates and --resume instead"
+
+
 @attrs.frozen
 class PairScene:
     """Of what sizes two bodies meet, and what all ways to meet have in common.

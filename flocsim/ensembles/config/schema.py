@@ -32,9 +32,12 @@ from flocsim.ensembles.config.pair_scene import (
     LARGEST_LENGTH,
     MEASURED,
     PAIR_SCENES,
+    SOBOL,
+    SOBOL_SCRAMBLES,
     PairScene,
     Problem,
     SettlingScene,
+    uneven_points,
 )
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.swarm_scene import SwarmScene
@@ -113,7 +116,19 @@ class StopConfig:
         default=0.1,
         help="share of all replicates that may fail; a study of more is given up, exit code 70",
     )
+    undecided: float = quantity(
+        "",
+        at_least=0.0,
+        at_most=1.0,
+        default=0.05,
+        help="share of a condition's replicates, or of a rate's encounters, that may be undecided "
+        "or failed; a study of more is complete, but ends with exit code 65, and such rates have "
+        "an interval alone",
+    )
 
+
+SOBOL_REPLICATES = 128
+"""Of every condition where nothing is said."""
 
 LARGEST_SEED = 2**63 - 1
 MOST_REPLICATES = 10**9
@@ -316,9 +331,9 @@ class IntegratorConfig:
         MOST_STEPS,
         default=200_000,
         beside_class=True,
-        help="steps after which a replicate ends undecided; of a swarm, those that an island may "
-        "try from one common time to the next, of more than 50 bodies 50 times so many over its "
-        "bodies",
+        help="steps that a replicate may take; one that has not ended, or has failed, is tried "
+        "once more with five times as many; of a swarm, those that an island may try from one "
+        "common time to the next, of more than 50 bodies 50 times so many over its bodies",
     )
     step: float | None = quantity(
         "s", above=0.0, default=None, help="for methods with a fixed step"
@@ -333,7 +348,8 @@ class IntegratorConfig:
         help="share of the replicates that are run again at a 100 times tighter tolerance (a fixed "
         "step: at a quarter of it); the outcomes that change are the numerical error of the "
         'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
-        "of a flip rate of 0 as narrow as a sampling interval, and at least 1 %; 0: none",
+        "of a flip rate of 0 as narrow as a sampling interval, and at least 1 %, of hooks, rests "
+        "and misses, which flip most, three times as many; 0: none",
     )
 
     def __attrs_post_init__(self):
@@ -391,6 +407,14 @@ class Config:
     replicates: int = whole_field(
         1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
     )
+    sampling: str = choice(
+        "random",
+        SOBOL,
+        default="random",
+        help="how orientations and flocs of two bodies are drawn: independently, or evenly, by the "
+        f"points of {SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the intervals "
+        "follow (studies of rates draw so in any case)",
+    )
     scene: PairScene = attrs.Factory(SettlingScene)
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)
@@ -409,6 +433,12 @@ class Config:
     def is_swarm(self) -> bool:
         """Whether the scene is a SwarmScene, and the study one of many bodies."""
         return bool(self.scene.kind == "swarm")
+
+    @property
+    def scrambles(self) -> int:
+        """Of how many scrambles of a Sobol sequence the replicates of two bodies are points; 0
+        where they are drawn independently."""
+        return SOBOL_SCRAMBLES if self.sampling == SOBOL and self.scene.kind == "binary" else 0
 
     @property
     def is_kernel(self) -> bool:
@@ -486,6 +516,8 @@ def implied(table: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if isinstance(scene, Mapping) and scene.get("kind") == "kernel":
         found["replicates"] = KERNEL_REPLICATES
+    elif table.get("sampling") == SOBOL:
+        found["replicates"] = SOBOL_REPLICATES
     if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
         return found
     if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
@@ -520,6 +552,8 @@ def elsewhere(key: str, scene: type) -> dict[str, attrs.Attribute]:
 def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
     """What does not go together though each is right by itself; ``parts``: a config's tables."""
     yield from weight_contradictions(parts["bodies"], parts["fluid"])
+    if parts.get("sampling") == SOBOL and isinstance(parts["scene"], tuple(PAIR_SCENES.values())):
+        yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
     yield from parts["scene"].problems(parts)
 
 

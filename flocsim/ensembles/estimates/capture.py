@@ -22,7 +22,8 @@ end that of χ = 1. As χ, whichever it is taken for, follows from the point alo
 scrambles are independent draws of either bound, and Student's interval holds for each by itself:
 from the low end of the one to the high end of the other covers whatever the points would have come
 to. The estimate is that of the decided points, whose flux stands for all, and NaN where the others
-are more than MOST_UNKNOWN of the flux: what is undecided is no sample, but what takes longest.
+are more of it than `[stop] undecided` allows: what is undecided is no sample, but what takes
+longest.
 """
 
 import math
@@ -32,20 +33,20 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
-from flocsim.ensembles.kernels.sampling import as_draws, points_of
+from flocsim.ensembles.config.schema import StopConfig
+from flocsim.ensembles.estimates.numerical import SECOND_RUNS, further_of_kinds
+from flocsim.ensembles.kernels.sampling import as_draws
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.confidence import numerical_error, wilson
+from flocsim.io.confidence import wilson
+from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, kinds_of
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
-UNKNOWN = [OUTCOMES.index(name) for name in ("undecided", "failed")]
-COLUMNS = ("outcome", "inside", "checked_outcome", "checked_inside", "floc_i", "floc_j")
-MOST_UNKNOWN = 0.05
-"""Share of the flux that may be unknown where there is an estimate."""
-
+COLUMNS = ("outcome", "inside", "bond", "checked_outcome", "checked_inside", "floc_i", "floc_j")
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
 
@@ -129,7 +130,7 @@ class Chi:
 
 def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, Chi]:
     """{c, inside, a: Chi} of codes as in the results file."""
-    unknown, touched = np.isin(outcome, UNKNOWN), inside != NOT_APPLICABLE
+    unknown, touched = np.isin(outcome, WITHOUT_OUTCOME), inside != NOT_APPLICABLE
     least = {"c": touched, "inside": inside == 1, "a": np.isin(outcome, BOUND)}
     return {
         name: Chi(each, each | (unknown if name == "a" else unknown & ~touched))
@@ -195,13 +196,15 @@ def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, flo
 @attrs.define(eq=False)
 class Estimated:
     """The numbers of one condition, but for what numerics do: ``values`` {name: number},
-    ``flipped`` and ``checked`` {X: how many, of those that are known both times}, and ``trials``;
+    ``flipped`` and ``checked`` {X: how many of each kind (kind,), of those that are known both
+    times}, ``members`` (kind,), how many there are, and ``trials``;
     ``largest`` {name: how much a point that flips changes the estimate, over the share of those
     that do}."""
 
     values: dict[str, float]
-    flipped: dict[str, int]
-    checked: dict[str, int]
+    flipped: dict[str, np.ndarray]
+    checked: dict[str, np.ndarray]
+    members: np.ndarray
     trials: int
     largest: dict[str, float]
 
@@ -211,25 +214,26 @@ def flow_width(plane: float, factor: float) -> float:
     return 2.0 * math.sqrt(max(plane, 0.0) / factor)
 
 
-def known_part(value: float, weight: np.ndarray, known: np.ndarray) -> float:
+def known_part(value: float, weight: np.ndarray, known: np.ndarray, most_unknown: float) -> float:
     """What a sum over the ``known`` points is with all of them, in proportion to the weights; NaN
-    where they lack too much."""
+    where they lack more than ``most_unknown`` of these."""
     unknown = float(np.sum(weight * ~known) / np.sum(weight))
-    return value / (1.0 - unknown) if unknown <= MOST_UNKNOWN else math.nan
+    return value / (1.0 - unknown) if unknown <= most_unknown and unknown < 1.0 else math.nan
 
 
 def estimate(
-    points: Weighted, rows: dict[str, np.ndarray], meeting: str, rate: float | None, scrambles: int
-) -> Estimated:
-    """What the points of a condition come to."""
+    points: Weighted, rows: dict[str, np.ndarray], meeting: str, rate: float | None,
+    scrambles: int, most_unknown: float = StopConfig().undecided,
+) -> Estimated:  # fmt: skip
+    """What the points of a condition come to; ``most_unknown``: share of the flux that may be
+    unknown where there is an estimate."""
     chi = became(rows["outcome"], rows["inside"])
     n = len(points.plane)
     again = became(rows["checked_outcome"], rows["checked_inside"])
     run_again = rows["checked_outcome"] != NOT_APPLICABLE
     checked = {name: run_again & chi[name].known & again[name].known for name in WHAT}
-    flipped = {
-        name: int(np.sum(checked[name] & (chi[name].least != again[name].least))) for name in WHAT
-    }
+    flipped = {name: checked[name] & (chi[name].least != again[name].least) for name in WHAT}
+    kinds = kinds_of(rows["outcome"], rows["bond"])
 
     def parts(values: np.ndarray) -> np.ndarray:
         """The means of the scrambles, which replicates belong to in turn."""
@@ -255,7 +259,11 @@ def estimate(
             return mean_of(parts(weight * flags), agree, most * scrambles / n)
 
         least, low, _ = bounds(chi[what].least)
-        ends = [known_part(least, weight, chi[what].known), low, bounds(chi[what].most)[2]]
+        ends = [
+            known_part(least, weight, chi[what].known, most_unknown),
+            low,
+            bounds(chi[what].most)[2],
+        ]
         if flow:
             assert rate is not None
             factor = rate * (1.0 if meeting == SHEAR else 2.0)
@@ -276,9 +284,13 @@ def estimate(
         point = 0.0 if sure else float(weight.max()) * scrambles / n
         ratios = [ratio_of(parts(weight * each), parts(over), point)
                   for each in (stays.least, stays.most)]  # fmt: skip
-        ends = [known_part(ratios[0][0], weight, stays.known), ratios[0][1], ratios[1][2]]
+        ends = [
+            known_part(ratios[0][0], weight, stays.known, most_unknown),
+            ratios[0][1],
+            ratios[1][2],
+        ]
         if name == "alpha":
-            ends = [alpha_of(points.plane, touched, stays)]
+            ends = [alpha_of(points.plane, touched, stays, most_unknown)]
             ends += [
                 widened(each, int(np.sum(flags)), int(np.sum(touched.most)))[side]
                 for side, each, flags in zip((0, 1), ratios, (stays.least, stays.most), strict=True)
@@ -286,7 +298,7 @@ def estimate(
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         below = float(parts(under).mean())
         largest[name] = float(weight.max()) / below if below > 0.0 else math.nan
-    unknown = np.isin(rows["outcome"], UNKNOWN)
+    unknown = np.isin(rows["outcome"], WITHOUT_OUTCOME)
     caught = float(np.sum(points.plane * stays.least))
     edge = float(np.sum(points.plane * stays.least * points.edge))
     values |= {
@@ -297,19 +309,21 @@ def estimate(
         "undecided": float(np.sum(points.plane * unknown) / np.sum(points.plane)),
         "edge": edge / caught if caught else 0.0,
     }
-    counts = {name: int(each.sum()) for name, each in checked.items()}
-    for name, count in flipped.items():
-        values[f"flips_{name}"] = count / counts[name] if counts[name] else math.nan
-    return Estimated(values, flipped, counts, n, largest)
+    flips, checks = ({name: np.sum(kinds & each, axis=-1) for name, each in flags.items()}
+                     for flags in (flipped, checked))  # fmt: skip
+    for name in WHAT:
+        count = int(checked[name].sum())
+        values[f"flips_{name}"] = int(flipped[name].sum()) / count if count else math.nan
+    return Estimated(values, flips, checks, kinds.sum(axis=-1), n, largest)
 
 
-def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi) -> float:
+def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi, most_unknown: float) -> float:
     """Of the flux that touches, and of which it is known what becomes of it, what aggregates; NaN
     where there is none, or the rest is too much of all that touches or may have."""
     seen = touched.least & stays.known
     flux = float(np.sum(weight * seen))
     lost = float(np.sum(weight * ~stays.known))
-    if not flux > 0.0 or lost > MOST_UNKNOWN * float(np.sum(weight * touched.most)):
+    if not flux > 0.0 or lost > most_unknown * float(np.sum(weight * touched.most)):
         return math.nan
     return float(np.sum(weight * stays.least)) / flux
 
@@ -327,10 +341,14 @@ def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> di
     """{place: {name_numerical: bound}} of all conditions, by mechanism: axis 0 of the shape."""
     bounds = {}
     for what in WHAT:
-        counts = np.zeros((3, *shape))
+        f, c, members = (np.zeros((len(KINDS), *shape)) for _ in range(3))
+        trials = np.ones(shape)
         for place, each in found.items():
-            counts[(slice(None), *place)] = each.flipped[what], each.checked[what], each.trials
-        bounds[what] = numerical_error(*counts)
+            at = (slice(None), *place)
+            f[at], c[at], members[at] = each.flipped[what], each.checked[what], each.members
+            trials[place] = each.trials
+        more = further_of_kinds(f, c, members - (1.0 - SECOND_RUNS) * c)
+        bounds[what] = np.minimum((f.sum(axis=0) + more) / trials, 1.0)
     told: dict[tuple, dict] = {}
     for place, each in found.items():
         told[place] = {}
@@ -356,7 +374,12 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         points_here = weighted(study, (condition, n), rows, points)
         meeting = scene.meeting[m]
         found[m, vertices.index(n), i, j] = estimate(
-            points_here, rows, meeting, scene.rate, scene.scrambles
+            points_here,
+            rows,
+            meeting,
+            scene.rate,
+            scene.scrambles,
+            study.config.stop.undecided,
         )
         if scene.sizes is None and i == j:
             radii[i] = float(np.mean(study.pairings[condition].radii))

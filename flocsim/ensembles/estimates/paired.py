@@ -7,8 +7,8 @@ them is correlated, and the difference is known better than from independent sam
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED
 from flocsim.io.confidence import wilson
+from flocsim.io.results.events import Events, events
 from flocsim.io.results.schema import AXES, NOT_APPLICABLE
 
 
@@ -16,33 +16,63 @@ def joint_counts(outcome: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """How often an event happens in both, here only, there only, in neither.
 
     ``outcome``, ``inside``: codes (type, vertices, delta, replicate). Returns whole numbers
-    (against, event, type, vertices, delta, 4): each condition and the first along each axis, over
-    the replicates that count in both.
+    (bound, against, event, type, vertices, delta, 4) of `bounded_cells`: each condition and the
+    first along each axis, over the replicates that count in both.
     """
     # The two events (2, …): a collision is inside; it aggregates.
-    counts = np.stack([inside != NOT_APPLICABLE, outcome < DECIDED])
-    happens = counts & np.stack([inside == 1, np.isin(outcome, AGGREGATED)])
+    of_all = events(outcome, inside, np.full_like(outcome, NOT_APPLICABLE))
+    here = Events(
+        *(np.stack(each) for each in zip(of_all["pr_inside"], of_all["pr_a"], strict=True))
+    )
     tables = []
     for axis in range(1, 1 + len(AXES)):
-        first_counts = np.take(counts, [0], axis)
-        first = np.take(happens, [0], axis)
-        both = counts & first_counts
-        cells = (happens & first, happens & ~first, ~happens & first, ~happens & ~first)
-        tables.append(np.stack([np.sum(both & cell, axis=-1) for cell in cells], axis=-1))
-    return np.stack(tables)
+        there = Events(*(np.take(each, [0], axis) for each in here))
+        tables.append(bounded_cells(here, there, np.arange(outcome.shape[axis - 1]) == 0, axis))
+    return np.stack(tables, axis=1)
+
+
+def bounded_cells(
+    here: Events, there: Events, itself: np.ndarray | None = None, axis: int = 0
+) -> np.ndarray:
+    """Whole numbers (3, …, 4) of replicates, the last axis of the flags: in both, here only, there
+    only, in neither.
+
+    First over those that count both times; then with the unknown ones, none of which is a success
+    here, all of them there; then the other way round. ``itself``: flags along an ``axis``, where
+    here and there are one condition, and what is unknown is so in both.
+    """
+    same = np.zeros(1, dtype=bool) if itself is None else itself
+    same = same.reshape(tuple(len(same) if k == axis else 1 for k in range(here.trials.ndim)))
+    known = here.trials & there.trials
+    may = (here.trials | here.unknown) & (there.trials | there.unknown) & ~same
+    found = []
+    for counted, mine, yours in (
+        (known, here.successes, there.successes),
+        (known | may, here.successes & ~here.unknown, there.successes | there.unknown),
+        (known | may, here.successes | here.unknown, there.successes & ~there.unknown),
+    ):
+        cells = (mine & yours, mine & ~yours, ~mine & yours, ~mine & ~yours)
+        found.append(np.stack([np.sum(counted & cell, axis=-1) for cell in cells], axis=-1))
+    return np.stack(found)
 
 
 def paired_differences(joint: np.ndarray) -> dict[str, np.ndarray]:
-    """The arrays of DIFFERENCES from joint counts (…, 4); NaN where no replicate counts."""
+    """The arrays of DIFFERENCES from bounded_cells; NaN where no replicate counts."""
     joint = np.asarray(joint)
-    pairs = joint.sum(axis=-1)
-    difference, low, high = newcombe(*np.moveaxis(joint, -1, 0))
+    difference, low, high = bounded_newcombe(joint)
     return {
-        "n_pairs": pairs,
+        "n_pairs": joint[0].sum(axis=-1),
         "difference": difference,
         "difference_low": low,
         "difference_high": high,
     }
+
+
+def bounded_newcombe(joint: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(difference, low, high) of bounded_cells: whatever the unknown replicates would have come to
+    is in the interval."""
+    known, least, most = (newcombe(*np.moveaxis(each, -1, 0)) for each in joint)
+    return known[0], least[1], most[2]
 
 
 def newcombe(

@@ -11,21 +11,28 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.ensembles.estimates.events import (
+from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.errors import UsageError
+from flocsim.io.confidence import (
+    bounded_sums,
+    clustered_proportion,
+    proportion,
+    scrambled_proportion,
+    wilson,
+)
+from flocsim.io.results.events import (
     AGGREGATED,
     HELD,
-    HOOK,
     INSIDE_CLASSES,
     MISSED,
     OUTSIDE_CLASSES,
     UNDECIDED,
+    Events,
     events,
+    events_of,
 )
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
-from flocsim.errors import UsageError
-from flocsim.io.confidence import clustered_proportion, proportion, wilson
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
-from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES
+from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES, last_axis
 
 __all__ = ["probabilities", "tabulate", "wilson"]
 
@@ -55,8 +62,9 @@ def tabulate(
         np.broadcast_to(np.asarray(codes), first[0].shape)
         for codes in (checked_outcome, checked_inside, checked_bond)
     )
-    counts = count(*first) | count_changes(first, again)
-    return counts | probabilities(counts) | numerical_errors(counts)
+    sums = count(*first) | count_changes(first, again)
+    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
+    return counts | probabilities(counts) | numerical_errors(sums)
 
 
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
@@ -83,7 +91,10 @@ def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str
 
 
 def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Probabilities with Wilson 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
+    """Probabilities with 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
+
+    Wilson's, from the low end for none to the high end for all of those that are undecided or have
+    failed (`flocsim.io.confidence.proportion`).
 
     pr_inside = n_inside / n_collided: where the outlines first touched is known for every one.
     pr_a_given_inside = A/(A+B), pr_a_given_outside = C/(C+D), pr_a = (A+C)/(A+B+C+D) and
@@ -92,22 +103,9 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     n_bond/(A+C). NaN where the denominator is 0. pr_inside equals A + B of pr_class, the paper's
     identity, exactly when every collision was decided.
     """
-    a, b, c, d = np.moveaxis(np.asarray(counts["n_class"]), -1, 0)
-    decided = a + b + c + d
-    hooks = np.asarray(counts["n_bond"])[..., HOOK - 1]
-    estimates = {
-        "pr_inside": (counts["n_inside"], counts["n_collided"]),
-        "pr_a_given_inside": (a, a + b),
-        "pr_a_given_outside": (c, c + d),
-        "pr_a": (a + c, decided),
-        "pr_sticks": (a + c - hooks, decided),
-        "pr_hangs": (hooks, decided),
-        "pr_class": (counts["n_class"], decided[..., np.newaxis]),
-        "pr_bond": (counts["n_bond"], (a + c)[..., np.newaxis]),
-    }
     table: dict[str, np.ndarray] = {}
-    for name, (successes, trials) in estimates.items():
-        values = proportion(successes, trials)
+    for name, (trials, successes, unknown) in events_of(counts).items():
+        values = proportion(successes, trials, unknown=unknown)
         table |= zip((name, f"{name}_low", f"{name}_high"), values, strict=True)
     return table
 
@@ -138,18 +136,12 @@ def checked_codes(
 
 
 def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
-    """{estimate: whole numbers (6, type, vertices)}: Σ S, Σ M, Σ S², Σ S M, Σ M², Σ [M > 0].
-
-    S and M are a replicate's successes and trials over all displacements; sums are over
-    replicates. Codes are (type, vertices, delta, replicate).
-    """
+    """{estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is a
+    cluster. Codes are (type, vertices, delta, replicate)."""
     sums, counted = {}, events(outcome, inside, bond)
     for name in POOLED_PROBABILITIES:
-        trials, successes = counted[name]
-        m = np.sum(trials, axis=2, dtype=np.int64)
-        s = np.sum(successes, axis=2, dtype=np.int64)
-        terms = (s, m, s * s, s * m, m * m, m > 0)
-        sums[name] = np.stack([np.sum(term, axis=-1) for term in terms])
+        each = Events(*(flags.sum(axis=2, dtype=np.int64) for flags in counted[name]))
+        sums[name] = bounded_sums(each.successes, each.trials, each.unknown)
     return sums
 
 
@@ -157,7 +149,50 @@ def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     """The arrays of POOLED; NaN where there was no event."""
     table: dict[str, np.ndarray] = {}
     for name, each in sums.items():
-        share, low, high, effective = clustered_proportion(*each.astype(float))
+        share, low, high, effective = clustered_proportion(each)
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}
         table[f"n_effective_{name}"] = effective
+    return table
+
+
+OF_SCRAMBLES = " of scrambles"
+"""Behind the name of a probability: what is summed of it for every scramble."""
+
+
+def scrambled_sums(
+    codes: tuple[np.ndarray, np.ndarray, np.ndarray], first: int, scrambles: int
+) -> dict[str, np.ndarray]:
+    """{"pr_a of scrambles": whole numbers (3, type, …, scramble)} of trials, successes and unknown.
+
+    ``codes``: outcome, inside, bond of replicates from the ``first`` on, replicate k of scramble k
+    mod ``scrambles``; nothing for none.
+    """
+    if not scrambles:
+        return {}
+    found = {}
+    for name, each in events(*codes).items():
+        flags = np.stack(each)
+        parts = [flags[..., (s - first) % scrambles :: scrambles].sum(axis=-1, dtype=np.int64)
+                 for s in range(scrambles)]  # fmt: skip
+        sums = np.stack(parts, axis=-1)
+        found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if last_axis(name) else sums
+    return found
+
+
+def scrambled_probabilities(
+    sums: Mapping[str, np.ndarray], pooled: bool = False
+) -> dict[str, np.ndarray]:
+    """Ends of the intervals of replicates that are points of scrambles, from scrambled_sums, in
+    the place of those for independent ones; also n_effective where all displacements are
+    ``pooled``."""
+    table: dict[str, np.ndarray] = {}
+    for key, each in sums.items():
+        name = key.removesuffix(OF_SCRAMBLES)
+        if pooled and name not in POOLED_PROBABILITIES:
+            continue
+        trials, successes, unknown = each.sum(axis=3) if pooled else each
+        low, high, effective = scrambled_proportion(successes, trials, unknown)
+        table |= {f"{name}_low": low, f"{name}_high": high}
+        if pooled:
+            table[f"n_effective_{name}"] = effective
     return table

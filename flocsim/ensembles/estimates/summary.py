@@ -5,19 +5,32 @@ from collections.abc import Callable, Iterable
 import attrs
 import numpy as np
 
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.ensembles.estimates.numerical import (
+    change_columns,
+    change_intervals,
+    count_changes,
+    numerical_errors,
+    numerical_of,
+    over_displacements,
+)
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
     CODES,
     COUNTED,
+    OF_SCRAMBLES,
     checked_codes,
     count,
     pooled_probabilities,
     pooled_sums,
     probabilities,
+    scrambled_probabilities,
+    scrambled_sums,
 )
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.results.schema import POOLED
+from flocsim.io.results.schema import POOLED, POOLED_PROBABILITIES
+
+JOINT = "joint"
+"""Name of the joint_counts among Sums."""
 
 BLOCK_ROWS = 262_144
 """Rows, of all conditions together, that are looked at together."""
@@ -27,11 +40,13 @@ BLOCK_ROWS = 262_144
 class Reader:
     """All rows of a finished study, in the order of the results file.
 
-    ``shape``: how many types, vertices, delta, replicates.
+    ``shape``: how many types, vertices, delta, replicates, and of how many ``scrambles`` these are
+    points.
     """
 
     store: RowStore
     shape: tuple[int, ...]
+    scrambles: int = 0
     known: list[np.ndarray] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -61,8 +76,8 @@ Sums = dict[str, np.ndarray]
 """Whole numbers by name, that of some replicates and of others being added up."""
 
 
-def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
-    """The Sums of replicates [first, stop) of so many conditions."""
+def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int = 0) -> Sums:
+    """The Sums of replicates [first, stop) of so many conditions, points of ``scrambles``."""
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
@@ -73,7 +88,8 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int) -> Sums:
             **count(outcome, inside, bond),
             **count_changes((outcome, inside, bond), again),
             **pooled_sums(outcome, inside, bond),
-            "joint": joint_counts(outcome, inside),
+            JOINT: joint_counts(outcome, inside),
+            **scrambled_sums((outcome, inside, bond), start, scrambles),
         }
         sums = added(sums, found)
     return sums
@@ -84,14 +100,42 @@ def added(sums: Sums, more: Sums) -> Sums:
     return {name: sums[name] + more[name] for name in sums} if sums else more
 
 
-def tables_of(sums: Sums) -> tuple[dict, dict, dict]:
-    """(probabilities, pooled, differences) from the Sums of a whole study."""
-    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
-    pooled = {name: values for name, values in sums.items() if name.startswith("pr_")}
-    together = numerical_errors({name: values.sum(axis=2) for name, values in counts.items()})
-    return (
-        counts | probabilities(counts) | numerical_errors(counts),
+@attrs.frozen
+class AllTables:
+    """The arrays of the groups of a results file that follow from Sums."""
+
+    probabilities: dict[str, np.ndarray]
+    pooled: dict[str, np.ndarray]
+    differences: dict[str, np.ndarray]
+    numerics: dict[str, np.ndarray]
+
+
+POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
+
+
+def tables_of(sums: Sums) -> AllTables:
+    """AllTables from the Sums of a whole study."""
+    pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
+    of_scrambles = {name: values for name, values in sums.items() if name.endswith(OF_SCRAMBLES)}
+    counted = {name: values for name, values in sums.items()
+               if not (name in POOLED_NAMES or name == JOINT or name in of_scrambles)}  # fmt: skip
+    together = numerical_errors(over_displacements(counted))
+    changes = change_intervals(counted)
+    return AllTables(
+        table_from(counted, changes) | scrambled_probabilities(of_scrambles),
         pooled_probabilities(pooled)
+        | scrambled_probabilities(of_scrambles, pooled=True)
         | {name: values for name, values in together.items() if name in POOLED},
-        paired_differences(sums["joint"]),
+        paired_differences(sums[JOINT]),
+        change_columns(changes),
     )
+
+
+def table_from(
+    counted: Sums, changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None
+) -> dict[str, np.ndarray]:
+    """The table of probabilities from what is counted of conditions; ``changes``: its
+    change_intervals, where they are there."""
+    counts = {name: values for name, values in counted.items() if name.startswith("n_")}
+    changes = change_intervals(counted) if changes is None else changes
+    return counts | probabilities(counts) | numerical_of(changes)

@@ -1,9 +1,7 @@
-"""The points of a kernel study: a scrambled Sobol sequence in (θ_i, θ_j, flocs, offset), and what
-interval of offsets it covers.
+"""What the points of a kernel study are for: (θ_i, θ_j, flocs, offset), and what interval of
+offsets they cover.
 
-Replicate k is point k // S of scramble k mod S, S scrambles being dealt in turn: all of them grow
-evenly with the number of replicates, and no number of ranks changes a point. The offset comes
-first, as the first dimensions of Sobol's sequence are the most even ones.
+The offset comes first, as the first dimensions of Sobol's sequence are the most even ones.
 
 A settling pair touches exactly where the shadows of the two outlines overlap, as nothing turns them
 on the way: offsets are sampled evenly between, `settling_interval`. In a flow the bodies turn as
@@ -11,45 +9,13 @@ they come, and offsets are b = ± b_max √u: as often as the flow brings pairs 
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 
 from flocsim.geometry.shapes.shape import Shape
 
-DIMENSIONS = 5
-OFFSET, ANGLE_I, ANGLE_J, FLOC_I, FLOC_J = range(DIMENSIONS)
+OFFSET, ANGLE_I, ANGLE_J, FLOC_I, FLOC_J = range(5)
 """What the dimensions of the sequence are for."""
-
-STREAM = (0, 0, 2)
-"""Spawn key, with the scramble's number behind it, of the numbers that scramble the sequence."""
-
-FIRST_POINTS = 256
-
-
-@lru_cache(maxsize=128)
-def points(seed: int, scramble: int, size: int) -> np.ndarray:
-    """The first ``size`` points (size, 5) of a scramble, in [0, 1); ``size`` a power of 2."""
-    from scipy.stats import qmc
-
-    stream = np.random.SeedSequence(seed, spawn_key=(*STREAM, scramble))
-    generator = np.random.Generator(np.random.Philox(stream))
-    sequence = qmc.Sobol(DIMENSIONS, scramble=True, seed=generator)
-    found = np.asarray(sequence.random_base2(size.bit_length() - 1))
-    found.flags.writeable = False
-    return found
-
-
-def point(seed: int, scrambles: int, replicate: int) -> np.ndarray:
-    """The point (5,) of a replicate."""
-    place, scramble = divmod(replicate, scrambles)
-    size = max(FIRST_POINTS, 1 << place.bit_length())
-    return points(seed, scramble, size)[place]
-
-
-def points_of(seed: int, scrambles: int, first: int, stop: int) -> np.ndarray:
-    """The points (stop − first, 5) of replicates."""
-    return np.array([point(seed, scrambles, replicate) for replicate in range(first, stop)])
 
 
 def as_draws(numbers: np.ndarray) -> np.ndarray:

@@ -8,13 +8,12 @@ import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
+from flocsim.ensembles.collision.points import point, point_facts
 from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels.sampling import (
     as_draws,
     flow_offset,
-    point,
-    points_of,
     settling_interval,
 )
 from flocsim.ensembles.study import Study, flocs_of
@@ -23,9 +22,6 @@ from flocsim.integrators.base import Integrator
 LEAST_OFFSET = 1e-4
 """In a flow, over the largest: what is nearer takes as long as this to come along, and the share of
 pairs that is, its square, is none."""
-
-SAMPLE = 16
-"""Points that stand for the sequence."""
 
 
 @attrs.define(eq=False)
@@ -42,8 +38,7 @@ class KernelStudy(Study):
 
     def facts(self) -> dict[str, Any]:
         """What rows follow from besides the config: the points themselves."""
-        first = points_of(self.config.seed, self.scene.scrambles, 0, SAMPLE * self.scene.scrambles)
-        return {"scene.points": [float(each) for each in first.sum(axis=0)]}
+        return point_facts(self.config.seed, self.scene.scrambles)
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray

@@ -38,13 +38,14 @@ Digests = dict[int, list[bytes]]
 @attrs.frozen(eq=False)
 class Place:
     """Where the unfinished file lies, ``host``: as rank 0's machine sees it; ``shape``: types,
-    vertices, delta, replicates."""
+    vertices, delta, replicates, which are points of so many ``scrambles``."""
 
     file: str
     token: bytes
     plan: Plan
     shape: tuple[int, ...]
     host: str
+    scrambles: int = 0
 
     def opened(self):
         return shared_row_file(self.file, self.token, self.plan)
@@ -122,7 +123,9 @@ class Review(Order):
             wrong = wrong_blocks(file, self.digests)
             sums: Sums = {}
             if self.counted[0] < self.counted[1]:
-                sums = counted_in(file, self.place.shape, self.counted, self.codes)
+                sums = counted_in(
+                    file, self.place.shape, self.counted, self.codes, self.place.scrambles
+                )
         return Answer(sums=sums, wrong=tuple(wrong))
 
 
@@ -183,7 +186,9 @@ def runs(start: int, stop: int, replicates: int) -> Iterator[tuple[int, int, int
         start += end - first
 
 
-def counted_in(file: RowFile, shape: Sequence[int], counted: Interval, codes: Digests) -> Sums:
+def counted_in(
+    file: RowFile, shape: Sequence[int], counted: Interval, codes: Digests, scrambles: int
+) -> Sums:
     """Sums of replicates, as they stand in the file; FileError where a digest is not right."""
     replicates, conditions = shape[-1], int(np.prod(shape[:3]))
     whole: set[int] = set()
@@ -200,7 +205,7 @@ def counted_in(file: RowFile, shape: Sequence[int], counted: Interval, codes: Di
         )
         return tuple(column.reshape(*shape[:3], stop - first) for column in columns)
 
-    return sums_of(read, conditions, *counted)
+    return sums_of(read, conditions, *counted, scrambles)
 
 
 def blocks_of(counted: Interval, replicates: int, conditions: int) -> list[int]:
@@ -246,7 +251,9 @@ class Assembly:
 
     def __attrs_post_init__(self):
         file, host = self.file, platform.node()
-        self.place = Place(file.path, file.token, file.plan, self.reader.shape, host)
+        self.place = Place(
+            file.path, file.token, file.plan, self.reader.shape, host, self.reader.scrambles
+        )
 
     def ask(self, orders: dict[int, Order], own: Callable[[], Any]) -> dict[int, Answer]:
         """Send orders to ranks, do one's ``own`` part, and wait for the answers."""
@@ -350,12 +357,16 @@ class Assembly:
         return {block: [self.digests[block][column] for column in wanted] for block in blocks}
 
     def count_here(self, counted: Interval) -> Sums:
+        def count() -> Sums:
+            codes, reader = self.codes_of(counted), self.reader
+            return counted_in(self.file, reader.shape, counted, codes, reader.scrambles)
+
         try:
-            return counted_in(self.file, self.reader.shape, counted, self.codes_of(counted))
+            return count()
         except FileError:
             # Seen from here, others have not written what they say: all is written here.
             self.write_here((0, self.file.plan.blocks))
-            return counted_in(self.file, self.reader.shape, counted, self.codes_of(counted))
+            return count()
 
 
 def assemble(

@@ -26,6 +26,7 @@ from flocsim.io.results.row_file import plan_of
 from flocsim.io.results.schema import (
     DIFFERENCES,
     EVENTS,
+    NUMERICS,
     POOLED,
     TABLE,
     Results,
@@ -244,6 +245,7 @@ def file_size(study: Study, count: int) -> float:
         flocs=tuple(floc.name for floc in study.flocs),
         pooled=blank(POOLED, shape[:2]),
         differences=blank(DIFFERENCES, (3, len(EVENTS), *shape)),
+        numerics=blank(NUMERICS, shape),
         count=count,
     )
     plan = plan_of(frame_of(draft), math.prod(shape) * count)

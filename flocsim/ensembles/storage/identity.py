@@ -40,6 +40,7 @@ PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
     "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler", "bonds",
     "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
+    "io/results/events.py",
     "ensembles/collision", "ensembles/study.py", "ensembles/kernels",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit

@@ -7,14 +7,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.estimates.events import AGGREGATED, DECIDED, HELD, MISSED, events
-from flocsim.ensembles.estimates.paired import between, newcombe
+from flocsim.ensembles.estimates.numerical import share_that_flips
+from flocsim.ensembles.estimates.paired import between, bounded_cells, bounded_newcombe
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.studies.opened import StudyResults
 from flocsim.errors import UsageError
-from flocsim.io.confidence import numerical_error
 from flocsim.io.labelled import Column, Labelled, Tables, about_of
+from flocsim.io.results.events import Events, approaches, events, kinds_of
 from flocsim.io.results.schema import (
     AXES,
     COMPARED,
@@ -261,38 +261,34 @@ def picked(results, wanted):
     return {name: results.replicates[name][at] for name in names}
 
 
-def approaches(outcome):
-    """(which replicates were decided, which ended aggregated)."""
-    return np.isin(outcome, [*range(DECIDED), MISSED, HELD]), np.isin(outcome, AGGREGATED)
-
-
 def numerical_per_approach(rows):
     """What numerics add to Pr[aggregation | decided approach]: flips of what was run again."""
     again = rows["checked_outcome"]
     checked = again != NOT_APPLICABLE
-    (trial, success), (trial_again, success_again) = map(approaches, (rows["outcome"], again))
+    (trial, success, _), (trial_again, success_again, _) = map(approaches, (rows["outcome"], again))
     flipped = checked & ((trial != trial_again) | (success != success_again))
-    counted = checked & (trial | trial_again)
-    return numerical_error(*(np.sum(each, axis=-1) for each in (flipped, counted, trial)))
+    kinds = kinds_of(rows["outcome"], rows["bond"])
+    return share_that_flips(flipped, checked, kinds, trial.sum(axis=-1))
 
 
 def differences_of(first, second, pairs):
-    """The arrays of MEANINGS but ``numerical``, of (counts, successes) of two files.
+    """The arrays of MEANINGS but ``numerical``, of the Events of two files.
 
     Over the replicates that count in both, among the first ``pairs``; of independent samples where
-    that is None.
+    that is None. What is unknown may have come to anything.
     """
     if pairs is None:
-        (n, s), (m, t) = ([each.sum(axis=-1) for each in one] for one in (first, second))
-        difference, low, high = between(t, m, s, n)
+        (n, s, u), (m, t, v) = (Events(*(each.sum(axis=-1) for each in one))
+                                for one in (first, second))  # fmt: skip
+        difference = between(t, m, s, n)[0]
+        low, high = between(t, m + v, s + u, n + u)[1], between(t + v, m + v, s, n + u)[2]
     else:
-        counts = first[0][..., :pairs] & second[0][..., :pairs]
-        mine, yours = (one[1][..., :pairs] & counts for one in (first, second))
-        cells = (mine & yours, yours & ~mine, mine & ~yours, ~mine & ~yours)
-        both, here, there, neither = (np.sum(counts & cell, axis=-1) for cell in cells)
-        n = m = counts.sum(axis=-1)
+        ours = (Events(*(each[..., :pairs] for each in one)) for one in (second, first))
+        joint = bounded_cells(*ours)
+        difference, low, high = bounded_newcombe(joint)
+        both, here, there, _ = np.moveaxis(joint[0], -1, 0)
+        n = m = joint[0].sum(axis=-1)
         s, t = both + there, both + here
-        difference, low, high = newcombe(both, here, there, neither)
     with np.errstate(divide="ignore", invalid="ignore"):
         return {
             "first": s / n, "second": t / m, "difference": difference, "difference_low": low,

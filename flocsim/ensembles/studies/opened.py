@@ -43,9 +43,9 @@ class StudyResults(Tables):
     """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
 
     ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
-    ``probabilities``, ``pooled`` and ``differences`` {name: array} its tables, ``replicates`` the
-    same of every single collision, read when asked for; ``kernel`` the rates of a kernel study,
-    None in others; ``run`` where it came from.
+    ``probabilities``, ``pooled``, ``differences`` and ``numerics`` {name: array} its tables,
+    ``replicates`` the same of every single collision, read when asked for; ``kernel`` the rates of
+    a kernel study, None in others; ``run`` where it came from.
     """
 
     indices = INDICES
@@ -57,6 +57,7 @@ class StudyResults(Tables):
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
         self.differences, self.kernel = results.differences, results.kernel
+        self.numerics = results.numerics
         self.studies: dict[int, Study] = {}
 
     @functools.cached_property

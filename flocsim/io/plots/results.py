@@ -5,11 +5,20 @@ FIGURES at the end, under the name that `flocsim plot` gives it; the first line 
 the command's help.
 """
 
+import textwrap
 from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import clustered_proportion, numerical_error, proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
+from flocsim.io.plots.outcomes import (
+    causes_of,
+    draw_ends,
+    end_handles,
+    mark_causes,
+    shifted,
+    words_of,
+)
 from flocsim.io.plots.style import (
     BOND_COLOURS,
     CLASS_COLOURS,
@@ -23,13 +32,14 @@ from flocsim.io.plots.style import (
     new_figure,
     plain,
     set_probability_axis,
+    set_share_axis,
     set_vertex_axis,
     type_titles,
     vertex_positions,
 )
 from flocsim.io.results.efficiency import efficiency
-from flocsim.io.results.file import CLASSES, Results
-from flocsim.io.results.schema import BONDS
+from flocsim.io.results.events import ENDS_COUNTED, events, events_of
+from flocsim.io.results.file import Results
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
@@ -52,6 +62,12 @@ LABELS = {
     "classes": "probability of class",
     "bonds": "share of aggregations",
 }
+POINTS = 20.0
+"""Points of a slot in which lines are drawn beside each other, where an axis has no slots."""
+LETTERS_WIDE, MOST_LINES = 18, 6
+"""Of what a legend tells of displacements."""
+ROOM = 0.8
+"""Share of a panel's width that its axis takes, about."""
 FEW = 10
 """Trials below which a point is hollow: its probability says little."""
 
@@ -63,23 +79,15 @@ NO_EVENTS = {
     "classes": "no decided collision",
     "bonds": "no aggregation",
 }
-TRIALS = {
-    "pr_inside": ("n_collided", None),
-    "pr_a_given_inside": ("n_class", (0, 1)),
-    "pr_a_given_outside": ("n_class", (2, 3)),
-    "pr_a": ("n_class", (0, 1, 2, 3)),
-}
-"""Counts that a probability is of: their name, and the places of those that add up."""
-
 SIZE_COLOURS = "viridis"
 MOST_SIZES_NAMED = 6
 """Up to so many receiving sizes are all named beside their colours."""
 
 SHARES = {
-    "classes": ("n_class", "outcome", range(len(CLASSES)), CLASS_COLOURS),
-    "bonds": ("n_bond", "bond", range(1, 1 + len(BONDS)), BOND_COLOURS),
+    "classes": ("n_class", CLASS_COLOURS),
+    "bonds": ("n_bond", BOND_COLOURS),
 }
-"""What is drawn as shares of a whole: its counts, its column, the codes there, its colours."""
+"""What is drawn as shares of a whole: its counts, its colours."""
 
 
 def figure_4(results: Results) -> Figure:
@@ -100,10 +108,11 @@ def figure_6(results: Results) -> Figure:
 def probability_figure(results, name):
     """One panel per type, one line per delta, against N, with bars for both errors."""
     with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name])
+        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], 1.35)
+        marked = set()
         for number, axes in enumerate(panels):
-            draw_probability(axes, results, number, name)
-        add_delta_legend(last, results.delta)
+            marked |= draw_probability(axes, results, number, name)
+        add_delta_legend(last, results.delta, marked)
         return figure
 
 
@@ -134,19 +143,19 @@ def overview(results: Results) -> Figure:
     """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", *SHARES)
     with house_style():
-        count = len(results.types)
+        count, marked = len(results.types), set()
         figure = new_figure(2.1 * count + 2.2, 7.1)
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
-                draw_probability(axes, results, number, name)
+                marked |= draw_probability(axes, results, number, name)
             for axes, name in zip(grid[2:, number], SHARES, strict=True):
                 draw_shares(axes, results, number, name)
             grid[0, number].set_title(type_titles(results.types)[number])
             grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
             axes.set_ylabel(LABELS[name])
-        add_delta_legend(grid[0, -1], results.delta)
+        add_delta_legend(grid[0, -1], results.delta, marked)
         for axes, name in zip(grid[2:, -1], SHARES, strict=True):
             add_shares_legend(axes, name)
         return figure
@@ -156,20 +165,52 @@ def against_delta(results: Results) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
     with house_style():
         titles = type_titles(results.types)
-        figure, panels, last = panel_grid(titles, LABELS["pr_a"], x_label=DELTA_LABEL)
+        figure, panels, last = panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL)
         colours = graded_colours(len(results.vertices))
-        order = np.argsort(results.delta)
+        order, marked = np.argsort(results.delta), set()
+        places = results.delta[order]
+        causes = causes_of(results.probabilities, "pr_a")
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
             axes.set_xlim(-0.05, 1.05)
+            if places[-1] == 1.0:
+                axes.axvline(1.0, color="0.85", zorder=0)
+                axes.text(1.0, 1.02, "grazes", color="0.4", fontsize=6.5, ha="right")
             for index, colour in enumerate(colours[: len(results.vertices)]):
-                bands = [results.probabilities["pr_a" + end][number, index][order] for end in ENDS]
-                places = results.delta[order] + 0.12 * dodge(index, len(results.vertices))
+                bands = [band[number, index][order] for band in bands_of(results, "pr_a")]
+                shift = POINTS * dodge(index, len(results.vertices))
                 few = trials_of(results, "pr_a")[number, index][order] < FEW
-                draw_bars(axes, places, bands, index, colour, few)
+                draw_bars(axes, places, bands, index, colour, few, shift)
+                marked |= mark_causes(axes, places, causes[number, index][order], colour, shift)
             note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
-        add_line_legend(last, words, colours, "vertices $N$" + BARS + HOLLOW)
+        title = "vertices $N$" + BARS + HOLLOW + words_of(marked)
+        add_line_legend(last, words, colours, title)
+        return figure
+
+
+def outcomes(results: Results) -> Figure:
+    """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
+    with house_style():
+        figure, panels, last = panel_grid(type_titles(results.types), "share of replicates", 1.35)
+        count = results.delta.size
+        order = np.argsort(results.vertices)
+        places = vertex_positions(results.vertices)[order]
+        slot = 72.0 * PANEL_SIZE[0] * ROOM / len(places)
+        for number, axes in enumerate(panels):
+            set_vertex_axis(axes, results.vertices)
+            set_share_axis(axes)
+            for index, place in enumerate(np.argsort(results.delta)):
+                counts = {name: values[number, order, place]
+                          for name, values in results.probabilities.items()
+                          if name in ENDS_COUNTED}  # fmt: skip
+                shift = slot * 0.8 * ((index + 0.5) / count - 0.5)
+                draw_ends(axes, places, counts, 0.68 * slot / count, shift)
+        shares = ", ".join(f"{share:g}" for share in np.sort(results.delta))
+        told = "\n".join(textwrap.wrap(shares, LETTERS_WIDE)[:MOST_LINES])
+        graze = "\n1: grazes" if 1.0 in results.delta else ""
+        title = "each bar from left:\n" + r"$\delta\,/\,\delta_{\max}$ = " + f"\n{told}{graze}"
+        place_legend(last, end_handles(), title)
         return figure
 
 
@@ -192,7 +233,7 @@ def efficiencies(results: Results) -> Figure:
                 if found is None:
                     note_if_empty(axes, np.array([np.nan]), "delta does not\nreach from 0 to 1")
                     continue
-                bands = [*(each[number] for each in found), np.zeros(len(results.vertices))]
+                bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
         add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
         return figure
@@ -229,7 +270,7 @@ def against_size(results: Results) -> Figure:
             for index, receiver in enumerate(receivers):
                 rows = np.flatnonzero(known & (r_i.round(9) == receiver))
                 rows = rows[np.argsort(r_j[rows])]
-                bands = [results.pooled["pr_a" + end][rows, number] for end in ENDS]
+                bands = [band[rows, number] for band in bands_in(results.pooled, "pr_a")]
                 draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
         if known.any() and results.pooled:
             bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
@@ -273,21 +314,23 @@ def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$
 
 
 def draw_probability(axes, results, number, name):
-    bands = [results.probabilities[name + end][number] for end in ENDS]
+    """The lines of a type, for each delta; the causes of what has no value."""
+    causes, marked = causes_of(results.probabilities, name)[number], set()
+    bands = [band[number] for band in bands_of(results, name)]
     set_vertex_axis(axes, results.vertices)
     set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
     for index, colour in enumerate(graded_colours(count)[:count]):
         line = [band[:, index] for band in bands]
-        draw_line(axes, results.vertices, line, index, count, colour, few[:, index])
+        marked |= draw_line(axes, results.vertices, line, index, count, colour, few[:, index],
+                            causes[:, index])  # fmt: skip
     note_if_empty(axes, bands[0], NO_EVENTS[name])
+    return marked
 
 
 def trials_of(results, name):
     """How many replicates a probability is of (type, vertices, delta)."""
-    counted, places = TRIALS[name]
-    counts = results.probabilities[counted]
-    return counts if places is None else counts[..., list(places)].sum(axis=-1)
+    return events_of(results.probabilities)[name].trials
 
 
 def draw_shares(axes, results, number, name):
@@ -303,68 +346,97 @@ def draw_shares(axes, results, number, name):
 
 
 def share_bands(results, number, name):
-    """(share, low, high, numerical error) (vertices, class or bond) of one type."""
+    """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
+    type."""
     errors = share_errors(results.probabilities, name)[number]
-    return (*shares_of(results, number, name), errors)
+    return (*shares_of(results, number, name), -errors, errors)
+
+
+def bands_in(table, name):
+    """[value, low, high, least and most change by numerics] of a probability in a table."""
+    value, low, high, numerical = (table[name + end] for end in ENDS)
+    return [value, low, high, -numerical, numerical]
+
+
+def bands_of(results, name):
+    """The same of the conditions of results, which may know the sign of what numerics change."""
+    bands = bands_in(results.probabilities, name)
+    signed = [results.numerics[f"{name}_change{end}"] for end in ENDS[1:3] if results.numerics]
+    return [*bands[:3], *signed] if signed else bands
 
 
 def share_errors(table, name):
-    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta."""
-    counted = SHARES[name][0]
-    share = f"pr_{counted.removeprefix('n_')}"
-    gained, lost, checked = (
-        np.moveaxis(table[f"n_{kind}_{share}"].sum(axis=2), -1, 0)
-        for kind in ("gained", "lost", "checked")
-    )
-    trials = table[counted].sum(axis=(2, 3))
-    parts = [
-        numerical_error(g + v, c, trials) for g, v, c in zip(gained, lost, checked, strict=True)
-    ]
-    return np.stack(parts, axis=-1)
+    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta: the mean of
+    those at each, by their trials."""
+    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+    trials = events_of(table)[share].trials
+    errors = np.where(trials > 0, table[f"{share}_numerical"], 0.0)
+    with np.errstate(invalid="ignore"):
+        return (trials * errors).sum(axis=2) / trials.sum(axis=2)
 
 
 def shares_of(results, number, name):
     """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
-    counted, column, codes, _ = SHARES[name]
+    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
     if results.replicates is None:
-        counts = results.probabilities[counted][number].sum(axis=1)
-        return proportion(counts, counts.sum(axis=1, keepdims=True))
-    found = results.replicates[column][number]
-    m = np.isin(found, codes).sum(axis=1, dtype=float)[:, None]
-    s = np.stack([(found == code).sum(axis=1) for code in codes], axis=1)
-    terms = np.broadcast_arrays(s, m, s * s, s * m, m * m, m > 0.0)
-    return clustered_proportion(*(term.sum(axis=-1, dtype=float) for term in terms))[:3]
+        counts = {
+            name: values[number].sum(axis=1)
+            for name, values in results.probabilities.items()
+            if name.startswith("n_")
+        }
+        trials, successes, unknown = events_of(counts)[share]
+        return proportion(successes, trials, unknown=unknown)
+    codes = (results.replicates[column][number] for column in ("outcome", "inside", "bond"))
+    # A replicate is a cluster: (class or bond, vertices, delta, replicate) → over delta.
+    trials, successes, unknown = (
+        np.sum(each, axis=2, dtype=np.int64) for each in events(*codes)[share]
+    )
+    found = clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
+    return tuple(np.moveaxis(each, 0, -1) for each in found)
 
 
-def draw_line(axes, vertices, bands, index, count, colour, few=None):
-    """Line ``index`` of ``count``: points with bars, joined in the order of N.
+def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None):
+    """Line ``index`` of ``count``: points with bars, joined in the order of N; the causes marked.
 
     Inner bars are intervals, outer ones, thin, these and the numerical error on either side;
-    points are hollow where there are ``few`` trials.
+    points are hollow where there are ``few`` trials, ``causes`` say why there are none.
     """
     order = np.argsort(vertices)
     places = vertex_positions(vertices)[order] + dodge(index, count)
     few = None if few is None else few[order]
     draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
+    return set() if causes is None else mark_causes(axes, places, causes[order], colour)
 
 
-def draw_bars(axes, places, bands, index, colour, few=None):
-    """A line of points with bars at these places: value, low, high, numerical error."""
-    value, low, high, numerical = bands
+def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
+    """A line of points with bars at these places: value, low, high, and by how much numerics may
+    lower and raise it.
+
+    ``shift``: to the right, in points, whatever the axis. Where there is an interval, but no value,
+    it is dotted.
+    """
+    value, low, high, lowers, raises = bands
     reach = np.clip([value - low, high - value], 0.0, None)
     size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
+    where = shifted(axes, shift)
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
                   marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
-                  elinewidth=0.6 * width)  # fmt: skip
+                  elinewidth=0.6 * width, transform=where)  # fmt: skip
     if few is not None and few.any():
         axes.plot(places[few], value[few], linestyle="", marker=MARKERS[index % len(MARKERS)],
-                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3)  # fmt: skip
-    if np.any(numerical > 0.0):
-        beyond = np.nan_to_num(numerical)
-        outer = [value - np.maximum(low - beyond, 0.0), np.minimum(high + beyond, 1.0) - value]
+                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3,
+                  transform=where)  # fmt: skip
+    alone = ~np.isfinite(value) & np.isfinite(high)
+    if alone.any():
+        axes.vlines(places[alone], low[alone], high[alone], color=colour, linestyle=":",
+                    linewidth=0.6 * width, transform=where)  # fmt: skip
+    if np.any((lowers < 0.0) | (raises > 0.0)):
+        down, up = np.minimum(np.nan_to_num(lowers), 0.0), np.maximum(np.nan_to_num(raises), 0.0)
+        outer = [value - np.maximum(low + down, 0.0), np.minimum(high + up, 1.0) - value]
         thin = 0.2 * width
         axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
-                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin)  # fmt: skip
+                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin,
+                      transform=where)  # fmt: skip
 
 
 def note_if_empty(axes, values, text):
@@ -373,16 +445,23 @@ def note_if_empty(axes, values, text):
         axes.text(0.5, 0.5, text, color="0.4", **place)
 
 
-def add_delta_legend(axes, delta):
+def add_delta_legend(axes, delta, marked=frozenset()):
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=f"{share:g}")
+        Line2D(
+            [],
+            [],
+            color=colour,
+            marker=MARKERS[index % len(MARKERS)],
+            label=f"{share:g}" + (" (grazes)" if share == 1.0 else ""),
+        )
         for index, (share, colour) in enumerate(
             zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
         )
     ]
-    place_legend(axes, handles, r"$\delta\,/\,\delta_{\max}$" + BARS + HOLLOW)
+    title = r"$\delta\,/\,\delta_{\max}$" + BARS + HOLLOW + words_of(marked)
+    place_legend(axes, handles, title)
 
 
 def add_shares_legend(axes, name):
@@ -416,6 +495,7 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "bonds": bonds,
     "delta": against_delta,
     "efficiency": efficiencies,
+    "outcomes": outcomes,
     "overview": overview,
     "size": against_size,
 }

@@ -177,6 +177,12 @@ def set_vertex_axis(axes, vertices):
     axes.tick_params(axis="x", length=2.5)
 
 
+def set_share_axis(axes):
+    """An axis of shares that add up to 1."""
+    set_probability_axis(axes)
+    axes.set_ylim(0.0, 1.0)
+
+
 def set_probability_axis(axes):
     axes.set_ylim(-0.03, 1.03)
     axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", ".25", ".5", ".75", "1"])

@@ -5,24 +5,36 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.io.plots.outcomes import (
+    causes_of,
+    draw_ends,
+    end_handles,
+    mark_causes,
+    words_of,
+)
 from flocsim.io.plots.results import (
     BARS,
+    ENDS,
     LABELS,
+    PANEL_SIZE,
+    ROOM,
     add_line_legend,
+    bands_in,
     draw_bars,
     note_if_empty,
-    panel_grid,
+    place_legend,
 )
 from flocsim.io.plots.style import (
     Figure,
-    dodge,
     graded_colours,
     house_style,
     new_figure,
     plain,
     set_probability_axis,
+    set_share_axis,
     type_titles,
 )
+from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.swarm_file import mean
 from flocsim.io.results.sweep_file import SweepResults
 
@@ -32,66 +44,116 @@ PREFIXED = ("m", "s", "J", "N", "V")
 STEEP = 20.0
 """Ratio of the largest value to the least from which on the axis is logarithmic."""
 
+LEAST_APART = 18.0
+"""Points between two values of an axis from which on both are written."""
+
+WIDEST = 7.0
+"""Points from one line to the next."""
+
+MARGIN = 0.5
+"""Of the axis on either side, over the distance of two values if they were evenly spaced."""
+
 
 def against_key(results: SweepResults) -> Figure:
-    """Pr[A] against the first swept key: a panel per type, a line per N, delta and further keys."""
-    from matplotlib.ticker import EngFormatter, NullFormatter, StrMethodFormatter
+    """What becomes of replicates, and Pr[A], against the first swept key.
 
+    Two panels per type, the bars stacked to 1; a bar and a line per N, delta and further keys.
+    """
     first = next(iter(results.swept.values()))
     table = results.labelled("probabilities")
-    axes_names = table.columns["pr_a"].axes
-    place = axes_names.index("type")
-    ends = ("", "_low", "_high", "_numerical")
-    # (type, the others one after the other, the first key): what every line is drawn of.
-    bands = [np.moveaxis(table.columns["pr_a" + end].values, (place, 0), (0, -1)) for end in ends]
-    lines = [band.reshape(band.shape[0], -1, band.shape[-1]) for band in bands]
-    others = [name for name in axes_names[1:] if name != "type"]
+    names = table.columns["pr_a"].axes
+    others = [name for name in names[1:] if name != "type"]
     words = line_words([(name, table.axes[name].values.tolist()) for name in others])
     types = table.axes["type"].values.tolist()
-    numbers = None if first.words else np.array(first.values, dtype=float)
-    where = np.arange(len(first.values), dtype=float) if numbers is None else numbers
+    where = np.arange(len(first.values)) if first.words else np.array(first.values)
     order = np.argsort(where)
-    is_log = numbers is not None and numbers.min() > 0.0 and numbers.max() > STEEP * numbers.min()
+    columns = {
+        name: lines_of(table.columns[name].values, names.index("type"))[:, :, order]
+        for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in ENDS)]
+    }
     with house_style():
-        unit = f" [{first.unit}]" if first.unit not in ("1", *PREFIXED) else ""
-        x_label = plain(first.key) + unit
-        figure, panels, last = panel_grid(type_titles(types), LABELS["pr_a"], 2.0, x_label)
-        colours = graded_colours(len(words))
-        for number, axes in enumerate(panels):
-            set_probability_axis(axes)
+        count = len(types)
+        figure = new_figure(2.35 * count + 2.0, 4.4)
+        grid = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
+        step = set_key_axis(grid[0, 0], first, where[order].astype(float))
+        step = min(WIDEST, step / len(words))
+        colours, marked = graded_colours(len(words)), set()
+        causes = causes_of(columns, "pr_a")
+        for number, title in enumerate(type_titles(types)):
+            above, below = grid[:, number]
+            above.set_title(title)
+            set_share_axis(above)
+            set_probability_axis(below)
+            below.set_xlabel(key_label(first))
             for index in range(len(words)):
-                line = [each[number, index][order] for each in lines]
-                aside = dodge(index, len(words))
-                if numbers is None:
-                    places = where[order] + 0.3 * aside
-                elif is_log:
-                    places = where[order] * (where.max() / where.min()) ** (0.1 * aside)
-                else:
-                    places = where[order] + 0.1 * aside * np.ptp(where)
-                draw_bars(axes, places, line, index, colours[index])
-            note_if_empty(axes, bands[0][number], "no decided collision")
-            if numbers is None:
-                axes.set_xticks(where, labels=[plain(each) for each in first.values])
-                continue
-            if is_log:
-                axes.set_xscale("log")
-                axes.xaxis.set_minor_formatter(NullFormatter())
-            else:
-                axes.locator_params(axis="x", nbins=5)
-            style = (
-                EngFormatter(first.unit) if first.unit in PREFIXED else StrMethodFormatter("{x:g}")
-            )
-            axes.xaxis.set_major_formatter(style)
-        title = ", ".join(plain(name) for name in others) + BARS
-        add_line_legend(last, words, colours, title)
+                shift = step * (index - 0.5 * (len(words) - 1))
+                mine = {name: values[number, index] for name, values in columns.items()}
+                draw_ends(above, where[order], mine, 0.85 * step, shift)
+                line = bands_in(mine, "pr_a")
+                draw_bars(below, where[order], line, index, colours[index], shift=shift)
+                marked |= mark_causes(
+                    below, where[order], causes[number, index], colours[index], shift
+                )
+            note_if_empty(below, columns["pr_a"][number], "no decided collision")
+        grid[0, 0].set_ylabel("share of replicates")
+        grid[1, 0].set_ylabel(LABELS["pr_a"])
+        place_legend(grid[0, -1], end_handles(), "bars from left:\nas lines below")
+        title = ", ".join(plain(name) for name in others) + BARS + words_of(marked)
+        add_line_legend(grid[1, -1], words, colours, title)
         return figure
+
+
+EVENT_COUNTS = ("n_collided", "n_inside", "n_bond")
+
+
+def lines_of(values, place):
+    """(type, the others one after the other, the first key, any last axis) of values (first key, …,
+    type, …, N, delta, …), the type at a ``place``."""
+    axes = 1 + place + 2
+    moved = np.moveaxis(values, (place, 0), (0, axes - 1))
+    return moved.reshape(moved.shape[0], -1, *moved.shape[axes - 1 :])
+
+
+def key_label(swept):
+    unit = f" [{swept.unit}]" if swept.unit not in ("1", *PREFIXED) else ""
+    return plain(swept.key) + unit
+
+
+def set_key_axis(axes, swept, places):
+    """An axis with a mark at every value (k,), in ascending order, and room beside the outermost;
+    the distance of the two nearest in points."""
+    from matplotlib.ticker import EngFormatter, FixedLocator, NullLocator, StrMethodFormatter
+
+    steep = not swept.words and places[0] > 0.0 and places[-1] > STEEP * places[0]
+    if steep:
+        axes.set_xscale("log")
+    at = np.log(places) if steep else places
+    margin = MARGIN * (np.ptp(at) / max(len(at) - 1, 1) or 0.1 * abs(at[0]) or 1.0)
+    ends = at[0] - margin, at[-1] + margin
+    axes.set_xlim(*(np.exp(ends) if steep else ends))
+    points = (at - ends[0]) / (ends[1] - ends[0]) * 72.0 * PANEL_SIZE[0] * ROOM
+    axes.xaxis.set_major_locator(FixedLocator(places))
+    axes.xaxis.set_minor_locator(NullLocator())
+    if swept.words:
+        labels = [plain(swept.values[int(place)]) for place in places]
+    else:
+        prefixed = EngFormatter(swept.unit)
+        form = prefixed if swept.unit in PREFIXED else StrMethodFormatter("{x:g}")
+        labels = [form(place) for place in places]
+        last = -np.inf
+        for k, point in enumerate(points):
+            labels[k], last = (labels[k], point) if point - last >= LEAST_APART else ("", last)
+    axes.set_xticks(places, labels=labels)
+    return float(np.diff(points).min(initial=72.0)) * 0.9
 
 
 def line_words(axes):
     """The values of all axes but the first key and the type, one text a line."""
     found = [""]
-    for _, values in axes:
+    for name, values in axes:
         told = [f"{value:g}" if isinstance(value, float) else plain(value) for value in values]
+        if name == "delta":
+            told = [f"{word} (grazes)" if word == "1" else word for word in told]
         found = [f"{before}, {each}" if before else each for before in found for each in told]
     return found
 

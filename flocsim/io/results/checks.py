@@ -27,7 +27,7 @@ from flocsim.io.results.schema import (
     Results,
 )
 
-OPTIONAL = ("pooled", "differences", "flocs", "kernel")
+OPTIONAL = ("pooled", "differences", "numerics", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
@@ -62,7 +62,8 @@ def check_coordinates(file: Any) -> None:
     for name in RADII if "pooled" in file else ():
         if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
             raise ValueError(f"pooled/{name} is not probabilities/{name}")
-    lists = {f"probabilities/{axis}": words for axis, words in LAST_AXES.items()}
+    lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics")
+             for axis, words in LAST_AXES.items()}  # fmt: skip
     for path, words in (lists | {"differences/event": EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
             raise ValueError(f"{path} holds other words than {', '.join(words)}")
@@ -101,6 +102,8 @@ def check_tables(results: Results) -> None:
     for name, values in results.differences.items():
         least, most = (0, np.inf) if name.startswith("n_") else (-1.0, 1.0)
         refuse(beyond(values, least, most), f"values outside [-1, 1] in differences/{name}")
+    for name, values in results.numerics.items():
+        refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in numerics/{name}")
     refuse(len(results.failures) > 256, "too many reasons")
 
 

@@ -19,10 +19,14 @@ from flocsim.io.confidence import proportion
 
 
 def aggregated(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(P, low, high) of every condition (type, vertices, delta), with Wilson's 95 % bounds."""
-    classes = table["n_class"]
-    ended = table["n_total"] - table["n_undecided"] - table["n_failed"]
-    return proportion(classes[..., 0] + classes[..., 2], ended)
+    """(P, low, high) of every condition (type, vertices, delta): 95 % bounds.
+
+    Undecided and failed approaches may have come to anything.
+    """
+    classes, unknown = table["n_class"], table["n_undecided"] + table["n_failed"]
+    return proportion(
+        classes[..., 0] + classes[..., 2], table["n_total"] - unknown, unknown=unknown
+    )
 
 
 def weights(delta: np.ndarray, axial: bool) -> np.ndarray | None:
@@ -43,7 +47,7 @@ def efficiency(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """(E, low, high) (type, vertices); None unless the offsets reach from 0 to 1.
 
-    The bounds are the same sums of Wilson's 95 % bounds at each offset: as wide as they come where
+    The bounds are the same sums of the 95 % bounds at each offset: as wide as they come where
     all offsets err together, since they have the flocs and orientations in common.
     """
     share = weights(delta, axial)

@@ -9,6 +9,7 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``kernel``         (mechanism, vertices, i, j): rates of a kernel study (`kernel_group`)
 - ``replicates``     (type, vertices, delta, replicate): what became of every single collision
 - ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
+- ``numerics``       (type, vertices, delta): by how much numerics change each probability
 - ``run``            scalars: config text, versions, machine, wall times
 
 All that may differ between two runs of one config is in ``run``, so `same_data` can compare the
@@ -45,6 +46,7 @@ from flocsim.io.results.schema import (
     DIFFERENCES,
     GROUPS,
     NOT_APPLICABLE,
+    NUMERICS,
     OUTCOMES,
     POOLED,
     RADII,
@@ -124,6 +126,7 @@ def results_in(file, replicates):
         flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
         pooled=read_group(file, "pooled", POOLED),
         differences=read_group(file, "differences", DIFFERENCES),
+        numerics=read_group(file, "numerics", NUMERICS),
         count=len(rows["replicate"]),
         radii={name: table[name] for name in RADII},
         kernel=read_kernel(file),

@@ -44,8 +44,12 @@ REFERENCES = {
 """{mechanism: {model: (factor on the efficiency over the rectilinear kernel, words)}}."""
 
 MODELS = ("spheres", "flocmod")
-QUANTITIES = ("efficiency", *ESTIMATES)
-"""What a matrix can hold: an efficiency is that of a model's kernel in three dimensions."""
+OF_MODELS = {f"efficiency{end}": f"efficiency3{end}" for end in ("", "_low", "_high")}
+"""What multiplies a model's kernel in three dimensions: what of KERNEL it follows from."""
+QUANTITIES = (
+    *OF_MODELS, *(name + end for name in ESTIMATES for end in ("", "_low", "_high")), "undecided",
+)  # fmt: skip
+"""What a matrix can hold: also ends of 95 % intervals, and the share that is undecided."""
 
 
 def number(value: float) -> str:
@@ -70,9 +74,11 @@ def kernel_csv(kernel: Kernel) -> str:
     return text.getvalue()
 
 
-def efficiency_for(kernel: Kernel, mechanism: str, vertices: int, model: str) -> np.ndarray:
-    """What a model's kernel of a mechanism is to be multiplied by (i, j); UsageError for a model
-    that has none. 0 for bodies of one size that do not meet."""
+def efficiency_for(
+    kernel: Kernel, mechanism: str, vertices: int, model: str, quantity: str = "efficiency"
+) -> np.ndarray:
+    """What a model's kernel of a mechanism is to be multiplied by (i, j), or an end of its
+    interval; UsageError for a model that has none. 0 for bodies of one size that do not meet."""
     known = REFERENCES.get(mechanism, {})
     if model not in known:
         raise UsageError(
@@ -80,7 +86,7 @@ def efficiency_for(kernel: Kernel, mechanism: str, vertices: int, model: str) ->
             "mechanism"
         )
     m, v = kernel.place_of(mechanism, vertices)
-    values = kernel.arrays["efficiency3"][m, v] * known[model][0]
+    values = kernel.arrays[OF_MODELS[quantity]][m, v] * known[model][0]
     return np.where(kernel.arrays["beta3_reference"][m, v] == 0.0, 0.0, values)
 
 
@@ -93,30 +99,37 @@ def kernel_matrix(
     efficiencies are multiplied by, element by element."""
     m, v = kernel.place_of(mechanism, vertices)
     bound = ["without hydrodynamic interaction: an upper bound"]
-    if curvilinear is not None and quantity != "efficiency":
+    if curvilinear is not None and quantity not in OF_MODELS:
         raise UsageError(
             f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: take "
             "efficiency, or leave it out"
         )
-    if quantity == "efficiency":
-        values = efficiency_for(kernel, mechanism, vertices, model)
-        held = "efficiency"
+    if quantity in OF_MODELS:
+        values = efficiency_for(kernel, mechanism, vertices, model, quantity)
+        held = quantity.replace("_low", ", lower 95 % bound,").replace(
+            "_high", ", upper 95 % bound,"
+        )
         if curvilinear is not None:
             rows = kernel.radii[:, np.newaxis]
             values = values * curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
-            held = "efficiency times curvilinear factor"
+            held += " times curvilinear factor"
             bound = about_factor(curvilinear, mechanism)
         what = [
             f"{held} in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
             "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
         ]
-    elif quantity in ESTIMATES:
+    elif quantity in QUANTITIES:
         values = kernel.arrays[quantity][m, v]
         what = [f"{quantity} [{KERNEL[quantity][1]}] in {mechanism}: {KERNEL[quantity][2]}"]
     else:
         raise UsageError(f"a matrix holds one of {', '.join(QUANTITIES)}, found {quantity}")
     if np.isnan(values).any():
         what.append("where there is nothing it is not known, as where points are undecided")
+    if unknown := np.nanmax(kernel.arrays["undecided"][m, v], initial=0.0):
+        what.append(
+            f"up to {100.0 * unknown:.2g} % of a pair's encounters are undecided or failed: ends "
+            "of intervals (_low, _high) hold whatever they could have come to"
+        )
     lines = [
         *what,
         f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",

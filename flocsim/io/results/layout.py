@@ -85,7 +85,7 @@ def frame_of(results: Results) -> Frame:
     frame = Frame()
     with h5py.File(frame.image, "w") as file:
         file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-        for name in ("probabilities", "pooled", "differences"):
+        for name in ("probabilities", "pooled", "differences", "numerics"):
             if getattr(results, name):
                 write_labelled(file.create_group(name), results.labelled(name))
         if results.kernel is not None:

@@ -18,6 +18,8 @@ OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
 """Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone;
 missed, held: the outlines never touched, and the bodies have parted, or rest so."""
 FAILED = OUTCOMES.index("failed")
+UNKNOWN = ("undecided", "failed")
+"""Outcomes of replicates that have come to none."""
 CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
@@ -89,7 +91,7 @@ BOUNDS = {
     "": "",
     "_low": ", lower 95 % bound",
     "_high": ", upper 95 % bound",
-    "_numerical": ", numerical error: 95 % bound of the share that flips",
+    "_numerical": ", numerical error: 95 % bound of its change, run exactly",
 }
 TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
     name + suffix: ("f8", "1", text + bound)
@@ -112,6 +114,14 @@ POOLED = {
     f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
     for name in POOLED_PROBABILITIES
 }
+NUMERICS = {
+    f"{name}_change{end}": (
+        "f8", "1", f"by how much {text} would change, run exactly: {word} 95 % bound"
+    )
+    for name, text in PROBABILITIES.items()
+    for end, word in (("_low", "lower"), ("_high", "upper"))
+}  # fmt: skip
+"""The numerical error as a signed change of every probability of `PROBABILITIES`."""
 PER_APPROACH = "pr_a_per_approach"
 """Of all approaches that were decided, misses among them: what efficiencies are sums of."""
 
@@ -186,6 +196,10 @@ GROUPS = {
         {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
          for name, (kind, unit, text) in TABLE.items()}, COORDINATES, SIZES,
     ),
+    "numerics": Group.of(
+        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
+         for name, (kind, unit, text) in NUMERICS.items()}, COORDINATES,
+    ),
     "pooled": Group.of(declared(POOLED, AXES[:2]), COORDINATES, SIZES),
     "differences": Group.of(declared(DIFFERENCES, ("against", "event", *AXES)), COORDINATES),
     "replicates": Group.of(declared(REPLICATES, (*AXES, "replicate"), FLAGS), COORDINATES),
@@ -224,7 +238,8 @@ class Results:
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
-    event, type, vertices, delta), or nothing; ``radii`` {r_i, r_j: (type,)} [m] those of `RADII`,
+    event, type, vertices, delta), ``numerics`` those of `NUMERICS`, or nothing; ``radii``
+    {r_i, r_j: (type,)} [m] those of `RADII`,
     NaN where they are not known; ``kernel`` the rates of a kernel study, None in others.
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
     """
@@ -239,6 +254,7 @@ class Results:
     flocs: tuple[str, ...] = attrs.field(default=(), converter=as_names)
     pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
     differences: dict[str, np.ndarray] = attrs.field(factory=dict)
+    numerics: dict[str, np.ndarray] = attrs.field(factory=dict)
     count: int = 0
     radii: dict[str, np.ndarray] = attrs.field(
         default=attrs.Factory(
@@ -258,6 +274,9 @@ class Results:
         if self.differences:
             wanted = (len(AXES), len(EVENTS), *shape)
             self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
+        if self.numerics:
+            shapes = {name: (*shape, *tail_of(name)) for name in NUMERICS}
+            self.check("numerics", NUMERICS, shapes)
         if self.replicates is not None:
             count = np.shape(self.replicates.get("outcome", ()))[3:4]
             self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, shape + count))

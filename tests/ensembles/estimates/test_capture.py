@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from flocsim.ensembles.collision.points import points_of
+from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
-    MOST_UNKNOWN,
     estimate,
     flow_width,
     kernel_of,
@@ -15,11 +16,10 @@ from flocsim.ensembles.estimates.capture import (
     weighted,
     widened,
 )
-from flocsim.ensembles.kernels.sampling import points_of
 from flocsim.ensembles.kernels.study import study_of
-from flocsim.ensembles.report import has_withheld, kernel_lines, undecided_line
+from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
 from flocsim.ensembles.runner import run
-from flocsim.io.results.kernel_group import ESTIMATES
+from flocsim.io.results.kernel_group import ESTIMATES, WHAT
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.kernel_study import kernel_config
 
@@ -37,6 +37,7 @@ def made_up(study, place, catches, flips=()):
     caught = catches(shares)
     rows["outcome"] = np.where(caught, 0, OUTCOMES.index("missed"))
     rows["inside"] = np.where(caught, 1, NOT_APPLICABLE)
+    rows["bond"] = np.where(caught, 1, NOT_APPLICABLE)
     rows["checked_outcome"] = np.full(count, NOT_APPLICABLE)
     rows["checked_inside"] = np.full(count, NOT_APPLICABLE)
     checked = np.arange(0, count, 8)
@@ -89,7 +90,7 @@ def test_flips_are_counted_and_bound_the_change(tmp_path):
     caught = np.flatnonzero((rows["outcome"] == 0) & (rows["checked_outcome"] == 0))[:2]
     points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9, flips=caught)
     found = estimate(points, rows, "settling", None, 4)
-    assert found.flipped == {"c": 2, "inside": 2, "a": 2}
+    assert {name: each.sum() for name, each in found.flipped.items()} == dict.fromkeys(WHAT, 2)
     assert found.values["flips_a"] == pytest.approx(2 / 64)
     assert found.largest["width_a"] == pytest.approx(points.width.max())
 
@@ -126,7 +127,7 @@ def test_the_unknown_cannot_leave_the_interval(tmp_path, meeting, rate, share, w
             assert np.isnan(value) or low <= value * (1 + 1e-12) <= high * (1 + 2e-12), name
         assert np.isnan(found["alpha_high"]) or 0.0 <= found["alpha_low"] <= 1.0
         assert np.isnan(found["alpha_high"]) or found["alpha_high"] <= 1.0
-        assert np.isnan(found["beta2"]) == (found["undecided"] > MOST_UNKNOWN)
+        assert np.isnan(found["beta2"]) == (found["undecided"] > StopConfig().undecided)
 
 
 def test_what_is_undecided_flips_nothing(tmp_path):
@@ -137,7 +138,7 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     )
     rows["checked_inside"][:] = NOT_APPLICABLE
     found = estimate(points, rows, "settling", None, 4)
-    assert not any(found.flipped.values()) and not any(found.checked.values())
+    assert not any(each.any() for each in (*found.flipped.values(), *found.checked.values()))
     assert np.isnan(found.values["flips_a"]) and found.values["checked"] == 64
 
 
@@ -147,15 +148,15 @@ def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
              "sizes": '["5 um", "8 um"]'}  # fmt: skip
     whole, cut = (
         run(kernel_config(tmp_path, **about, more=f"[integrator]\nmax_steps = {steps}"))
-        for steps in (100_000, 90)
+        for steps in (100_000, 15)
     )
     there, here = whole.kernel.arrays, cut.kernel.arrays
-    assert there["undecided"].max() == 0.0 and here["undecided"].min() > MOST_UNKNOWN
+    assert there["undecided"].max() == 0.0 and here["undecided"].min() > StopConfig().undecided
     for name in ESTIMATES:
         assert np.all(here[f"{name}_low"] <= there[name]), name
         assert np.all(there[name] <= here[f"{name}_high"]), name
     assert np.isnan(here["beta2"]).all() and here["alpha_high"].max() <= 1.0
-    assert has_withheld(cut) and not has_withheld(whole)
+    assert too_many_undecided(cut) and not too_many_undecided(whole)
     assert "undecided" in undecided_line(cut) and undecided_line(whole) == ""
     assert "[0.00, " in "\n".join(kernel_lines(cut.kernel))
 

@@ -63,18 +63,19 @@ def test_the_interval_covers_as_often_as_it_says(p, q, overlap):
 def test_joint_counts_are_the_counts_of_pairs():
     outcome, inside, bond = draw_codes(np.random.default_rng(1), (2, 3, 2, 50))
     joint = joint_counts(outcome, inside)
-    assert joint.shape == (3, 2, 2, 3, 2, 4)
+    assert joint.shape == (3, 3, 2, 2, 3, 2, 4)
+    known = joint[0]
     table = tabulate(outcome, inside, bond)
     # Against itself an event happens in both or in neither.
     for axis, first in enumerate([np.s_[0], np.s_[:, 0], np.s_[:, :, 0]]):
-        own = joint[axis][(slice(None), *([first] if axis == 0 else first))]
+        own = known[axis][(slice(None), *([first] if axis == 0 else first))]
         assert not own[..., 1:3].any()
         assert np.all(own[0][..., 0] == table["n_inside"][first])
     # One pair of conditions, counted plainly: N = the second against the first, by replicate.
     decided = (outcome < 4) & (outcome[:, :1] < 4)
     a, b = np.isin(outcome, [0, 2]), np.isin(outcome[:, :1], [0, 2])
-    np.testing.assert_array_equal(joint[1, 1, ..., 1], (decided & a & ~b).sum(axis=-1))
-    np.testing.assert_array_equal(joint[1, 1].sum(axis=-1), decided.sum(axis=-1))
+    np.testing.assert_array_equal(known[1, 1, ..., 1], (decided & a & ~b).sum(axis=-1))
+    np.testing.assert_array_equal(known[1, 1].sum(axis=-1), decided.sum(axis=-1))
 
 
 def test_blocks_of_replicates_add_up():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from flocsim.ensembles.collision.points import point, points_of
 from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
 from flocsim.ensembles.kernels.sampling import (
     ANGLE_I,
@@ -11,8 +12,6 @@ from flocsim.ensembles.kernels.sampling import (
     as_draws,
     flow_offset,
     half_widths,
-    point,
-    points_of,
     settling_interval,
 )
 from flocsim.geometry.shapes.composite import Composite

@@ -1,0 +1,124 @@
+"""Which parameter matters: elasticities of Pr[A], one parameter at a time on the same draws."""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.studies.compare import Comparison, compare
+from flocsim.ensembles.studies.opened import StudyResults, open_any
+from flocsim.ensembles.studies.study import WAYS, Study
+from flocsim.ensembles.studies.sweep import parts_folder, sweep, value_of
+from flocsim.errors import UsageError
+from flocsim.fields import is_number
+from flocsim.io.terminal import aligned
+
+RATIO = 2.0
+"""Of the larger to the smaller value of a parameter."""
+
+
+@attrs.frozen(eq=False)
+class Elasticities:
+    """dPr[A]/d ln p of parameters: ``keys`` and their ``values`` (SI); ``ratio`` of the larger to
+    the smaller value that was run, the geometric mean of which is the value; ``types``,
+    ``vertices``, ``delta`` the conditions; ``value``, ``low``, ``high`` (key, type, vertices,
+    delta), the 95 % interval paired; ``numerical`` what numerics add on either side."""
+
+    keys: tuple[str, ...]
+    values: tuple[float, ...]
+    ratio: float
+    types: tuple[str, ...]
+    vertices: np.ndarray
+    delta: np.ndarray
+    value: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    numerical: np.ndarray
+
+    def matters(self, place: tuple[int, ...]) -> bool:
+        """Whether 0 is outside the interval of sampling; numerics are said beside it, and err
+        alike on the same draws."""
+        return bool(self.low[place] > 0.0 or self.high[place] < 0.0)
+
+    def table(self) -> str:
+        """A row for each parameter and condition; a star where 0 is outside the interval."""
+        rows = [("parameter", "at", "type", "N", "delta", "dPr[A]/dln p", "[95 %]", "num.", "")]
+        for place in np.ndindex(self.value.shape):
+            k, t, v, d = place
+            names = (self.keys[k], f"{self.values[k]:g}", self.types[t], str(self.vertices[v]),
+                     f"{self.delta[d]:g}")  # fmt: skip
+            value, low, high = (each[place] for each in (self.value, self.low, self.high))
+            found = ("-", "-", "-", "") if math.isnan(value) else (
+                f"{value:+.3f}", f"[{low:+.3f}, {high:+.3f}]", f"+-{self.numerical[place]:.3f}",
+                "*" if self.matters(place) else "",
+            )  # fmt: skip
+            rows.append((*names, *found))
+        return "\n".join(aligned(rows))
+
+
+def elasticities(
+    study: Study, keys: Sequence[str], output: str | os.PathLike, *, ratio: float = RATIO,
+    jobs: int = 1, mode: str = "new", overwrite: bool = False, quiet: bool = True,
+    tell: Callable[[str], object] = lambda line: None, ways: str = WAYS,
+) -> Elasticities:  # fmt: skip
+    """Run a Study of pairs with each parameter multiplied by √ratio and divided by it.
+
+    The difference of Pr[A] over ln ratio, replicate by replicate on the same draws, by Newcombe's
+    paired interval. Each parameter is a sweep of two values, in a file ``output`` with its key
+    behind the name; ``mode`` and others as in `sweep`. UsageError for a key without a number above
+    0, for swarms, and as `sweep` raises it.
+    """
+    if not ratio > 1.0 or not math.isfinite(ratio):
+        raise UsageError(f"the ratio of an elasticity must be above 1 and finite, found {ratio:g}")
+    if not keys or len(set(keys)) < len(keys):
+        raise UsageError("elasticities are of at least one key, each named once")
+    if study.config.is_swarm or study.config.is_kernel:
+        raise UsageError("elasticities are of probabilities of pairs: sweep the key instead")
+    values = [number_of(study, key) for key in keys]
+    found: list[Comparison] = []
+    for key, value in zip(keys, values, strict=True):
+        path = named(output, key)
+        ends = [value / math.sqrt(ratio), value * math.sqrt(ratio)]
+        sweep(study, {key: ends}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
+              tell=tell, ways=ways)  # fmt: skip
+        first, second = (
+            open_any(parts_folder(path) / f"{number:04d}.h5", study.path.parent)
+            for number in (0, 1)
+        )
+        assert isinstance(first, StudyResults) and isinstance(second, StudyResults)
+        compared = compare(first, second)
+        assert isinstance(compared, Comparison)
+        found.append(compared)
+    arrays = {
+        name: np.stack([each.arrays["pr_a"][column] for each in found]) / math.log(ratio)
+        for name, column in COLUMNS.items()
+    }
+    axes = found[0]
+    return Elasticities(tuple(keys), tuple(values), ratio, axes.types, axes.vertices, axes.delta,
+                        **arrays)  # fmt: skip
+
+
+COLUMNS = {
+    "value": "difference", "low": "difference_low", "high": "difference_high",
+    "numerical": "numerical",
+}  # fmt: skip
+
+
+def named(output: str | os.PathLike, key: str) -> Path:
+    """The joined file of a parameter's two values."""
+    path = Path(output)
+    return path.with_name(f"{path.stem}-{key.replace('.', '-')}.h5")
+
+
+def number_of(study: Study, key: str) -> float:
+    """The value of a parameter (SI); UsageError where it is no number above 0."""
+    value, _ = value_of(study.config, key)
+    if not is_number(value) or not value > 0.0:
+        raise UsageError(
+            f"{key} has no elasticity, as it is {value!r}: name a key whose value is a number "
+            "above 0 in the config, or sweep it"
+        )
+    return float(value)
