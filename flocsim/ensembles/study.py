@@ -47,6 +47,11 @@ TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 """Failures behind which more steps, or shorter ones, may come to an outcome."""
 
 
+def says_outcome(row: dict) -> bool:
+    """Whether a row says what became of a pair."""
+    return OUTCOMES[row["outcome"]] not in UNKNOWN
+
+
 @attrs.define(eq=False)
 class Study(StudyKind):
     """Every replicate of a config. All that is random follows from (seed, replicate).
@@ -189,8 +194,8 @@ class Study(StudyKind):
         driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
         row = draw.run(driver, max_steps, halted)
         exact = self.exact[self.pairings[condition].name]
-        if row is not None and FAILURES[row["failure"]] in TRIED_AGAIN:
-            row = self.tried_again(draw, exact, row, halted)
+        if row is not None and (attempt := self.second_attempt(condition, row)):
+            row = self.tried_again(draw, attempt, row, halted)
         if row is None or exact is None:
             return row
         easily = bool(flips_easily(row["outcome"], row["bond"]))
@@ -200,26 +205,32 @@ class Study(StudyKind):
         found = self.run_again(draw, exact, halted)
         return None if found is None else row | found
 
-    def tried_again(
-        self, draw: Draw, exact: Integrator | None, row: dict,
-        halted: Callable[[], bool] | None = None,
-    ) -> dict | None:  # fmt: skip
-        """A row that says nothing of the outcome, or that of a second try, where it does.
+    def second_attempt(self, condition: int, row: dict) -> tuple[int, Integrator | None] | None:
+        """(steps, method) by which a replicate is tried again whose row says nothing of its
+        outcome; None where it is not.
 
-        With more steps; more exactly, too, where the first did not end for lack of steps. None
-        where it was given up.
+        With more steps; more exactly, too, where the first did not end for lack of steps.
         """
         ran_out = FAILURES[row["failure"]] == "step budget"
-        if exact is None and not ran_out:
-            return row
-        steps = MORE_STEPS * self.config.integrator.max_steps
+        exact = self.exact[self.pairings[condition].name]
+        if FAILURES[row["failure"]] not in TRIED_AGAIN or (exact is None and not ran_out):
+            return None
+        return MORE_STEPS * self.config.integrator.max_steps, None if ran_out else exact
+
+    def tried_again(
+        self, draw: Draw, attempt: tuple[int, Integrator | None], row: dict,
+        halted: Callable[[], bool] | None = None,
+    ) -> dict | None:  # fmt: skip
+        """The row of a second attempt where that says something of the outcome, the first where
+        not; None where it was given up."""
+        steps, method = attempt
         try:
-            found = draw.run(self.driver(draw.encounter), steps, halted, None if ran_out else exact)
+            found = draw.run(self.driver(draw.encounter), steps, halted, method)
         except MemoryError:
             raise
         except Exception:
             return row
-        return found if found is None or OUTCOMES[found["outcome"]] not in UNKNOWN else row
+        return found if found is None or says_outcome(found) else row
 
     def run_again(
         self, draw: Draw, exact: Integrator, halted: Callable[[], bool] | None = None

@@ -8,6 +8,7 @@ from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.storage.identity import identity_of
+from flocsim.ensembles.studies.replicates import replicate_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.geometry.shapes.parts import table_of
@@ -64,6 +65,10 @@ def test_what_runs_out_of_steps_is_tried_again_with_more(study, tmp_path):
     taken = full["steps"] + full["rejected"]
     few = small_study(tmp_path, {"integrator": {"max_steps": taken // 3}})
     assert few.run(0, 16, 0.0, 0) == full
+    # Its motion is that of the second attempt, too.
+    motion = replicate_of(0, (0, 16, 0.0), few)
+    assert motion.row["outcome"] == OUTCOMES[full["outcome"]]
+    assert motion.t[-1] == full["t_end"]
     fewer = small_study(tmp_path, {"integrator": {"max_steps": taken // 20}}).run(0, 16, 0.0, 0)
     assert OUTCOMES[fewer["outcome"]] == "undecided"
     assert fewer["steps"] + fewer["rejected"] <= taken // 20

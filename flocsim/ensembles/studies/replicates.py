@@ -11,7 +11,7 @@ from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.pilot.choice import final_methods
-from flocsim.ensembles.study import Study
+from flocsim.ensembles.study import Study, says_outcome
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
@@ -69,18 +69,27 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
     if not is_whole(replicate) or not replicate >= 0:
         raise UsageError(f"replicate must be a whole number from 0, found {replicate!r}")
     began, draw = time.perf_counter(), study.draw(*place, int(replicate))
-    driver, max_steps = study.driver(draw.encounter), study.config.integrator.max_steps
-    system, run = draw.encounter.system, draw.begin(driver, max_steps, record=True)
-    status = run.to_end()
-    row = draw.row(run, status)
+    driver, system = study.driver(draw.encounter), draw.encounter.system
 
-    def fresh() -> Run:
-        return draw.begin(driver, max_steps)
+    def attempt(steps: int, method: Integrator | None = None) -> tuple[dict, Trajectory]:
+        def fresh(record: bool = False) -> Run:
+            return draw.begin(driver, steps, integrator=method, record=record)
 
-    legs = ((run.steps, float(run.clock[UNTIL])),)
-    origin = Origin(system.bodies, system.forces, system.fluid, system.integrator, fresh, run, legs)
-    lasted = time.perf_counter() - began
-    return Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)
+        run = fresh(record=True)
+        status = run.to_end()
+        row = draw.row(run, status)
+        origin = Origin(
+            system.bodies, system.forces, system.fluid, method or system.integrator, fresh, run,
+            ((run.steps, float(run.clock[UNTIL])),),
+        )  # fmt: skip
+        lasted = time.perf_counter() - began
+        return row, Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)
+
+    row, found = attempt(study.config.integrator.max_steps)
+    if again := study.second_attempt(place[0], row):
+        row, second = attempt(*again)
+        return second if says_outcome(row) else found
+    return found
 
 
 def row_in_words(row: dict) -> dict:
