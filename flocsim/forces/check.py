@@ -84,8 +84,6 @@ def refusal(force, function, finding):
 def require_plain(force, kernel):
     """KernelError where a kernel is not a plain function that captures nothing."""
     name = type(force).__name__
-    if kernel is Force.kernel:
-        raise KernelError(f"{name} has no kernel: give it a static method `kernel`")
     if inspect.ismethod(kernel):
         raise refusal(force, kernel, "is a method; put @staticmethod above it and drop `self`")
     if hasattr(kernel, "py_func"):
@@ -195,8 +193,8 @@ def failure(view, error):
         fields = type(view)._fields
         near = difflib.get_close_matches(error.name, fields, n=1)
         advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
-        has_not = f"which a {type(view).__name__} has not"
-        return f"reads {error.name!r} in {failing_line(error)}, {has_not}; {advice}"
+        lacks = f"{type(view).__name__} has no attribute {error.name!r}"
+        return f"fails in {failing_line(error)}: {lacks}; {advice}"
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"fails in {failing_line(error)}: {what}"
 
@@ -284,8 +282,6 @@ def reach_of(force: PairForce) -> float:
 
 
 def check_pair_force(force, fluid):
-    if type(force).acts_on is PairForce.acts_on:
-        raise KernelError(f"{type(force).__name__} must subclass CentreForce or SurfaceForce")
     samples = sample_pairs(reach_of(force))
     check_results(force, fluid, force.kernel, samples, "repulsion [N]")
     if force.slope is not None:

@@ -79,7 +79,7 @@ def beyond_the_law(bodies: Sequence[Settled], forces: dict[str, Any]) -> str:
     if worst.reynolds <= drag.serves_up_to:
         return ""
     advice = (
-        f'{name} takes law = "schiller_naumann", which serves up to {SCHILLER_NAUMANN_UP_TO:g}'
+        f'{name} takes law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
         if drag.law == "stokes"
         else "take smaller or lighter bodies, or a drag of your own"
     )

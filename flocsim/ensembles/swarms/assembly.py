@@ -126,7 +126,7 @@ def table_rows(results: SwarmResults) -> list[list[str]]:
         "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
         "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
         "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
-        "error of half [m]": (mean(counts["median_error"]), "{:.1e}"),
+        "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
         "largest [m]": (mean(counts["error"]), "{:.1e}"),
     }
     if not np.any(counts["percolating"] > 0.0):

@@ -88,7 +88,7 @@ def _decode_with_pillow(path):
         check_promise(path, image.width * image.height)
         if getattr(image, "n_frames", 1) > 1:
             raise ImageError(
-                f"{path}: holds {image.n_frames} pictures; save the wanted one to its own file"
+                f"{path}: holds {image.n_frames} pictures; save the wanted one as its own file"
             )
         image.load()
         image = ImageOps.exif_transpose(image)
@@ -119,7 +119,7 @@ def check_tiff(path, tiff):
     """ImageError for a TIFF that is a stack, too large, or unpacks to more than its pixels."""
     if len(tiff.pages) != 1:
         raise ImageError(
-            f"{path}: holds {len(tiff.pages)} pictures; save the wanted one to its own file"
+            f"{path}: holds {len(tiff.pages)} pictures; save the wanted one as its own file"
         )
     page = tiff.pages[0]
     check_shape(path, page.shape)

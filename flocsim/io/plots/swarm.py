@@ -67,7 +67,7 @@ def clusters(results: SwarmResults) -> Figure:
     finite = ",\nof those that do not percolate" if endless else ""
     shown = [
         ("clusters", 1.0, "clusters"),
-        ("mean_size", 1.0, "bodies of a body's cluster"),
+        ("mean_size", 1.0, "body-weighted mean cluster size"),
         ("gyration", MICRO, f"radius of gyration [µm]{finite}"),
         ("settling", 1e3, "settling [mm/s]"),
     ]

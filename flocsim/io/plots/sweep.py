@@ -180,7 +180,7 @@ def over_time(results: SweepResults) -> Figure:
 
 
 SHOWN = (
-    ("mean_size", 1.0, "bodies of a body's cluster"), ("clusters", 1.0, "clusters"),
+    ("mean_size", 1.0, "body-weighted mean cluster size"), ("clusters", 1.0, "clusters"),
     ("settling", 1e3, "settling [mm/s]"),
 )  # fmt: skip
 """Columns of the counts, factors to the units of their labels."""

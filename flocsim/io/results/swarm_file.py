@@ -33,7 +33,7 @@ MOMENTS = ("replicate", "time")
 COUNTS = {
     "clusters": ("f8", "1", "clusters, single bodies among them"),
     "largest": ("f8", "1", "bodies of the largest cluster"),
-    "mean_size": ("f8", "1", "bodies of a body's cluster, in the mean over bodies"),
+    "mean_size": ("f8", "1", "body-weighted mean cluster size"),
     "percolating": ("f8", "1", "clusters that hang together with their images round the box"),
     "gyration": ("f8", "m", "radius of gyration of a cluster, in the mean over mass; of those "
                  "that do not percolate"),
