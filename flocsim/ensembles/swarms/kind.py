@@ -93,7 +93,7 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
 def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
     """{name: text or number} of all that the replicates of a study follow from."""
     config, swarm = study.config, study.first
-    facts = config_facts(study, ("scene", "shapes", "bodies", "fluid"))
+    facts = config_facts(study.config, ("scene", "shapes", "bodies", "fluid"))
     facts |= machine or machine_facts(CODE)
     facts["shapes.vertices"] = list(config.shapes.vertices)
     shapes = [floc.shapes.get(study.vertices) for floc in study.flocs]

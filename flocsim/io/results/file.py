@@ -65,6 +65,7 @@ __all__ = [
     "first_of_each",
     "read_overview",
     "read_results",
+    "read_row",
     "same_data",
     "write_results",
 ]
@@ -140,6 +141,17 @@ def results_in(file, replicates):
 def read_group(file, name, schema):
     """The arrays of a group that a file may lack."""
     return {each: file[name][each][()] for each in schema} if name in file else {}
+
+
+def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:
+    """{column: value} of one replicate, at (type, vertices, delta, replicate); FileError as
+    `read_results`, and for values that no run can have given."""
+    with opened(path) as file:
+        rows = file["replicates"]
+        found = {name: rows[name][place] for name in REPLICATES}
+        reasons = len(rows["failure"].attrs["flag_meanings"].split())
+        check_rows(lambda name: np.asarray(found[name]), reasons, 0)
+        return found
 
 
 SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
