@@ -25,7 +25,7 @@ from flocsim.ensembles.studies.replicates import (
     row_in_words,
 )
 from flocsim.ensembles.study import Study, methods_of
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.contents import RESULTS, STRENGTH, SWARM, SWEEP, content_of
@@ -93,7 +93,14 @@ class StudyResults(Tables):
         if self.sources.config is None:
             self.sources.config = text
             self.sources.consent = None if self.trusted else Consent(str(self.path), self.modules)
-        return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+        try:
+            return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+        except ConfigError as error:
+            line, *more = str(error).split("\n")
+            further = f" (and {len(more)} more)" if more else ""
+            raise ConfigError(
+                f"the config in {self.path} cannot be used: {line}{further}"
+            ) from error
 
     @property
     def modules(self) -> dict[str, dict[str, str]]:
