@@ -6,6 +6,8 @@ met inside HDF5, where it can end the process.
 """
 
 import io
+from collections.abc import Mapping
+from typing import Any
 
 import attrs
 import numpy as np
@@ -89,6 +91,19 @@ def frame_of(results: Results) -> Frame:
         # Last, so that its length moves no byte of the groups before it.
         write_run(file, results)
     return frame
+
+
+def image_of(results: Results, attributes: Mapping[str, Any]) -> io.BytesIO:
+    """A whole results file in memory, with further attributes, and without a seal."""
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        write_tables(file, results)
+        write_labelled(file.create_group("replicates"), results.labelled("replicates"))
+        write_run(file, results)
+        file.attrs.update(attributes)
+    return image
 
 
 def write_tables(file, results):

@@ -10,17 +10,17 @@ as `Addition.meaning` says.
 """
 
 import contextlib
-import io
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.io.groups import Group, scalar_of, values_of, write_labelled
+from flocsim.io.groups import Group, scalar_of, values_of
 from flocsim.io.hdf5.structure import Node
+from flocsim.io.opening import parsed
 from flocsim.io.results.checks import check_coordinates, check_structure
-from flocsim.io.results.layout import SCHEMA_VERSION, write_run, write_tables
+from flocsim.io.results.layout import SCHEMA_VERSION, image_of
 from flocsim.io.results.schema import (
     BLANKS,
     BONDS,
@@ -123,8 +123,6 @@ def groups_of(version: int) -> dict[str, Group]:
 def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
     """An open file of an older version as one of this, in memory; ValueError for what no such
     version wrote."""
-    import h5py
-
     groups = groups_of(version)
     check_structure(nodes, groups)
     check_coordinates(file)
@@ -133,14 +131,8 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
             f"it has more than {MOST_ROWS} rows of schema version {version}: read it with the "
             "flocsim that wrote it"
         )
-    image = io.BytesIO()
-    with h5py.File(image, "w") as now:
-        results = results_of(file, groups)
-        write_tables(now, results)
-        write_labelled(now.create_group("replicates"), results.labelled("replicates"))
-        write_run(now, results)
-        now.attrs[WRITTEN_AS] = version
-    with h5py.File(image, "r") as now:
+    image = image_of(results_of(file, groups), {WRITTEN_AS: version})
+    with parsed(image, len(image.getbuffer())) as (now, _):
         yield now
 
 
