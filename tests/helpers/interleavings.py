@@ -458,7 +458,8 @@ class World:
 
     def run(self):
         words = self.words()
-        must, known, stamp = self.must_work(words), self.tasks(), self.stamp()
+        must, stamp = self.must_work(words), self.stamp()
+        known = self.tasks_of(self.output) | self.tasks_of(self.journal)
         child = Child(self.folder, words)
         code = child.end()
         self.judge(child, code, {self.physics}, must)
