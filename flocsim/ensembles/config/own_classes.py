@@ -157,7 +157,8 @@ def load_module(name, folder, sources):
             module = importlib.import_module(name)
             note_installed(module, folder, sources)
         if module is not before:
-            READ[name] = READ.get(name, {}) | sources.modules
+            # Neighbours that an older one had imported are not run again.
+            READ[name] = (READ.get(name, {}) if before else {}) | sources.modules
         sources.modules |= {k: v for k, v in READ.get(name, {}).items() if k not in sources.modules}
         return module
     except (Exception, SystemExit) as error:

@@ -242,6 +242,17 @@ class StudyResults(Tables):
         return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
 
 
+def identity_in(results: StudyResults | SwarmResults) -> dict[str, Any]:
+    """What the rows of results follow from, as their file says; FileError where nobody can read
+    it."""
+    try:
+        found: dict[str, Any] = stored(results.run, "identity")
+        return found
+    except ValueError as error:
+        where = getattr(results, "path", "a file of swarms")
+        raise FileError(f"{where} holds no readable results: {error}") from error
+
+
 Opened = StudyResults | SweepResults | SwarmResults | Strengths
 
 
