@@ -199,7 +199,7 @@ def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
         before, behind = values.shape[:axis], values.shape[axis + 3 :]
         every = np.zeros((*before, many, *behind), values.dtype)
         for place, found in known.items():
-            every[(slice(None),) * axis + (place,)] = found[name].reshape(*before, *behind)
+            every[(slice(None),) * axis + (place,)] = found[name].reshape((*before, *behind))
         counts[name] = every.reshape(*before, *shape, *behind)
     return table_from(counts)
 
