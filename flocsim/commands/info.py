@@ -13,6 +13,7 @@ import numpy as np
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
+from flocsim.ensembles.config.consent import read_sources
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.equivalent_spheres import sphere_words
 from flocsim.ensembles.estimates import strengths
@@ -53,7 +54,7 @@ from flocsim.io.terminal import aligned
 from flocsim.io.trajectory import centre_distance
 
 APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-         "warnings", "trial", "settling", "size_classes", "equivalent_spheres",
+         "warnings", "trial", "modules", "settling", "size_classes", "equivalent_spheres",
          MOST_UNDECIDED)  # fmt: skip
 """What the group ``run`` holds besides what is printed as it is."""
 
@@ -72,25 +73,46 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
+    parser.add_argument(
+        "--modules", action="store_true",
+        help="print only the modules of one's own that it was run with",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     journal = journal_of(args.results)
     if journal is not None:
-        if args.config:
+        if args.config or args.modules:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
         print(unfinished_text(read_unfinished(journal)))
         return 0
-    if not args.config:
+    if not (args.config or args.modules):
         print(text_of(args.results))
         return 0
     _, results = content_of(args.results, (RESULTS, SWARM))
-    if results.run.get("config"):
-        sys.stdout.write(str(results.run["config"]))
-    else:
-        raise FileError(f"{args.results} holds no config: it was not written by flocsim ensemble")
+    print_kept(args, results.run)
     return 0
+
+
+def print_kept(args, run):
+    """Print the config, the modules, or both, that a file keeps; FileError where it has none."""
+    if args.config:
+        if not run.get("config"):
+            raise FileError(
+                f"{args.results} holds no config: it was not written by flocsim ensemble"
+            )
+        sys.stdout.write(str(run["config"]))
+    if args.modules:
+        try:
+            modules = read_sources(run)
+        except ValueError as error:
+            raise FileError(f"{args.results} holds no readable results: {error}") from error
+        if not modules:
+            raise FileError(f"{args.results} holds no modules: it was run without, or by a flocsim "
+                            "that kept none")  # fmt: skip
+        for place, each in modules.items():
+            sys.stdout.write(f"# {visible(place, '')}\n{each['source'].rstrip()}\n")
 
 
 def text_of(path):

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands import SUMMARIES
+from flocsim.commands import FOLDER_HELP, SUMMARIES
 from flocsim.commands.reporting.examples import examples_of
 from flocsim.commands.reporting.page import report_page, swarm_page
 from flocsim.ensembles.studies.opened import open_results
@@ -28,9 +28,7 @@ def add_parser(subparsers: Any) -> None:
     add("-o", "--output", metavar="FILE.html",
         help="page to write (default: r.html for r.h5, in the current folder)")  # fmt: skip
     add("--no-motion", action="store_true", help="run no replicate again: a page without motion")
-    add("--folder", metavar="DIR",
-        help="where the config lay, its shape library and its own modules (default: where the "
-        "results lie)")  # fmt: skip
+    add("--folder", metavar="DIR", help=FOLDER_HELP)
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 

@@ -4,7 +4,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands import SUMMARIES
+from flocsim.commands import FOLDER_HELP, SUMMARIES
 from flocsim.ensembles.cli import run_command
 from flocsim.ensembles.parallel.communicator import launched_rank
 from flocsim.ensembles.parallel.heartbeat import SECONDS
@@ -36,6 +36,7 @@ def add_parser(subparsers: Any) -> None:
         help="go on with a stopped survey, or test more (--count); starts one if there is "
         "none")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="default: NAME-strength.h5")
+    add("--folder", metavar="DIR", help=FOLDER_HELP)
     add("--figure", metavar="FILE", help="default: NAME-strength.png")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--quiet", action="store_true", help="print warnings and errors only")
@@ -67,7 +68,9 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
         rules = data_rule(args.overwrite or args.mode == "resume"), figure_rule(args.overwrite)
         check_outputs([Output(output, rules[0], SUFFIX, WAYS), Output(figure, rules[1])],
                       [args.results])  # fmt: skip
-    bonds = Bonds(open_results(args.results), args.flow, args.count, args.precision)
+    bonds = Bonds(
+        open_results(args.results, args.folder, sources), args.flow, args.count, args.precision
+    )
     return config_of(bonds, str(output))
 
 

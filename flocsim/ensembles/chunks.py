@@ -126,8 +126,8 @@ def fits(description: dict, length: int, row: np.dtype = ROW) -> bool:
 def rows_of(data: bytes, row: np.dtype = ROW) -> dict[str, np.ndarray]:
     """{column: values} of a chunk's data."""
     count = len(data) // row.itemsize
-    return {name: np.frombuffer(data, row[name], count, count * starts(row)[name])
-            for name in starts(row)}  # fmt: skip
+    return {name: np.frombuffer(data, row[name], count, count * start)
+            for name, start in starts(row).items()}  # fmt: skip
 
 
 def starts(row: np.dtype) -> dict[str, int]:

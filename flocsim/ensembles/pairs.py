@@ -4,12 +4,13 @@ import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in
+from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.doubts import settling_facts, study_doubts
@@ -58,6 +59,7 @@ from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import opened, read_results, scalar_of
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.layout import FORMAT
+from flocsim.io.results.older import why_apart
 from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import Results, as_words
 
@@ -66,6 +68,8 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The table of replicates of a results file, open until the resources are closed."""
     file = resources.enter_context(opened(output))
     rows = file["replicates"]
+    if apart := why_apart(file):
+        raise ValueError(apart)
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its codes of failures have other words")
     places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
@@ -187,12 +191,16 @@ def axes_of(session: dict, found: list[Condition]) -> dict[str, Any]:
 
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     """The table of probabilities from all rows of a store, whose conditions have this shape."""
-    each = [counts_of(store, place) for place in range(len(store.conditions))]
+    many = len(store.conditions)
+    known = {place: counts_of(store, place) for place in range(many) if store.counts[place]}
     counts = {}
-    for name in each[0]:
+    for name, values in next(iter(known.values())).items():
         axis = leading_axes(name)
-        joined = np.concatenate([one[name] for one in each], axis=axis)
-        counts[name] = joined.reshape(*joined.shape[:axis], *shape, *joined.shape[axis + 3 :])
+        before, behind = values.shape[:axis], values.shape[axis + 3 :]
+        every = np.zeros((*before, many, *behind), values.dtype)
+        for place, found in known.items():
+            every[(slice(None),) * axis + (place,)] = found[name].reshape((*before, *behind))
+        counts[name] = every.reshape(*before, *shape, *behind)
     return table_from(counts)
 
 
@@ -201,18 +209,20 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
     there."""
 
     def codes(first: int, stop: int) -> tuple[np.ndarray, ...]:
-        near = [(max(a, first), min(b, stop)) for a, b in runs if a < stop and b > first]
-        found = []
-        for name in COUNTED:
-            parts = [store.read(place, name, *each) for each in near]
-            values = np.concatenate([np.empty(0, "i8"), *parts]).astype("i8")
-            found.append(values.reshape(1, 1, 1, -1))
-        return tuple(found)
+        """Of the rows from the ``first`` of those that there are: their numbers may be anything."""
+        columns = {name: np.empty(stop - first, "i8") for name in COUNTED}
+        for (a, b), before in zip(runs, begins, strict=True):
+            low, high = a + max(first - before, 0), min(b, a + stop - before)
+            for number, rows in store.rows(place, low, high, known) if low < high else ():
+                start = before + number - a - first
+                for name in COUNTED:
+                    columns[name][start : start + len(rows[name])] = rows[name]
+        return tuple(values.reshape(1, 1, 1, -1) for values in columns.values())
 
-    runs = store.intervals(place)
-    end = runs[-1][1] if runs else 0
+    runs, known = store.intervals(place), store.known(place)
+    begins = [0, *accumulate(stop - first for first, stop in runs)][:-1]
     try:
-        sums = sums_of(codes, 1, 0, end)
+        sums = sums_of(codes, 1, 0, total(runs))
     except UsageError as error:
         raise FileError(f"{store.journal.path} holds no readable rows: {error}") from error
     return {name: values for name, values in sums.items() if name not in (*POOLED_NAMES, JOINT)}

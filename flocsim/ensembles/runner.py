@@ -17,6 +17,7 @@ import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
+from flocsim.ensembles.config.consent import kept_sources
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates.stop_rule import borders
 from flocsim.ensembles.kind import StudyKind
@@ -381,6 +382,8 @@ def facts(study, start, notes, ended, ranks):
     found = provenance(config.text, config.seed, " ".join(kernels))
     if start.accuracy:
         found["accuracy"] = storable(json.dumps(start.accuracy, sort_keys=True))
+    if config.modules:
+        found["modules"] = storable(kept_sources(config.modules))
     return found | {
         "overrides": storable(json.dumps(config.overrides)),
         "identity": storable(json.dumps(identity, sort_keys=True)),

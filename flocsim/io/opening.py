@@ -16,6 +16,10 @@ UNREADABLE = (
 """What h5py raises for what it cannot read."""
 
 
+LONGEST_WORDS = 80
+"""Letters of what a file says that it is."""
+
+
 @contextlib.contextmanager
 def parsed(data: BinaryIO, size: int) -> Iterator[tuple[Any, dict[str, Node]]]:
     """(open h5py file, its structure) of HDF5 data, h5py being let at it once the structure is one
@@ -47,9 +51,11 @@ def opened_file(
 
 
 def text_of(file: Any, nodes: dict[str, Node], name: str) -> str:
-    """An attribute of an open file that is a text; "" where there is none."""
+    """An attribute of an open file that is a text; "" where there is none, or none that flocsim
+    writes there, which messages show."""
     known = nodes[""].attributes.get(name)
-    return str(file.attrs[name]) if known == ("text", ()) else ""
+    found = str(file.attrs[name]) if known == ("text", ()) else ""
+    return found if found.isprintable() and len(found) <= LONGEST_WORDS else ""
 
 
 def kind_of(path: str | os.PathLike) -> str:

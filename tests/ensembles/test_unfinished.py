@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
+from flocsim.ensembles import pairs
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
@@ -94,3 +95,38 @@ def test_finished_results_are_read_themselves(tmp_path):
     assert journal_of(tmp_path / "r.h5") == tmp_path / "r.h5.journal"
     (tmp_path / "r.h5").write_bytes(b"")
     assert journal_of(tmp_path / "r.h5") is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            {"types": ["I", *map(str, range(300))], "delta": [*range(300)]},
+            "is of 180600 conditions",
+        ),
+        ({"types": ["I"] * 300}, "conditions that are the same"),
+    ],
+)
+def test_a_journal_of_too_many_conditions_is_refused_at_once(tmp_path, asked, said):
+    write_journal(tmp_path / "r.h5.journal", asked=ASKED | asked).file.close()
+    with pytest.raises(FileError, match=said):
+        read_unfinished(tmp_path / "r.h5.journal")
+
+
+def test_what_is_read_grows_with_the_rows_and_not_with_their_numbers(tmp_path, monkeypatch):
+    """Replicates 2**40 and on are counted as any: nothing is done for those before."""
+    journal = write_journal(tmp_path / "r.h5.journal")
+    rows = np.zeros(4, ROW)
+    for name in COLUMNS:
+        rows[name] = RESULTS.replicates[name][1, 0, 0, :4]
+    rows["failure"] = 0
+    journal.append(chunk_record(Condition("III", 1, 0.0), 2**40 - 4, rows, "k"))
+    journal.file.close()
+    ends = []
+    original = pairs.sums_of
+    monkeypatch.setattr(
+        pairs, "sums_of", lambda *words: (ends.append(words[3]), original(*words))[1]
+    )
+    found = read_unfinished(tmp_path / "r.h5.journal")
+    assert found.results.probabilities["n_total"][1].tolist() == [[4, 0], [15, 0]]
+    assert sorted(ends) == [4, 15, 40, 40, 40, 40]

@@ -5,7 +5,7 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.studies.opened import StudyResults
-from flocsim.ensembles.studies.replicates import place_of, replicate_of
+from flocsim.ensembles.studies.replicates import place_of
 from flocsim.errors import FlocsimError
 from flocsim.io.results.file import first_of_each
 from flocsim.io.results.schema import CLASSES
@@ -35,10 +35,9 @@ def example_of(opened: StudyResults, outcome: str, at: tuple[int, int, int, int]
     name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
     title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {replicate}"
     try:
+        trajectory = opened.replicate(replicate, name, vertices, delta)
         place = place_of(opened.config, name, vertices, delta)
-        study = opened.study_with(vertices)
-        trajectory = replicate_of(replicate, place, study)
-        zone = study.draw(*place, replicate).encounter.zone_distance
+        zone = opened.study_with(vertices).draw(*place, replicate).encounter.zone_distance
     except FlocsimError as error:
         return Example(outcome, title, reason=" ".join(str(error).split()))
     return Example(outcome, title, trajectory, float(zone))

@@ -81,7 +81,9 @@ def load_any_config(
     if "file" not in table.get("output", {}):
         stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
         parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
-    return Config(text=text, folder=folder, overrides=overrides, **parts)
+    return Config(
+        text=text, folder=folder, overrides=overrides, modules=dict(sources.modules), **parts
+    )
 
 
 @attrs.frozen

@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.problems import misfit
-from flocsim.ensembles.config.sources import Neighbours, Sources
+from flocsim.ensembles.config.sources import Neighbours, Sources, place
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, PairForce
@@ -72,7 +72,10 @@ def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None =
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise misfit(f"'module:Class' such as {kind.example!r}", name)
-    module = load_module(module_name, folder, sources or Sources())
+    sources = sources or Sources()
+    if sources.consent is not None and not sources.has(folder / f"{module_name}.py", folder):
+        sources.consent.check_module(module_name, class_name, folder)
+    module = load_module(module_name, folder, sources)
     where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
     if not hasattr(module, class_name):
         known = [
@@ -136,8 +139,10 @@ def check_shape(shape: Shape) -> None:
 def load_module(name, folder, sources):
     """The module, from ``folder`` where a file of its name lies there, else as installed.
 
-    While it loads it may import its neighbours; sys.path is left as it was.
+    While it loads it may import its neighbours; sys.path is left as it was. ``sources`` has all
+    that it read afterwards, also where it, or a neighbour, had been loaded before.
     """
+    before = sys.modules.get(name)
     path, entry = folder / f"{name}.py", str(folder.resolve())
     sys.path.insert(0, entry)
     neighbours = Neighbours(sources, folder)
@@ -147,8 +152,15 @@ def load_module(name, folder, sources):
     importlib.invalidate_caches()
     try:
         if sources.has(path, folder):
-            return run_file(name, path, sources.module(path, folder))
-        return importlib.import_module(name)
+            module = run_file(name, path, sources.module(path, folder))
+        else:
+            module = importlib.import_module(name)
+            note_installed(module, folder, sources)
+        if module is not before:
+            # Neighbours that an older one had imported are not run again.
+            READ[name] = (READ.get(name, {}) if before else {}) | sources.modules
+        sources.modules |= {k: v for k, v in READ.get(name, {}).items() if k not in sources.modules}
+        return module
     except (Exception, SystemExit) as error:
         raise ConfigError(why_not(name, folder, error)) from error
     finally:
@@ -156,6 +168,18 @@ def load_module(name, folder, sources):
             sys.path.remove(entry)
         with contextlib.suppress(ValueError):
             sys.meta_path.remove(neighbours)
+
+
+READ: dict[str, dict[str, bytes]] = {}
+"""Module of the user's own → what it and its neighbours were when they were run."""
+
+
+def note_installed(module, folder, sources):
+    """Put the source of a module that lies elsewhere into ``sources``, by its name."""
+    path = getattr(module, "__file__", None)
+    if path and path.endswith(".py") and place(path, folder) not in sources.modules:
+        with contextlib.suppress(OSError):
+            sources.modules[module.__name__] = Path(path).read_bytes()
 
 
 def run_file(name, path, source):

@@ -399,7 +399,8 @@ class Config:
 
     ``forces`` (Force objects) and ``force_names`` go in step: gravity, drag, van_der_waals,
     double_layer, contact, then the user's own as in the file. ``text`` is the file's source and
-    ``folder`` where it lies; ``overrides`` what was laid over it.
+    ``folder`` where it lies; ``overrides`` what was laid over it; ``modules``
+    {place: source} of the user's own classes.
     """
 
     preset: str | None = choice(*PRESETS, default=None, help="values that lie under the file's own")
@@ -428,6 +429,7 @@ class Config:
     text: str = ""
     folder: Path = attrs.Factory(Path)
     overrides: dict[str, Any] = attrs.Factory(dict)
+    modules: dict[str, bytes] = attrs.field(factory=dict, repr=False)
 
     @property
     def is_swarm(self) -> bool:

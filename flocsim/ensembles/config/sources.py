@@ -13,7 +13,9 @@ from types import CodeType, ModuleType
 
 import attrs
 
+from flocsim.ensembles.config.consent import Consent
 from flocsim.ensembles.config.toml_text import read_text_file
+from flocsim.errors import ConfigError
 from flocsim.io.files import held
 
 INSTALLED = ("site-packages", "dist-packages")
@@ -23,12 +25,15 @@ INSTALLED = ("site-packages", "dist-packages")
 @attrs.define(eq=False)
 class Sources:
     """What has been read: ``config`` is the text of the config file, None before that; ``modules``
-    has the bytes of the user's modules by their place, relative to the config's folder;
-    ``libraries`` the shape libraries by their paths, which are to stay as they were."""
+    has the bytes of the user's modules by their place, relative to the config's folder, and of
+    installed ones by their name; ``libraries`` the shape libraries by their paths, which are to
+    stay as they were. ``consent``: what may be run, where the config is not the user's; None: all
+    that it names."""
 
     config: str | None = None
     modules: dict[str, bytes] = attrs.Factory(dict)
     libraries: dict[str, str | os.PathLike] = attrs.Factory(dict)
+    consent: Consent | None = None
 
     def library(self, path: Path) -> str | os.PathLike:
         """A shape library's path, held from when it was first named."""
@@ -45,10 +50,14 @@ class Sources:
         return place(path, folder) in self.modules or path.is_file()
 
     def module(self, path: str | os.PathLike, folder: Path) -> bytes:
-        """The bytes of a module's file, below the config's folder or not; OSError if unreadable."""
+        """The bytes of a module's file, below the config's folder or not; OSError if unreadable,
+        ConfigError where there is no consent to run it."""
         name = place(path, folder)
         if name not in self.modules:
-            self.modules[name] = Path(path).read_bytes()
+            found = Path(path).read_bytes()
+            if self.consent is not None:
+                self.consent.check(name, path, found)
+            self.modules[name] = found
         return self.modules[name]
 
 
@@ -68,13 +77,20 @@ class Neighbours(importlib.abc.MetaPathFinder):
     ) -> importlib.machinery.ModuleSpec | None:
         """The spec of a module below the folder; None for all others, which Python finds."""
         spec = importlib.machinery.PathFinder.find_spec(fullname, path, target)
-        if spec is None or type(spec.loader) is not importlib.machinery.SourceFileLoader:
+        if spec is None or not spec.has_location or spec.origin is None:
             return None
         parts = Path(place(spec.origin, self.folder)).parts
         if parts[0] == os.pardir or any(name in parts for name in INSTALLED):
             return None
         if fullname.partition(".")[0] == "flocsim":
             return None
+        if type(spec.loader) is not importlib.machinery.SourceFileLoader:
+            if self.sources.consent is None:
+                return None
+            raise ConfigError(
+                f"{spec.origin} has no source to be compared, "
+                f"{self.sources.consent.advice(spec.origin)}"
+            )
         spec.loader = SourceLoader(fullname, spec.loader.path, self)
         return spec
 

@@ -48,7 +48,7 @@ def strengths_of(
     counts = {name: np.zeros(shape, dtype=np.int64)
               for name in ("n_tested", "n_opened", "n_holding", "n_failed")}  # fmt: skip
     rate = np.full((*shape, len(QUANTILES)), np.nan)
-    for place in np.ndindex(shape):
+    for place in map(tuple, np.unique(places, axis=0).tolist()):
         rows = np.all(places == place, axis=1)
         opened = rows & np.isin(status, (OPENED, OPENS_AT_LEAST))
         holding = int(np.sum(rows & (status == HOLDS)))

@@ -21,13 +21,14 @@ import numpy as np
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.config.pair_scene import SETTLING
-from flocsim.ensembles.kind import StudyKind
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import point_columns
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 
 VARIABLE = {"scene": {"types", "pairs", "delta", "sizes"}, "shapes": {"vertices", "file", "own"}}
@@ -60,23 +61,32 @@ def identity_of(study: Study, machine: dict | None = None) -> dict:
 
     ``machine``: the machine_facts, where they are known.
     """
-    facts = config_facts(study, ("scene", "shapes", "bodies", "fluid", "zone"))
-    facts |= machine or machine_facts()
-    facts["integrator.check_share"] = study.config.integrator.check_share
+    facts = facts_before(study.config, study.methods, machine)
     facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
     return json.loads(json.dumps(facts))
 
 
-def config_facts(study: StudyKind, tables: Sequence[str]) -> dict:
-    """What the config of a study of any kind says: these tables, the method, the forces."""
-    config = study.config
+def facts_before(
+    config: Config, methods: dict[str, Integrator], machine: dict | None = None
+) -> dict:
+    """What of the identity is known before any floc is made, which may take long."""
+    facts = config_facts(config, ("scene", "shapes", "bodies", "fluid", "zone"), methods)
+    facts |= machine or machine_facts()
+    facts["integrator.check_share"] = config.integrator.check_share
+    return json.loads(json.dumps(facts))
+
+
+def config_facts(
+    config: Config, tables: Sequence[str], methods: dict[str, Integrator] | None = None
+) -> dict:
+    """What a config of any kind says: these tables, the method, the forces."""
     facts: dict = {"seed": config.seed}
     for table in tables:
         facts |= settings(table, getattr(config, table))
     if config.shapes.own is not None:
         facts |= settings("shapes", config.shapes.own)
         facts["shapes.class"] = config.shapes.label
-    facts |= method_facts(study)
+    facts |= method_facts(config, methods)
     facts["integrator.max_steps"] = config.integrator.max_steps
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
@@ -84,11 +94,10 @@ def config_facts(study: StudyKind, tables: Sequence[str]) -> dict:
     return facts
 
 
-def method_facts(study):
+def method_facts(config, methods):
     """The method, or what a pilot has chosen for each type."""
-    config = study.config
     if config.integrator.is_chosen:
-        chosen = {f"types.{name}.integrator": repr(each) for name, each in study.methods.items()}
+        chosen = {f"types.{name}.integrator": repr(each) for name, each in methods.items()}
         return {"integrator.accuracy": config.integrator.accuracy} | chosen
     method = config.integrator.method
     facts = settings("integrator", method)

@@ -1,5 +1,6 @@
 """What the journal of an unfinished study holds, as a kind of study reads it, and its rows."""
 
+import math
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -13,6 +14,9 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
 from flocsim.errors import FileError
 from flocsim.io.journal.records import CHUNK, Record
+
+MOST_CONDITIONS = 20_000
+"""Of a study that is read while it runs."""
 
 ORDER = ("types", "vertices", "delta")
 """Axes of conditions, as a session has them."""
@@ -49,6 +53,14 @@ def store_of(
 ) -> tuple[RowStore, list[dict], int]:  # fmt: skip
     """(rows of a journal that can be believed, notes on failed ones, bytes that are damaged);
     FileError where there is none."""
+    many = math.prod(len(axes[name]) for name in ORDER)
+    if many > MOST_CONDITIONS:
+        raise FileError(
+            f"{journal.path} is of {many} conditions, and no more than {MOST_CONDITIONS} are shown "
+            "before all are there: wait for the results"
+        )
+    if any(len(set(axes[name])) < len(axes[name]) for name in ORDER):
+        raise FileError(f"{journal.path} has conditions that are the same")
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
     places = {condition: place for place, condition in enumerate(conditions)}
     store, notes, unread = RowStore(journal, conditions, row), [], 0

@@ -10,8 +10,7 @@ import numpy as np
 from flocsim.ensembles.estimates.numerical import share_that_flips
 from flocsim.ensembles.estimates.paired import between, bounded_cells, bounded_newcombe
 from flocsim.ensembles.storage.identity import differences
-from flocsim.ensembles.storage.stored_json import stored
-from flocsim.ensembles.studies.opened import StudyResults
+from flocsim.ensembles.studies.opened import StudyResults, identity_in
 from flocsim.errors import UsageError
 from flocsim.io.labelled import Column, Labelled, Tables, about_of
 from flocsim.io.results.events import Events, approaches, events, kinds_of
@@ -227,7 +226,7 @@ ORDER = ("types", "vertices", "delta")
 
 def changes_between(first, second):
     """Lines on what the studies of two files differ in."""
-    lines = differences(*(stored(each.run, "identity") for each in (first, second)))
+    lines = differences(*map(identity_in, (first, second)))
     return tuple(
         line.replace(" in the file, ", " in the first, ").replace(" now", " in the second")
         for line in lines

@@ -2,39 +2,50 @@
 
 import functools
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from flocsim.ensembles.config.consent import Consent, read_sources
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.report import checked_line, format_table
-from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.studies.replicates import (
+    Place,
     chosen,
     one_count_study,
     place_of,
     recorded_methods,
     replicate_of,
+    row_in_words,
 )
-from flocsim.ensembles.study import Study
-from flocsim.errors import FileError, UsageError
+from flocsim.ensembles.study import Study, methods_of
+from flocsim.errors import ConfigError, FileError, UsageError
 from flocsim.fields import is_whole
+from flocsim.integrators.base import Integrator
 from flocsim.io.contents import RESULTS, STRENGTH, SWARM, SWEEP, content_of
 from flocsim.io.files import held
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, save
-from flocsim.io.results.file import read_results
+from flocsim.io.results.file import read_results, read_row
 from flocsim.io.results.schema import GROUPS, Results
 from flocsim.io.results.strength_file import Strengths
 from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.io.results.sweep_file import SweepResults
 from flocsim.trajectories.trajectory import Trajectory
+
+STEPS_MORE = 1000
+"""Steps beyond twice those of its row after which a replicate is given up as another one."""
+
+REPEATED = ("outcome", "inside", "bond")
+"""What of a row has to come out again."""
 
 INDICES = {name: group.index for name, group in GROUPS.items()}
 
@@ -50,8 +61,13 @@ class StudyResults(Tables):
 
     indices = INDICES
 
-    def __init__(self, results: Results, source: str | os.PathLike, folder: Path) -> None:
-        self.results, self.source, self.folder = results, source, folder
+    def __init__(
+        self, results: Results, source: str | os.PathLike, folder: Path | None,
+        sources: Sources | None = None,
+    ) -> None:  # fmt: skip
+        self.results, self.source = results, source
+        self.folder = Path(source).parent if folder is None else folder
+        self.trusted, self.sources = folder is not None, sources or Sources()
         self.path = Path(source)
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
@@ -74,7 +90,26 @@ class StudyResults(Tables):
         text = str(self.run.get("config", ""))
         if not text:
             raise FileError(f"{self.path} holds no config: it was not written by flocsim ensemble")
-        return load_config(self.folder / "study.toml", self.stored("overrides"), Sources(text))
+        if self.sources.config is None:
+            self.sources.config = text
+            self.sources.consent = None if self.trusted else Consent(str(self.path), self.modules)
+        try:
+            return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+        except ConfigError as error:
+            line, *more = str(error).split("\n")
+            further = f" (and {len(more)} more)" if more else ""
+            raise ConfigError(
+                f"the config in {self.path} cannot be used: {line}{further}"
+            ) from error
+
+    @property
+    def modules(self) -> dict[str, dict[str, str]]:
+        """{place: {digest, source}} of the user's own modules that were run; none in files of
+        before."""
+        try:
+            return read_sources(self.run)
+        except ValueError as error:
+            raise FileError(f"{self.path} holds no readable results: {error}") from error
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
@@ -117,7 +152,8 @@ class StudyResults(Tables):
         Of a collision type (default: the first), with so many vertices (the last) at a displacement
         (the first). UsageError where the file does not have it, where the config's library or own
         modules are not where the results lie (``flocsim.open(path, folder=…)`` says where), and
-        where this flocsim would compute something else than the file holds.
+        where this flocsim computes something else than the file holds. Own modules that are not
+        what the file was made with are run only where ``folder`` is given.
         """
         if not is_whole(replicate) or not 0 <= replicate < self.count:
             raise UsageError(
@@ -129,7 +165,31 @@ class StudyResults(Tables):
         ):  # fmt: skip
             chosen(value, known, name, 0)
         place = place_of(self.config, type, vertices, delta)
-        return replicate_of(int(replicate), place, self.study_with(place[1]))
+        study, row = self.study_with(place[1]), self.row(int(replicate), place)
+        found = replicate_of(int(replicate), place, study, STEPS_MORE + 2 * int(row["steps"]))
+        self.hold(found, row)
+        return found
+
+    def row(self, replicate: int, place: Place) -> dict[str, Any]:
+        """The stored row of a replicate, in words."""
+        name = self.config.scene.names[place[0]]
+        at = (
+            list(self.types).index(name), self.vertices.tolist().index(place[1]),
+            self.delta.tolist().index(place[2]), replicate,
+        )  # fmt: skip
+        if "replicates" in vars(self):
+            return row_in_words({each: self.replicates[each][at] for each in self.replicates})
+        return row_in_words(read_row(self.source, at))
+
+    def hold(self, found: Trajectory, row: Mapping[str, Any]) -> None:
+        """UsageError where a replicate has come out otherwise than its row says."""
+        assert found.row is not None, "a replicate of a study"
+        for name in REPEATED:
+            if found.row[name] != row[name]:
+                raise UsageError(
+                    f"{self.path} cannot be run again as it was: {name} is {row[name]} in the "
+                    f"file, {found.row[name]} now; use the kind of machine that it was made with"
+                )
 
     def study_with(self, vertices: int) -> Study:
         """The study of the file with bodies of so many vertices, ready to run replicates again.
@@ -137,27 +197,72 @@ class StudyResults(Tables):
         UsageError where this flocsim would compute something else than the file holds.
         """
         if vertices not in self.studies:
-            methods = recorded_methods(self.stored("accuracy"))
-            study = one_count_study(self.config, vertices, methods)
-            if unlike := differences(self.stored("identity"), identity_of(study)):
-                raise UsageError(
-                    f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
-                    "files and the kind of machine that it was made with"
-                )
+            config, identity = self.config, self.stored("identity")
+            methods = recorded_methods(self.stored("accuracy")) or self.methods()
+            if lacking := set(config.scene.names) - methods.keys():
+                self.refuse([f"no method is known for the type {min(lacking)}"])
+            # What costs nothing comes first: flocs may take hours.
+            before = facts_before(config, methods)
+            self.refuse(differences({k: v for k, v in identity.items() if k in before}, before))
+            self.refuse(self.contradictions())
+            study = one_count_study(config, vertices, methods)
+            self.refuse(differences(identity, identity_of(study)))
             self.studies[vertices] = study
         return self.studies[vertices]
+
+    def refuse(self, unlike: Sequence[str]) -> None:
+        """UsageError where something differs from what the file says."""
+        if unlike:
+            raise UsageError(
+                f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
+                "files and the kind of machine that it was made with"
+            )
+
+    def methods(self) -> dict[str, Integrator]:
+        """The methods of a config that needs no pilot."""
+        if self.config.integrator.is_chosen:
+            raise FileError(f"{self.path} does not say what methods its pilot has chosen")
+        return methods_of(self.config)
+
+    def contradictions(self) -> list[str]:
+        """What the config asks for that the file does not have, a line each."""
+        shapes, lines = self.config.shapes, []
+        lacking = set(self.config.scene.names) - set(self.types)
+        if lacking:
+            lines.append(f"its config has the type {min(lacking)}, its rows have not")
+        grown = shapes.own is None and shapes.source == "synthetic" and max(shapes.vertices) > 1
+        if grown and len(self.results.flocs) != shapes.pool:
+            lines.append(
+                f"its config asks for {shapes.pool} flocs, its rows have {len(self.results.flocs)}"
+            )
+        return lines
 
     def __repr__(self) -> str:
         shape = " × ".join(map(str, self.results.shape))
         return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
 
 
+def identity_in(results: StudyResults | SwarmResults) -> dict[str, Any]:
+    """What the rows of results follow from, as their file says; FileError where nobody can read
+    it."""
+    try:
+        found: dict[str, Any] = stored(results.run, "identity")
+        return found
+    except ValueError as error:
+        where = getattr(results, "path", "a file of swarms")
+        raise FileError(f"{where} holds no readable results: {error}") from error
+
+
 Opened = StudyResults | SweepResults | SwarmResults | Strengths
 
 
-def open_results(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> StudyResults:
-    """A results file of pairs or rates; see `open_any`."""
-    found = opened(path, (RESULTS,), folder)
+def open_results(
+    path: str | os.PathLike, folder: str | os.PathLike | None = None,
+    sources: Sources | None = None,
+) -> StudyResults:  # fmt: skip
+    """A results file of pairs or rates; see `open_any`. ``sources``: what has been read of its
+    modules and libraries."""
+    found = opened(path, (RESULTS,), folder, sources)
     assert isinstance(found, StudyResults)
     return found
 
@@ -166,14 +271,15 @@ def open_any(path: str | os.PathLike, folder: str | os.PathLike | None = None) -
     """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked;
     the table of replicates of pairs stays on the disk until it is asked for.
 
-    ``folder``: where the config of a study lay, its shape library and its own modules (default:
-    where the results lie). FileError for a file that is absent, damaged, or of another kind.
+    ``folder``: where the config of a study lay, its shape library and its own modules, which are
+    run then whatever they are (default: where the results lie). FileError for a file that is
+    absent, damaged, or of another kind.
     """
     return opened(path, (RESULTS, SWARM, SWEEP, STRENGTH), folder)
 
 
-def opened(path, kinds, folder=None):
+def opened(path, kinds, folder=None, sources=None):
     """What a file of one of these kinds holds; see `open_any`."""
-    source, where = held(path), Path(path).parent if folder is None else Path(folder)
+    source, where = held(path), None if folder is None else Path(folder)
     kind, found = content_of(source, kinds)
-    return StudyResults(found, source, where) if kind == RESULTS else found
+    return StudyResults(found, source, where, sources) if kind == RESULTS else found

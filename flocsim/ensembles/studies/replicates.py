@@ -58,20 +58,28 @@ def one_count_study(
 
 
 def recorded_methods(record: dict) -> dict[str, Integrator] | None:
-    """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record."""
+    """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record.
+    UsageError for methods that are none."""
+    for each in record.get("types", []):
+        chosen(each["method"], tuple(METHODS), "the method of a pilot's choice", 0)
     return {
         each["name"]: METHODS[each["method"]](each["tolerance"]) for each in record.get("types", [])
     } or None
 
 
-def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
-    """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words."""
+def replicate_of(replicate: int, place: Place, study: Study, most: int | None = None) -> Trajectory:
+    """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words.
+
+    ``most`` steps, where they are less than the config's.
+    """
     if not is_whole(replicate) or not replicate >= 0:
         raise UsageError(f"replicate must be a whole number from 0, found {replicate!r}")
     began, draw = time.perf_counter(), study.draw(*place, int(replicate))
     driver, system = study.driver(draw.encounter), draw.encounter.system
 
     def attempt(steps: int, method: Integrator | None = None) -> tuple[dict, Trajectory]:
+        steps = steps if most is None else min(most, steps)
+
         def fresh(record: bool = False) -> Run:
             return draw.begin(driver, steps, integrator=method, record=record)
 

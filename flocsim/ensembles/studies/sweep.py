@@ -32,8 +32,7 @@ from flocsim.ensembles.storage.plan import (
     read_plan,
     write_plan,
 )
-from flocsim.ensembles.storage.stored_json import stored
-from flocsim.ensembles.studies.opened import StudyResults, open_any
+from flocsim.ensembles.studies.opened import StudyResults, identity_in, open_any
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
@@ -187,9 +186,9 @@ def facts_in(results: Part) -> Facts:
     if isinstance(results, SwarmResults):
         asked = {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))],
                  "delta": [0.0], "replicates": len(results.scales["replicate"])}  # fmt: skip
-        return stored(results.run, "identity") | {"asked": asked}
+        return identity_in(results) | {"asked": asked}
     axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
-    return results.stored("identity") | {"asked": axes | {"replicates": results.count}}
+    return identity_in(results) | {"asked": axes | {"replicates": results.count}}
 
 
 def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[str, Swept]:

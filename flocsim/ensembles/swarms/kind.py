@@ -93,7 +93,7 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
 def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
     """{name: text or number} of all that the replicates of a study follow from."""
     config, swarm = study.config, study.first
-    facts = config_facts(study, ("scene", "shapes", "bodies", "fluid"))
+    facts = config_facts(study.config, ("scene", "shapes", "bodies", "fluid"))
     facts |= machine or machine_facts(CODE)
     facts["shapes.vertices"] = list(config.shapes.vertices)
     shapes = [floc.shapes.get(study.vertices) for floc in study.flocs]
@@ -141,6 +141,8 @@ def results(
         new = groups_of(form, found, store.journal.read)
         groups = appended(groups, new) if groups else new
     groups["ends"] = {name: store.read(0, name, 0, count) for name in ENDS}
+    # Of the rows, as a run that found all of them has made no trial itself.
+    run["trial"] = f"{int(store.read(0, 'trial', 0, 1)[0]):016x}"
     made = results_from(form, groups, run)
     if output is not None:
         write_swarm(output, made, start.replacing)
@@ -160,10 +162,7 @@ def first_of(found: SwarmResults, count: int) -> dict[str, dict[str, np.ndarray]
 
 def facts(study: SwarmStudy) -> dict[str, Any]:
     """What the results say of a study besides their groups."""
-    return {
-        "periodic": study.scene.periodic, "trial": f"{study.trial:016x}",
-        "vertices": study.vertices,
-    }  # fmt: skip
+    return {"periodic": study.scene.periodic, "vertices": study.vertices}
 
 
 def verdict(found: SwarmResults) -> tuple[int, str]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.groups import scalars_in
+from flocsim.io.groups import Group, scalars_in
 from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.results.kernel_group import KERNEL_GROUP
@@ -36,13 +36,16 @@ BOUND_CLASSES = [CLASSES.index(name) for name in AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
-def check_structure(nodes: Mapping[str, Node]) -> None:
-    """ValueError unless the groups and datasets of a file are those of results."""
-    declared = {**GROUPS, "kernel": KERNEL_GROUP, "flocs": FLOCS}
-    groups = {name: group.arrays for name, group in declared.items()}
-    groups["run"] = scalars_in(nodes, "run")
+def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = GROUPS) -> None:
+    """ValueError unless the groups and datasets of a file are those of results.
+
+    ``groups``: as the version of the file has them.
+    """
+    declared = {**groups, "kernel": KERNEL_GROUP, "flocs": FLOCS}
+    wanted = {name: group.arrays for name, group in declared.items()}
+    wanted["run"] = scalars_in(nodes, "run")
     known = {axis: len(words) for axis, words in WORDS.items()}
-    lengths = hold_against(nodes, groups, groups.keys() - set(OPTIONAL), known)
+    lengths = hold_against(nodes, wanted, wanted.keys() - set(OPTIONAL), known)
     if not 0 < lengths["type"] * lengths["vertices"] * lengths["delta"] <= MOST_CONDITIONS:
         raise ValueError(f"there are no conditions, or more than {MOST_CONDITIONS}")
     kinds = {"flag_meanings": ("text", ()), "flag_values": ("u1", None)}
@@ -59,7 +62,7 @@ def check_coordinates(file: Any) -> None:
         for axis in {*AXES} & group.keys():
             if group[axis][()].tolist() != first[axis][()].tolist():
                 raise ValueError(f"{group.name.strip('/')}/{axis} is not probabilities/{axis}")
-    for name in RADII if "pooled" in file else ():
+    for name in {*RADII} & first.keys() if "pooled" in file else ():
         if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
             raise ValueError(f"pooled/{name} is not probabilities/{name}")
     lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics")
@@ -117,11 +120,15 @@ def beyond(values, least, most):
     return bool(np.any((values < least - ROUNDING) | (values > most + ROUNDING)))
 
 
-def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -> None:
+def check_rows(
+    column: Callable[[str], np.ndarray], failures: int, flocs: int,
+    lacking: frozenset[str] = frozenset(),
+) -> None:  # fmt: skip
     """ValueError for rows of replicates that no run can have given.
 
     ``column(name)`` gives the values of a column, all of one shape; ``failures``, ``flocs``: how
-    many words and flocs the codes may stand for, no flocs where that is unknown.
+    many words and flocs the codes may stand for, no flocs where that is unknown; ``lacking``:
+    columns that a file of an older version does not have.
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
@@ -145,12 +152,14 @@ def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -
     ended = outcome != FAILED
     for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
         refuse_row(ended & ~np.isfinite(column(name)), name)
-    for name in ("r_i", "r_j", "D_0"):
+    for name in {"r_i", "r_j", "D_0"} - lacking:
         values = column(name)
         refuse_row(ended & ~((values > 0.0) & np.isfinite(values)), name)
     touched = ended & (inside != NOT_APPLICABLE)
     for name in ("d_c_collision", "d_c_max", "t_collision"):
         refuse_row(touched & ~np.isfinite(column(name)), name)
+    if "D_0" in lacking:
+        return
     with np.errstate(invalid="ignore", over="ignore"):
         expected = column("d_c_over_D_0") * column("D_0")
         apart = np.abs(expected - column("d_c_collision"))

@@ -30,6 +30,7 @@ from flocsim.errors import FileError
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import scalar_of, values_of
 from flocsim.io.opening import opened_file, text_of
+from flocsim.io.results import older
 from flocsim.io.results.checks import (
     CODED,
     check_codes,
@@ -65,6 +66,7 @@ __all__ = [
     "first_of_each",
     "read_overview",
     "read_results",
+    "read_row",
     "same_data",
     "write_results",
 ]
@@ -133,13 +135,32 @@ def results_in(file, replicates):
     )
     check_tables(results)
     if results.replicates is not None:
-        check_rows(results.replicates.__getitem__, len(results.failures), len(results.flocs))
+        check_rows(
+            results.replicates.__getitem__, len(results.failures), len(results.flocs),
+            lacking_in(file),
+        )  # fmt: skip
     return results
+
+
+def lacking_in(file):
+    """The columns that the replicates of an open file do not have, as it is of an older version."""
+    return older.lacking(older.version_of(file), "replicates")
 
 
 def read_group(file, name, schema):
     """The arrays of a group that a file may lack."""
     return {each: file[name][each][()] for each in schema} if name in file else {}
+
+
+def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:
+    """{column: value} of one replicate, at (type, vertices, delta, replicate); FileError as
+    `read_results`, and for values that no run can have given."""
+    with opened(path) as file:
+        rows = file["replicates"]
+        found = {name: rows[name][place] for name in REPLICATES}
+        reasons = len(rows["failure"].attrs["flag_meanings"].split())
+        check_rows(lambda name: np.asarray(found[name]), reasons, 0, lacking_in(file))
+        return found
 
 
 SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
@@ -220,9 +241,10 @@ def parts_of(shape):
 
 @contextlib.contextmanager
 def opened(path: str | os.PathLike) -> Iterator[Any]:
-    """An open h5py file of a known schema, once the checksum over all of it was found right.
+    """An open h5py file of this schema, once the checksum over all of it was found right.
 
-    And once its structure was found to be one that flocsim writes: HDF5 sees no other.
+    And once its structure was found to be one that flocsim writes: HDF5 sees no other. A file of an
+    older schema is made into one of this in memory.
     """
     with opened_file(
         path, lambda reason: f"{path} holds no readable results: {reason}; run it again"
@@ -235,11 +257,17 @@ def opened(path: str | os.PathLike) -> Iterator[Any]:
                 f"{path} is not a results file{found}: name one that flocsim ensemble wrote"
             )
         version = read_version(file, known)
+        if version in older.VERSIONS:
+            with older.as_now(file, nodes, int(version)) as now:
+                yield now
+            return
         if version != SCHEMA_VERSION:
             raise FileError(
                 f"{path} has results of schema version {version}, this flocsim reads "
-                f"{SCHEMA_VERSION}: read it with the version that wrote it"
+                f"{older.VERSIONS[0]} to {SCHEMA_VERSION}: read it with the version that wrote it"
             )
+        if older.WRITTEN_AS in known:
+            raise ValueError(f"it has an attribute {older.WRITTEN_AS}, which no file has")
         check_structure(nodes)
         check_coordinates(file)
         yield file

@@ -6,6 +6,8 @@ met inside HDF5, where it can end the process.
 """
 
 import io
+from collections.abc import Mapping
+from typing import Any
 
 import attrs
 import numpy as np
@@ -84,24 +86,47 @@ def frame_of(results: Results) -> Frame:
 
     frame = Frame()
     with h5py.File(frame.image, "w") as file:
-        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-        for name in ("probabilities", "pooled", "differences", "numerics"):
-            if getattr(results, name):
-                write_labelled(file.create_group(name), results.labelled(name))
-        if results.kernel is not None:
-            write_labelled(file.create_group("kernel"), results.kernel.labelled())
-        if results.flocs:
-            write_labelled(file.create_group("flocs"), FLOCS.labelled({"floc": results.flocs}))
+        write_tables(file, results)
         frame.streams = reserve_replicates(file, results)
         # Last, so that its length moves no byte of the groups before it.
-        group = file.create_group("run")
-        for name, value in results.run.items():
-            value = value.item() if isinstance(value, np.generic) else value
-            if not isinstance(value, str | int | float):
-                raise UsageError(f"run/{name} must be text or a number, found {value!r}")
-            # A bool would become an HDF5 enumeration, which few readers know.
-            group[name] = int(value) if isinstance(value, bool) else value
+        write_run(file, results)
     return frame
+
+
+def image_of(results: Results, attributes: Mapping[str, Any]) -> io.BytesIO:
+    """A whole results file in memory, with further attributes, and without a seal."""
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        write_tables(file, results)
+        write_labelled(file.create_group("replicates"), results.labelled("replicates"))
+        write_run(file, results)
+        file.attrs.update(attributes)
+    return image
+
+
+def write_tables(file, results):
+    """All groups but the replicates and where they came from."""
+    file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
+    for name in ("probabilities", "pooled", "differences", "numerics"):
+        if getattr(results, name):
+            write_labelled(file.create_group(name), results.labelled(name))
+    if results.kernel is not None:
+        write_labelled(file.create_group("kernel"), results.kernel.labelled())
+    if results.flocs:
+        write_labelled(file.create_group("flocs"), FLOCS.labelled({"floc": results.flocs}))
+
+
+def write_run(file, results):
+    """The group of what the results came from."""
+    group = file.create_group("run")
+    for name, value in results.run.items():
+        value = value.item() if isinstance(value, np.generic) else value
+        if not isinstance(value, str | int | float):
+            raise UsageError(f"run/{name} must be text or a number, found {value!r}")
+        # A bool would become an HDF5 enumeration, which few readers know.
+        group[name] = int(value) if isinstance(value, bool) else value
 
 
 def reserve_replicates(file, results):

@@ -264,7 +264,7 @@ def command(fake, tmp_path, monkeypatch):
     """Runs the command in a folder where study.h5 is the fake one."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.h5").write_bytes(b"never read here")
-    monkeypatch.setattr("flocsim.ensembles.studies.opened.open_results", lambda _: fake)
+    monkeypatch.setattr("flocsim.ensembles.studies.opened.open_results", lambda *_: fake)
     return lambda *words: program.main(["strength", "study.h5", *map(str, words)])
 
 

@@ -152,3 +152,14 @@ def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_pat
     ends = np.isin(first.replicates["outcome"], range(5)).sum(axis=-1)
     np.testing.assert_array_equal(comparison.arrays["pr_a_per_approach"]["n_first"], ends)
     assert "Pr[aggregation | decided approach]" in comparison.table("pr_a_per_approach")
+
+
+@pytest.mark.parametrize("identity", ['{"seed": 1e999}', '{"seed": 99999999999999999999}', "["])
+def test_what_no_flocsim_wrote_is_refused_in_one_line(tmp_path, monkeypatch, capsys, identity):
+    monkeypatch.chdir(tmp_path)
+    made = make_results()
+    write_results(tmp_path / "a.h5", attrs.evolve(made, run=made.run | {"identity": identity}))
+    write_results(tmp_path / "b.h5", made)
+    assert main(["compare", "a.h5", "b.h5"]) == 74
+    [line] = capsys.readouterr().err.splitlines()
+    assert "a.h5 holds no readable results: run/identity cannot be read" in line

@@ -18,7 +18,7 @@ from flocsim.ensembles.swarms.checks import check_part
 from flocsim.ensembles.swarms.records import Left, Part, part_of
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.study import SwarmStudy
-from flocsim.errors import UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.io import terminal
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
@@ -273,6 +273,26 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
         for name, values in columns.items():
             assert after[group][name][: len(values)].tobytes() == values.tobytes()
     assert read_swarm(tmp_path / "swarm.h5").run["sessions"] == 2
+
+
+def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, monkeypatch):
+    """Killed between the last row and the file: the next run computes nothing, makes no trial."""
+    from flocsim.ensembles.swarms import kind
+
+    monkeypatch.chdir(tmp_path)
+    path = write_swarm_study(tmp_path)
+
+    def full(*words):
+        raise FileError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kind, "write_swarm", full)
+        assert main(["swarm", str(path), "--quiet"]) == 74
+    assert main(["swarm", str(path), "--quiet", "--resume"]) == 0
+    assert read_swarm("swarm.h5").run["computed"] == 0
+    assert read_swarm("swarm.h5").run["trial"] == read_swarm(finished / "swarm.h5").run["trial"]
+    assert main(["swarm", str(path), "--quiet", "--resume", "--replicates", "3"]) == 0
+    assert len(read_swarm("swarm.h5").scales["replicate"]) == 3
 
 
 def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):

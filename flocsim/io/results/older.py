@@ -1,0 +1,174 @@
+"""Results files of earlier schema versions, read as files of this one.
+
+What a version added is listed in ADDED. Arrays that an older file lacks are blank: NaN where nobody
+estimated or measured, 0 where nothing was counted, and codes that say "not applicable"; nothing is
+computed anew but the counts of bonds, which stand in the rows. A file of each version lies in
+tests/data.
+
+All of the file is taken into memory. Its rows are never added to: what they mean has changed since,
+as `Addition.meaning` says.
+"""
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.io.groups import Group, scalar_of, values_of
+from flocsim.io.hdf5.structure import Node
+from flocsim.io.opening import parsed
+from flocsim.io.results.checks import check_coordinates, check_structure
+from flocsim.io.results.layout import SCHEMA_VERSION, image_of
+from flocsim.io.results.schema import (
+    BLANKS,
+    BONDS,
+    BOUNDS,
+    CHANGES,
+    COORDINATES,
+    DIFFERENCES,
+    GROUPS,
+    POOLED,
+    PROBABILITIES,
+    RADII,
+    REPLICATES,
+    TABLE,
+    Results,
+    tail_of,
+)
+
+MOST_ROWS = 2**23
+"""Of a file that is taken into memory, 1.5 GB."""
+
+WRITTEN_AS = "written_as_version"
+"""Attribute of a file that was made of an older one."""
+
+BY_BOND = ("pr_sticks", "pr_hangs", "pr_bond")
+
+
+@attrs.frozen
+class Addition:
+    """What came with a version: {group: names}, and what rows of before it are not."""
+
+    names: Mapping[str, frozenset[str]]
+    meaning: str
+
+
+ADDED = {
+    3: Addition(
+        {
+            "probabilities": frozenset(
+                {"n_bond", "n_checked", "n_flipped"}
+                | {f"{name}_numerical" for name in PROBABILITIES}
+                | {f"{name}{bound}" for name in BY_BOND for bound in BOUNDS}
+                | {f"{count}_{name}" for count in CHANGES for name in PROBABILITIES}
+            ),
+            "pooled": frozenset(
+                name for name in POOLED
+                if name.endswith("_numerical") or any(each in name for each in BY_BOND)
+            ),
+            "replicates": frozenset({"checked_outcome", "checked_inside", "checked_bond"}),
+        },
+        "none was run again for its numerical error",
+    ),
+    4: Addition(
+        {
+            "probabilities": frozenset(RADII),
+            "pooled": frozenset(RADII),
+            "replicates": frozenset({*RADII, "D_0", "d_c_over_D_0"}),
+        },
+        "they do not have the radii and D_0 that each was run with",
+    ),
+    5: Addition(
+        {"probabilities": frozenset({"n_held"})},
+        "pairs that rest apart without touching are not told from those that miss",
+    ),
+}  # fmt: skip
+"""Version → what it added to that before it."""
+
+VERSIONS = tuple(version - 1 for version in ADDED)
+
+
+def lacking(version: int, group: str) -> frozenset[str]:
+    """The names that a group of an older file does not have."""
+    since = [each.names.get(group, ()) for number, each in ADDED.items() if number > version]
+    return frozenset().union(*since)
+
+
+def version_of(file: Any) -> int:
+    """The version as which an open file was written."""
+    return int(file.attrs.get(WRITTEN_AS, SCHEMA_VERSION))
+
+
+def why_apart(file: Any) -> str:
+    """Why no rows are added to those of an open file; "" where they are of this version."""
+    version = version_of(file)
+    said = [each.meaning for number, each in ADDED.items() if number > version]
+    return f"its rows are of schema version {version}: {'; '.join(said)}" if said else ""
+
+
+def groups_of(version: int) -> dict[str, Group]:
+    """The groups as an older version had them."""
+    found = {}
+    for name, group in GROUPS.items():
+        missing = lacking(version, name)
+        columns = {key: each for key, each in group.columns.items() if key not in missing}
+        beside = {key: each for key, each in group.beside.items() if key not in missing}
+        found[name] = Group.of(columns, COORDINATES, beside)
+    return found
+
+
+@contextlib.contextmanager
+def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
+    """An open file of an older version as one of this, in memory; ValueError for what no such
+    version wrote."""
+    groups = groups_of(version)
+    check_structure(nodes, groups)
+    check_coordinates(file)
+    if np.prod(nodes["replicates/outcome"].shape, dtype=object) > MOST_ROWS:
+        raise ValueError(
+            f"it has more than {MOST_ROWS} rows of schema version {version}: read it with the "
+            "flocsim that wrote it"
+        )
+    image = image_of(results_of(file, groups), {WRITTEN_AS: version})
+    with parsed(image, len(image.getbuffer())) as (now, _):
+        yield now
+
+
+def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
+    """The Results in an open file of an older version."""
+    found = {name: group.read(file[name]) for name, group in groups.items() if name in file}
+    table, rows = found["probabilities"], found["replicates"]
+    shape = len(table["type"]), len(table["vertices"]), len(table["delta"])
+    blank = {name: np.full((*shape, *tail_of(name)), blank_of(TABLE[name])) for name in TABLE}
+    blank["n_bond"] = np.stack(
+        [np.sum(rows["bond"] == 1 + code, axis=-1) for code in range(len(BONDS))], axis=-1
+    )
+    pooled = {name: np.full(shape[:2], blank_of(POOLED[name])) for name in POOLED}
+    columns = {
+        name: np.full(rows["outcome"].shape, BLANKS[kind])
+        for name, (kind, _, _) in REPLICATES.items()
+    }
+    radii = {name: np.full(shape[0], np.nan) for name in RADII}
+    return Results(
+        types=table["type"], vertices=table["vertices"], delta=table["delta"],
+        replicates=filled(columns, rows), probabilities=filled(blank, table),
+        run={name: scalar_of(dataset) for name, dataset in file["run"].items()},
+        failures=file["replicates/failure"].attrs["flag_meanings"].split(),
+        flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
+        pooled=filled(pooled, found["pooled"]) if "pooled" in found else {},
+        differences={name: found["differences"][name] for name in DIFFERENCES}
+        if "differences" in found else {},
+        radii=filled(radii, table),
+    )  # fmt: skip
+
+
+def blank_of(about):
+    """What stands in a table for what was not looked at."""
+    return 0 if about[0] == "i8" else np.nan
+
+
+def filled(blank, known):
+    """The blank arrays, and in the place of those that are known these."""
+    return {name: known.get(name, values) for name, values in blank.items()}
