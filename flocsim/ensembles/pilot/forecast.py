@@ -15,12 +15,13 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.checking import MORE_STEPS, count_checks
+from flocsim.ensembles.collision.checking import MORE_STEPS, expected_checks
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
 from flocsim.ensembles.pilot.trials import Job, Trial, is_flip, try_out
 from flocsim.ensembles.study import Study
 from flocsim.io.pieces import seal_size
+from flocsim.io.results.events import flips_easily
 from flocsim.io.results.layout import frame_of
 from flocsim.io.results.row_file import plan_of
 from flocsim.io.results.schema import (
@@ -182,7 +183,7 @@ class Spent(NamedTuple):
 
 
 def estimated(
-    groups: Sequence[Spent], count: int, checks: int, fixed: float, seed: int
+    groups: Sequence[Spent], count: int, checks: Sequence[float], fixed: float, seed: int
 ) -> tuple[Estimate, float]:
     """(CPU time [s] of all, share of second runs) from the types' replicates.
 
@@ -191,12 +192,12 @@ def estimated(
     random = np.random.default_rng(seed)
     sizes = [len(each.first) for each in groups]
     whole = sum(
-        each.work(count, checks, np.arange(n)[None])[0]
-        for each, n in zip(groups, sizes, strict=True)
+        each.work(count, seconds, np.arange(n)[None])[0]
+        for each, n, seconds in zip(groups, sizes, checks, strict=True)
     )
     drawn = sum(
-        each.work(count, checks, random.integers(0, n, (RESAMPLES, n))).sum(axis=1)
-        for each, n in zip(groups, sizes, strict=True)
+        each.work(count, seconds, random.integers(0, n, (RESAMPLES, n))).sum(axis=1)
+        for each, n, seconds in zip(groups, sizes, checks, strict=True)
     )
     value = fixed + float(np.sum(whole))
     # What has been run of the study is known; few replicates vary less than what they are of.
@@ -213,14 +214,14 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     config = study.config
     count = expected_replicates(config.replicates, config.stop)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
-    checks = cells * count_checks(config.seed, count, config.integrator.check_share)
     fixed = START * ranks + before + setting_up(study, runs, ranks)
     fixed += EACH * cells * count * len(config.scene.names)
-    groups = []
+    groups, checks = [], []
     for place in range(len(config.scene.names)):
         mine = [run for run in runs if run.task.condition == place]
         seconds = [run.second.cpu if run.second else math.nan for run in mine]
         groups.append(Spent(np.array([run.first.cpu for run in mine]), np.array(seconds)))
+        checks.append(cells * second_runs(mine, count, config.integrator.check_share))
     work, again = estimated(groups, cells * count, checks, fixed, config.seed)
     size = file_size(study, count)
     least = count if config.stop.half_width is None else min(config.stop.least, count)
@@ -230,6 +231,14 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     seen = {run.task[:3] for run in runs}
     hours = Estimate(*(part / 3600.0 for part in work))
     return Forecast(hours, again, bounds, list(runs), len(seen), count)
+
+
+def second_runs(runs: Sequence[Timed], count: int, share: float | str) -> float:
+    """How many of ``count`` replicates of a condition are run again, if as many flip easily as of
+    these."""
+    easily = np.mean([flips_easily(run.first.outcome, run.first.bond) for run in runs])
+    few, many = (expected_checks(count, share, each) for each in (False, True))
+    return few + float(easily) * (many - few)
 
 
 def file_size(study: Study, count: int) -> float:

@@ -32,7 +32,7 @@ class Job(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """What came of a Job: outcome and inside as in the results file, its cost [evaluations of
+    """What came of a Job: outcome, inside and bond as in the results file, its cost [evaluations of
     Implicit], the time [s] that it simulated; CPU times [s] of its run, and of what was made for
     its two flocs before (0: it was there)."""
 
@@ -42,6 +42,7 @@ class Trial(NamedTuple):
     time: float = 0.0
     cpu: float = 0.0
     setup: float = 0.0
+    bond: int = NOT_APPLICABLE
 
 
 def try_out(
@@ -70,9 +71,8 @@ def try_out(
     except Exception:
         return Trial(cpu=clock() - began, setup=setup), None
     cost = WEIGHTS.get(type(job.integrator), 1.0) * int(run.work.tally[EVALUATIONS])
-    found = Trial(
-        int(row["outcome"]), int(row["inside"]), cost, run.time, clock() - began, setup
-    )  # fmt: skip
+    outcome, inside, bond = (int(row[name]) for name in ("outcome", "inside", "bond"))
+    found = Trial(outcome, inside, cost, run.time, clock() - began, setup, bond)
     return found, run
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from flocsim.ensembles.collision.checking import expected_checks
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.pilot.forecast import (
     CLOCK,
@@ -16,6 +17,7 @@ from flocsim.ensembles.pilot.forecast import (
     forecast_of,
     in_turn,
     pairs_made,
+    second_runs,
     setting_up,
     time_replicates,
     timed,
@@ -23,6 +25,7 @@ from flocsim.ensembles.pilot.forecast import (
 from flocsim.ensembles.pilot.trials import Trial
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.study import Study
+from flocsim.io.results.events import CERTIFICATE, HOOK
 from tests.helpers.small_study import small_config, small_study
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 40}
@@ -35,7 +38,7 @@ def never():
 def test_known_times_are_added_up():
     first = np.array([1.0, 3.0, 1.0, 3.0])
     second = np.array([2.0, 6.0, math.nan, math.nan])
-    found, share = estimated([Spent(first, second)] * 2, 1000, 100, 50.0, seed=1)
+    found, share = estimated([Spent(first, second)] * 2, 1000, [100, 100], 50.0, seed=1)
     assert found.value == pytest.approx(50.0 + 2 * (1000 * 2.0 + 100 * 4.0))
     assert share == pytest.approx(2 * 100 * 4.0 / found.value)
     assert found.low < found.value < found.high
@@ -44,8 +47,8 @@ def test_known_times_are_added_up():
 def test_what_was_run_whole_is_as_sure_as_the_clock():
     times = np.random.default_rng(1).lognormal(0.0, 1.0, 300)
     none = np.full(300, math.nan)
-    all_of_it, _ = estimated([Spent(times, none)], 300, 0, 0.0, seed=1)
-    part_of_it, _ = estimated([Spent(times, none)], 30_000, 0, 0.0, seed=1)
+    all_of_it, _ = estimated([Spent(times, none)], 300, [0], 0.0, seed=1)
+    part_of_it, _ = estimated([Spent(times, none)], 30_000, [0], 0.0, seed=1)
     assert all_of_it.high / all_of_it.value == pytest.approx(math.exp(1.97 * CLOCK), rel=0.01)
     assert part_of_it.high / part_of_it.value > 1.01 * all_of_it.high / all_of_it.value
 
@@ -56,7 +59,7 @@ def test_the_interval_holds_the_truth_of_heavy_tails_mostly(count):
     random, covered = np.random.default_rng(5), 0
     for seed in range(200):
         times = random.lognormal(0.0, 1.0, count)
-        found, _ = estimated([Spent(times, np.full(count, math.nan))], 10**6, 0, 0.0, seed)
+        found, _ = estimated([Spent(times, np.full(count, math.nan))], 10**6, [0], 0.0, seed)
         covered += found.low <= 10**6 * math.exp(0.5) <= found.high
     assert covered >= 0.85 * 200
 
@@ -129,3 +132,13 @@ def test_a_rule_that_may_end_the_study_widens_the_file(tmp_path):
     found = forecast_of(study, runs, 1, 0.0)
     assert found.replicates == 97
     assert found.size.low < 0.8 * found.size.value < 3.0 * found.size.value < found.size.high
+
+
+def test_second_runs_are_more_of_those_that_flip_easily():
+    hook, sure = (Timed(None, Trial(outcome=0, bond=bond)) for bond in (HOOK, CERTIFICATE))
+    few, some, all_of_them = (
+        second_runs(runs, 1000, "auto") for runs in ([sure], [sure, sure, hook, hook], [hook])
+    )
+    assert few == expected_checks(1000, "auto")
+    assert all_of_them == 3 * few and some == 2 * few
+    assert second_runs([hook], 1000, 0.1) == 100.0
