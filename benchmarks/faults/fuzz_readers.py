@@ -84,12 +84,13 @@ def read_library_file(path):
     from flocsim.commands.info import library_text
     from flocsim.io.shapes.library import read_library
 
-    for entry in read_library(path):
+    entries = read_library(path)
+    for entry in entries:
         for fit in entry.fits.values():
             assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
             assert math.isfinite(fit.shape.area)
         assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
-    library_text(path)
+    library_text(path, entries)
 
 
 def read_picture_file(path):
@@ -141,7 +142,7 @@ def read_swarm_file(path):
     for replicate in range(min(replicates, 3)):
         for body in range(min(bodies, 5)):
             assert math.isfinite(shape_of(found, replicate, body).area)
-    swarm_text(path)
+    swarm_text(path, found)
 
 
 class SwarmJournalReader:

@@ -385,7 +385,8 @@ def wrongs(words):
     out, err = io.StringIO(), io.StringIO()
     signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    began, code, trace = time.process_time(), 0, ""
+    # A copied process begins with the memory of the first one.
+    began, before, code, trace = time.process_time(), most_memory(), 0, ""
     limit = int(began + 2 * LONGEST) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))
     try:
@@ -411,11 +412,16 @@ def wrongs(words):
         yield f"unprintable: {out.getvalue()!r}"[:1000]
     if lasted > LONGEST:
         yield f"takes {lasted:.1f} s"
-    if (memory := 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) > MOST_MEMORY:
+    if (memory := most_memory() - before) > MOST_MEMORY:
         yield f"takes {memory / 2**20:.0f} MiB"
     if os.path.exists(MARK):
         os.unlink(MARK)
         yield "runs foreign code"
+
+
+def most_memory():
+    """What this process has taken of memory at most [bytes]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 WARNING = "flocsim: warning: "
