@@ -114,7 +114,10 @@ def over_displacements(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
 
 def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
     """How many more flip at most, of all kinds together: arrays (kind, type, vertices, …), whose
-    rates are compared among the conditions of one N, those of each class by themselves."""
+    rates are compared among the conditions of one N, those of each class by themselves.
+
+    Of a kind of which none was run again at this N all may flip; NaN where no replicate was.
+    """
     if flipped.ndim > checked.ndim:
         each = [further_of_kinds(flipped[..., k], checked, exposed)
                 for k in range(flipped.shape[-1])]  # fmt: skip
@@ -125,9 +128,9 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
         together = [np.s_[:, n] for n in range(len(total[0]))]
     for kind in range(len(flipped)):
         for at in together:
-            total[at] += further_flips(
-                flipped[kind][at], checked[kind][at], exposed[kind][at], EACH_SIDE
-            )
+            more = further_flips(flipped[kind][at], checked[kind][at], exposed[kind][at], EACH_SIDE)
+            some = np.any(checked[(slice(None), *np.index_exp[at])])
+            total[at] += np.where(np.isnan(more) & some, np.ceil(exposed[kind][at]), more)
     return total
 
 

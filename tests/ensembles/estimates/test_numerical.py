@@ -7,6 +7,7 @@ from scipy.stats import nbinom
 from flocsim.ensembles.estimates.numerical import (
     change_intervals,
     count_changes,
+    further_of_kinds,
     numerical_errors,
     over_displacements,
 )
@@ -229,3 +230,12 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
     for name, values in numerical_errors(over_displacements(counted)).items():
         if name not in ("pr_class_numerical", "pr_bond_numerical"):
             np.testing.assert_array_equal(tables.pooled[name], values)
+
+
+def test_of_a_kind_that_was_never_run_again_all_may_flip():
+    checked = np.array([[[0], [0]], [[12], [12]]])  # of (kind, type, N)
+    exposed = np.array([[[2.0], [0.0]], [[0.0], [0.0]]])
+    more = further_of_kinds(np.zeros((2, 2, 1)), checked, exposed)
+    assert more.tolist() == [[2.0], [0.0]]
+    nothing = further_of_kinds(np.zeros((2, 2, 1)), np.zeros((2, 2, 1)), exposed)
+    assert np.isnan(nothing[0, 0]) and nothing[1, 0] == 0.0
