@@ -33,11 +33,7 @@ CONCERNED = {
 """Section → the tests that know of what it adds."""
 
 
-VERSION = (
-    "--deselect",
-    "tests/io/results/test_older_schemas.py::"
-    "test_what_is_written_now_is_what_the_file_of_this_version_has",
-)
+VERSION = ("--ignore", "tests/io/results/test_older_schemas.py")
 """What asks for the version, the migration and the stored file that CONTRIBUTING.md names as well:
 no diff has that file."""
 
