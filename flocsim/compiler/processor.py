@@ -69,7 +69,8 @@ def compiled_for() -> tuple[str, ...]:
     settings = numba_settings()
     named = settings["CPU_NAME"], settings["CPU_FEATURES"], os.environ.get("NUMBA_ENABLE_AVX", "")
     native = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    return llvm.get_process_triple(), *native, *named
+    more = CONFIG_FILE.read_text("utf-8", "replace") if CONFIG_FILE.exists() else ""
+    return llvm.get_process_triple(), *native, *named, more
 
 
 def cpu_kind() -> dict:

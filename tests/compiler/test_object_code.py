@@ -82,3 +82,10 @@ def test_what_is_set_in_the_environment_is_told_by_numba(name, value, told):
         for env in (dict(os.environ), {**os.environ, name: value})
     ]
     assert said[0] != said[1] and said[1].startswith(told)
+
+
+def test_settings_in_a_file_are_told_whatever_they_set(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = processor.compiled_for()
+    (tmp_path / processor.CONFIG_FILE).write_text("enable_avx: 0\n")
+    assert processor.compiled_for() != before
