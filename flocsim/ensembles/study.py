@@ -223,13 +223,7 @@ class Study(StudyKind):
     ) -> dict | None:  # fmt: skip
         """The row of a second attempt where that says something of the outcome, the first where
         not; None where it was given up."""
-        steps, method = attempt
-        try:
-            found = draw.run(self.driver(draw.encounter), steps, halted, method)
-        except MemoryError:
-            raise
-        except Exception:
-            return row
+        found = self.run_carefully(draw, attempt, halted, row)
         return found if found is None or says_outcome(found) else row
 
     def run_again(
@@ -239,15 +233,25 @@ class Study(StudyKind):
 
         An exception costs no more than this: the second run has failed, the first is as it was.
         """
-        steps = MORE_STEPS * self.config.integrator.max_steps
-        driver = self.driver(draw.encounter)
+        attempt = MORE_STEPS * self.config.integrator.max_steps, exact
+        failed = dict.fromkeys(CHECKED.values(), NOT_APPLICABLE) | {"outcome": FAILED}
+        row = self.run_carefully(draw, attempt, halted, failed)
+        return None if row is None else {name: row[column] for name, column in CHECKED.items()}
+
+    def run_carefully(
+        self, draw: Draw, attempt: tuple[int, Integrator | None],
+        halted: Callable[[], bool] | None, otherwise: dict,
+    ) -> dict | None:  # fmt: skip
+        """The row of a replicate run in so many steps by a method; ``otherwise`` for an exception,
+        None where it was given up."""
+        steps, method = attempt
         try:
-            row = draw.run(driver, steps, halted=halted, integrator=exact)
+            driver = self.driver(draw.encounter)
+            return draw.run(driver, steps, halted=halted, integrator=method)
         except MemoryError:
             raise
         except Exception:
-            return dict.fromkeys(CHECKED, NOT_APPLICABLE) | {"checked_outcome": FAILED}
-        return None if row is None else {name: row[column] for name, column in CHECKED.items()}
+            return otherwise
 
     @property
     def kinds(self) -> list[Code]:
