@@ -28,7 +28,7 @@ from flocsim.ensembles.study import Study
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
 from flocsim.interruption import install
-from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
+from flocsim.io.journal.records import CHUNK, SESSION, SNAPSHOT, Record, scan
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import write_star_library
@@ -428,6 +428,8 @@ class World:
         if "--resume" not in words:
             return not self.output.exists() and not self.journal.exists()
         journal = self.tasks_of_journal(self.journal) if self.journal.exists() else set()
+        if self.others_begun(key):
+            return False
         there = set()
         if self.output.exists():
             there = self.tasks_of_results(self.output)
@@ -436,6 +438,16 @@ class World:
         return {each for each in journal | there if each[0] == key} == journal | there and {
             each[1:] for each in journal | there
         } <= mine
+
+    def others_begun(self, key):
+        """Whether the journal has a part of a swarm of another study, which is refused as its
+        finished tasks are."""
+        if not self.journal.exists():
+            return False
+        with open(self.journal, "rb") as file:
+            records = [each for each in scan(file) if isinstance(each, Record)]
+        sessions = {each.description.get("short") for each in records if each.kind == SESSION}
+        return sessions != {key} and any(each.kind == SNAPSHOT for each in records)
 
     def wanted(self):
         delta = self.asked.delta if self.kind == "pairs" else (0.0,)
