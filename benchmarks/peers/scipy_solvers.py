@@ -57,11 +57,11 @@ class SciPyRun:
         entries = (rate_state, list_anew, inspect)
         self.pieces = tuple(self.system.compose(entry, self.observer or {}) for entry in entries)
 
-    def rate(self, at, vector):
+    def rate(self, time, vector):
         """The right-hand side."""
         self.evaluations += 1
         rates = np.empty_like(vector)
-        self.pieces[0](self.scene, self.work, at, vector, rates)
+        self.pieces[0](self.scene, self.work, time, vector, rates)
         return rates
 
     def make_list(self):
@@ -71,15 +71,15 @@ class SciPyRun:
         slips = self.work.slip[NOW, : self.work.tally[CANDIDATES]]
         return np.concatenate([self.work.motion[NOW].ravel(), slips]), longest
 
-    def start_solver(self, method, at, until, tolerance, step):
+    def start_solver(self, method, time, until, tolerance, step):
         """A solver from the present state."""
         vector, longest = self.make_list()
         slips = np.full(len(vector) - self.work.motion[NOW].size, tolerance)
         absolute = np.concatenate([state_tolerances(self.system, tolerance), slips])
         relative = max(tolerance / 1e-5, SMALLEST_RELATIVE)
-        largest = min(longest, until - at)
+        largest = min(longest, until - time)
         return SOLVERS[method](
-            self.rate, at, vector, until, rtol=relative, atol=absolute, max_step=largest,
+            self.rate, time, vector, until, rtol=relative, atol=absolute, max_step=largest,
             first_step=min(step, largest),
         )  # fmt: skip
 
@@ -87,8 +87,8 @@ class SciPyRun:
         """Show the observer the instant inside the last step at which the outlines touched."""
         path = solver.dense_output()
 
-        def gap(at):
-            return self.inspect(at, path(at), observed, False)[2]
+        def gap(time):
+            return self.inspect(time, path(time), observed, False)[2]
 
         low, high = solver.t_old, solver.t
         if gap(low) > 0.0 > gap(high):
@@ -105,9 +105,9 @@ class SciPyRun:
         self.rate(0.0, vector)
         self.inspect(0.0, vector, observed.copy(), True)
 
-    def inspect(self, at, vector, observed, watch):
+    def inspect(self, time, vector, observed, watch):
         """See peers.compiled.inspect."""
-        return self.pieces[2](self.scene, self.work, observed, at, vector, watch)
+        return self.pieces[2](self.scene, self.work, observed, time, vector, watch)
 
     def advance(self, solver, observed, apart):
         """One step: (status or "", observer's code, whether the list must be made anew, apart)."""

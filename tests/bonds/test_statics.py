@@ -91,11 +91,11 @@ def test_two_spheres_never_hook_even_pressed_on_a_fixed_one():
 
 def test_a_sphere_in_a_cup_is_carried_by_it():
     cup = [(-3, 4), (-3, -1), (3, -1), (3, 4), (2.5, 4), (0.0, -0.5), (-2.5, 4)]
-    shape, at = polygon(cup)
+    shape, place = polygon(cup)
     slope = math.atan2(4.5, 2.5)
     for x, carried in ((0.0, True), (0.3e-6, False)):
         lowest = (-0.5 + (1.0 + REACH - 0.05) / math.cos(slope)) * 1e-6
-        places = [(*at, 0.0), (x, lowest + abs(x) * math.tan(slope), 0.0)]
+        places = [(*place, 0.0), (x, lowest + abs(x) * math.tan(slope), 0.0)]
         two = TwoBodies([shape, Sphere(1e-6)], places, [Contact(friction=0.0)], fixed=(True, False))
         assert hooked(two) == carried
 
@@ -142,7 +142,7 @@ def by_linear_program(two, drift, grip):
     loads += [(-line, 0.0)] if askew < 0.0 else []
     if not np.any(drift):
         side = np.array([-line[1], line[0]])
-        loads = [(sign * f, at) for f in (line, side) for at in (0.0, 1.0) for sign in (-1.0, 1.0)]
+        loads = [(sign * f, arm) for f in (line, side) for arm in (0.0, 1.0) for sign in (-1.0, 1.0)]
     for force, at_i in loads:
         arm = -at_i * bond.distance * line / size
         wrench = np.array([*force, arm[0] * force[1] - arm[1] * force[0]])

@@ -159,12 +159,12 @@ def judged(scene: Scene, exact: Integrator) -> Verdict:
     reference, other = scene.run(exact, MORE_STEPS)
     if other["failure"]:
         return Verdict(*about, math.nan, stated, WRONG, f"no reference: it ends {ending(other)}")
-    at = min(found.time, reference.time)
+    until = min(found.time, reference.time)
     # Both are stopped where the first of them was decided.
-    if found.time > at:
-        found, _ = scene.run(case.method, until=at)
-    elif reference.time > at:
-        reference, _ = scene.run(exact, MORE_STEPS, until=at)
+    if found.time > until:
+        found, _ = scene.run(case.method, until=until)
+    elif reference.time > until:
+        reference, _ = scene.run(exact, MORE_STEPS, until=until)
     error = end_distance(scene.draw.encounter.system.bodies, place_of(found), place_of(reference))
     stated = found.error if math.isfinite(case.method.tolerance) else math.nan
     if (row["outcome"], row["inside"]) != (other["outcome"], other["inside"]):

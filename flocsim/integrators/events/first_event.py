@@ -86,9 +86,9 @@ def friction_share(scene, work, share, step, resolution):
     before; what is beyond that by less than the resolution [m] at the end of the step is left."""
     for row in range(work.tally[CANDIDATES]):
         if work.candidates[row, CLOSED] == 1:
-            distance, at = beyond(scene, work, row, step)
+            distance, share_there = beyond(scene, work, row, step)
             if distance > resolution:
-                share = min(share, at)
+                share = min(share, share_there)
     return share
 
 

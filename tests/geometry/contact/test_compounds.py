@@ -168,11 +168,11 @@ def test_a_disk_in_a_hole_starts_there():
 
 def test_contacts_of_parts_are_seen():
     beads_there = beads()
-    at = beads_there.parts[1].points[0]
-    touching = np.array([[0.0, 0.0, 0.0], [at[0], at[1] - 2.5 + 1e-3, 0.0]])
+    tip = beads_there.parts[1].points[0]
+    touching = np.array([[0.0, 0.0, 0.0], [tip[0], tip[1] - 2.5 + 1e-3, 0.0]])
     found = placed_contacts([beads_there, Sphere(0.5)], touching)
     assert len(found) > 0 and np.ptp(found, axis=0).max() < 1e-12  # once from either side
-    assert found[0] == pytest.approx([at[0], at[1] - 2.0], abs=2e-3)
+    assert found[0] == pytest.approx([tip[0], tip[1] - 2.0], abs=2e-3)
 
 
 def test_a_lone_disk_as_a_part_is_a_disk():

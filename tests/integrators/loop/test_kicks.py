@@ -69,8 +69,8 @@ def test_a_sphere_without_inertia_goes_along_the_plain_path():
     """x_k = Σ √(2 k_B T τ/ζ) ξ: the D of every kick is that of the law."""
     run = lone(Overdamped(1e-9)).run(0.1, jit=False)
     wanted = wanted_path(100, 1e-3)
-    at = run.at(np.arange(1, 101) * 1e-3).position[:, 0]
-    np.testing.assert_allclose(at, wanted[1:], rtol=1e-7, atol=1e-12)
+    places = run.at(np.arange(1, 101) * 1e-3).position[:, 0]
+    np.testing.assert_allclose(places, wanted[1:], rtol=1e-7, atol=1e-12)
 
 
 def test_steps_end_at_kicks_and_only_one_is_taken_in_each():

@@ -68,12 +68,12 @@ def test_a_step_that_is_taken_anew_starts_from_what_is_known():
 
 
 @pytest.mark.parametrize(
-    ("staged", "at", "reach", "known"),
+    ("staged", "began", "reach", "known"),
     [(1e-6, 0.5, -1.0, True), (0.0, 0.5, -1.0, False), (1e-6, 0.4, -1.0, False),
      (1e-6, 0.5, 1e-7, False)],
 )  # fmt: skip
-def test_surface_forces_and_rejected_steps_start_afresh(staged, at, reach, known):
+def test_surface_forces_and_rejected_steps_start_afresh(staged, began, reach, known):
     scene = System([Body(Sphere(1e-5), density=2650.0)], [Gravity()], Implicit()).scene(jit=False)
     clock = np.zeros(CLOCK_SIZE)
-    clock[TIME], clock[STAGED_STEP], clock[STAGED_AT] = 0.5, staged, at
+    clock[TIME], clock[STAGED_STEP], clock[STAGED_AT] = 0.5, staged, began
     assert bool(is_tried_again(scene._replace(surface_reach=reach), clock)) == known
