@@ -1,4 +1,7 @@
-"""The tuples of numbers and arrays that kernels and drivers see, and where things lie in them."""
+"""The tuples of numbers and arrays that kernels and drivers see, and where things lie in them.
+
+Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
+"""
 
 from typing import Annotated, Any, NamedTuple
 

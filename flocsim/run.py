@@ -5,22 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.arrays import (
-    CODE,
-    ERROR,
-    EVALUATIONS,
-    NOW,
-    PAUSE_AT,
-    RECORDED,
-    REJECTED,
-    STEPS,
-    TIME,
-    UNTIL,
-    Scene,
-    Work,
-    copy_of,
-    with_room,
-)
+import flocsim.arrays as at
+from flocsim.arrays import Scene, Work, copy_of, with_room
 from flocsim.integrators.base import Integrator, Status
 
 STEPS_AT_A_TIME = 5_000
@@ -52,7 +38,7 @@ class Run:
     ) -> None:
         self.driver, self.scene, self.work = driver, scene, work
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
-        self.clock[UNTIL] = until
+        self.clock[at.UNTIL] = until
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
         self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
@@ -60,21 +46,21 @@ class Run:
 
     def row_now(self) -> np.ndarray:
         """Time and state now, as one row of a record."""
-        return np.concatenate([[self.clock[TIME]], self.work.motion[NOW].ravel()])[None]
+        return np.concatenate([[self.clock[at.TIME]], self.work.motion[at.NOW].ravel()])[None]
 
     def advance(self, steps: int | None = None) -> Status:
         """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
 
         A pause comes between two steps, so that it changes nothing.
         """
-        self.counts[PAUSE_AT] = self.counts[STEPS] + (steps or STEPS_AT_A_TIME)
+        self.counts[at.PAUSE_AT] = self.counts[at.STEPS] + (steps or STEPS_AT_A_TIME)
         while True:
             code = self.driver(
                 self.scene, self.work, self.observed, self.clock, self.counts, self.record
             )
-            if self.counts[RECORDED] > 0:
-                self.saved.append(self.record[: self.counts[RECORDED]].copy())
-                self.counts[RECORDED] = 0
+            if self.counts[at.RECORDED] > 0:
+                self.saved.append(self.record[: self.counts[at.RECORDED]].copy())
+                self.counts[at.RECORDED] = 0
             if code == Status.NO_ROOM:
                 self.work = with_room(self.work)
             elif code != Status.RECORD_FULL:
@@ -111,28 +97,28 @@ class Run:
     @property
     def time(self) -> float:
         """How far it has come [s]."""
-        return float(self.clock[TIME])
+        return float(self.clock[at.TIME])
 
     @property
     def steps(self) -> int:
-        return int(self.counts[STEPS])
+        return int(self.counts[at.STEPS])
 
     @property
     def rejected(self) -> int:
         """Steps tried in vain."""
-        return int(self.counts[REJECTED])
+        return int(self.counts[at.REJECTED])
 
     @property
     def evaluations(self) -> int:
         """How often the forces were summed."""
-        return int(self.work.tally[EVALUATIONS])
+        return int(self.work.tally[at.EVALUATIONS])
 
     @property
     def error(self) -> float:
         """The sum of the steps' estimated errors [m]."""
-        return float(self.clock[ERROR])
+        return float(self.clock[at.ERROR])
 
     @property
     def code(self) -> int:
         """The observer's last code."""
-        return int(self.counts[CODE])
+        return int(self.counts[at.CODE])

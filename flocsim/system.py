@@ -9,20 +9,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    ERROR,
-    EVALUATIONS,
-    KICK_SPAN,
-    NOW,
-    RADIUS,
-    REBUILDS,
-    TIME,
-    TOLERANCE,
-    UNTIL,
-    Scene,
-    copy_of,
-    work_of,
-)
+import flocsim.arrays as at
+from flocsim.arrays import Scene, copy_of, work_of
 from flocsim.body import Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError, KernelWarning, UsageError
@@ -265,7 +253,9 @@ class System:
                           KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
-            growth = self.amplification(run.time, run.work.motion[NOW, :, :3], max_steps, jit=jit)
+            growth = self.amplification(
+                run.time, run.work.motion[at.NOW, :, :3], max_steps, jit=jit
+            )
         legs = ((run.steps, end),)
         origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
@@ -281,26 +271,26 @@ class System:
                 f"{type(start).__name__}: run the first one until then, and hand that over"
             )
         origin = start.known()
-        if run.clock[UNTIL] <= start.t[-1]:
+        if run.clock[at.UNTIL] <= start.t[-1]:
             raise UsageError(
                 f"until must be a time above {start.t[-1]:g} s, at which start has ended, found "
-                f"{run.clock[UNTIL]:g}"
+                f"{run.clock[at.UNTIL]:g}"
             )
         scene = origin.ended.scene
         if not all(
             np.array_equal(getattr(run.scene, name), getattr(scene, name))
             for name in ("first", "vertices")
-        ) or not np.array_equal(run.scene.bodies[:, RADIUS], scene.bodies[:, RADIUS]):
+        ) or not np.array_equal(run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]):
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
         if (run.scene.kicks, run.scene.key) != (scene.kicks, scene.key):
-            run.work.bodies[0, KICK_SPAN] = 0.0  # no kick has begun
-        run.work.tally[REBUILDS] = 0
-        run.work.tally[EVALUATIONS] = 0
-        run.clock[TIME] = start.t[-1]
-        if np.isfinite(start.error) and np.isfinite(run.clock[TOLERANCE]):
-            run.clock[ERROR] = start.error
+            run.work.bodies[0, at.KICK_SPAN] = 0.0  # no kick has begun
+        run.work.tally[at.REBUILDS] = 0
+        run.work.tally[at.EVALUATIONS] = 0
+        run.clock[at.TIME] = start.t[-1]
+        if np.isfinite(start.error) and np.isfinite(run.clock[at.TOLERANCE]):
+            run.clock[at.ERROR] = start.error
         run.saved = [run.row_now()]
         return run
 
@@ -318,7 +308,7 @@ class System:
         def companion(bodies: list[Body]) -> np.ndarray | None:
             run = attrs.evolve(self, bodies=bodies).begin(until, max_steps=max_steps, jit=jit)
             ended = run.to_end() == Status.FINISHED
-            return run.work.motion[NOW, :, :3] if ended else None
+            return run.work.motion[at.NOW, :, :3] if ended else None
 
         return amplification_of(self.bodies, end, companion, nudge)
 

@@ -2,19 +2,9 @@
 
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
-from flocsim.arrays import (
-    BOUNDING_RADIUS,
-    BUOYANT_MASS,
-    EQUIVALENT_RADIUS,
-    FREE,
-    INERTIA,
-    MASS,
-    NOW,
-    RADIUS,
-    with_capacity,
-    work_of,
-)
+from flocsim.arrays import with_capacity, work_of
 from flocsim.body import scene_of
 
 BALL = Sphere(5e-6)
@@ -30,19 +20,19 @@ def test_the_scene_lists_all_bodies_one_after_another():
     assert scene.parameters.tolist() == [1.0, 2.0]
     for row, body in zip(scene.bodies, bodies, strict=True):
         shape = body.shape
-        assert [row[MASS], row[BUOYANT_MASS], row[INERTIA]] == [
+        assert [row[at.MASS], row[at.BUOYANT_MASS], row[at.INERTIA]] == [
             body.mass, body.buoyant_mass(fluid), body.inertia,
         ]  # fmt: skip
-        assert row[EQUIVALENT_RADIUS] == shape.equivalent_radius
-        assert [row[BOUNDING_RADIUS], row[RADIUS]] == [shape.bounding_radius, shape.radius]
-    assert scene.bodies[:, FREE].tolist() == [1.0, 0.0]
+        assert row[at.EQUIVALENT_RADIUS] == shape.equivalent_radius
+        assert [row[at.BOUNDING_RADIUS], row[at.RADIUS]] == [shape.bounding_radius, shape.radius]
+    assert scene.bodies[:, at.FREE].tolist() == [1.0, 0.0]
 
 
 def test_work_arrays_grow_and_keep_what_they_hold():
     scene = scene_of([Body(BALL, density=2650.0)] * 3, Fluid(), [])
     position, velocity = np.arange(9.0).reshape(3, 3), -np.arange(9.0).reshape(3, 3)
     work = work_of(scene, position, velocity, capacity=2)
-    assert np.array_equal(work.motion[NOW], np.hstack([position, velocity]))
+    assert np.array_equal(work.motion[at.NOW], np.hstack([position, velocity]))
     assert len(work.budget) == 3 and np.all(work.budget < 0.0)
     for array in (work.slip, work.candidates, work.geometry, work.kept):
         array[...] = np.arange(array.size).reshape(array.shape)

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+import flocsim.arrays as at
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.arrays import EVALUATIONS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.trials import WEIGHTS
 from flocsim.ensembles.study import Study
@@ -39,7 +39,7 @@ def spent(made, method, place, replicate):
     run = draw.begin(driver, made.config.integrator.max_steps, integrator=method)
     began = time.process_time()
     run.to_end()
-    return time.process_time() - began, int(run.work.tally[EVALUATIONS])
+    return time.process_time() - began, int(run.work.tally[at.EVALUATIONS])
 
 
 def main():

@@ -6,15 +6,7 @@ listed pair.
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    FORCE,
-    FREE,
-    MOTION_COLUMNS,
-    NOW,
-    SLIP_RATES,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import list_ahead, outline_speed, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
@@ -29,31 +21,31 @@ def read_state(work, vector):
     """Write a state vector into NOW."""
     bodies = work.motion.shape[1]
     for body in range(bodies):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NOW, body, axis] = vector[6 * body + axis]
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[NOW, row] = vector[6 * bodies + row]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NOW, body, axis] = vector[6 * body + axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.NOW, row] = vector[6 * bodies + row]
 
 
 def rate_state(scene, work, time, vector, rates):
     """Derivative of a state vector by time, every listed pair flagged as it is there."""
     read_state(work, vector)
-    locate_and_rate(scene, work, NOW)
-    sum_forces(scene, work, time, NOW)
+    locate_and_rate(scene, work, at.NOW)
+    sum_forces(scene, work, time, at.NOW)
     bodies = work.motion.shape[1]
     for body in range(bodies):
         for axis in range(3):
-            gain = scene.bodies[body, FREE] / inertia(scene, body, axis)
+            gain = scene.bodies[body, at.FREE] / inertia(scene, body, axis)
             rates[6 * body + axis] = vector[6 * body + 3 + axis]
-            rates[6 * body + 3 + axis] = gain * work.rates[NOW, body, FORCE + axis]
-    for row in range(work.tally[CANDIDATES]):
-        closed = work.candidates[row, CLOSED] == 1
-        rates[6 * bodies + row] = work.slip[SLIP_RATES + NOW, row] if closed else 0.0
+            rates[6 * body + 3 + axis] = gain * work.rates[at.NOW, body, at.FORCE + axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        closed = work.candidates[row, at.CLOSED] == 1
+        rates[6 * bodies + row] = work.slip[at.SLIP_RATES + at.NOW, row] if closed else 0.0
 
 
 def locate_now(scene, work):
     """Geometry and flags of NOW; the smallest gap [m] (inf without pairs)."""
-    least = locate_contacts(scene, work, NOW)
+    least = locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
     return least
 
@@ -87,9 +79,9 @@ def inspect(scene, work, observed, time, vector, watch):
     The code is the observer's if it is to ``watch``, else 0.
     """
     read_state(work, vector)
-    least = locate_now(scene, work) if work.tally[CANDIDATES] > 0 else math.inf
+    least = locate_now(scene, work) if work.tally[at.CANDIDATES] > 0 else math.inf
     opened = False
-    for row in range(work.tally[CANDIDATES]):
-        opened = opened or (work.candidates[row, CLOSED] == 0 and work.slip[NOW, row] != 0.0)
+    for row in range(work.tally[at.CANDIDATES]):
+        opened = opened or (work.candidates[row, at.CLOSED] == 0 and work.slip[at.NOW, row] != 0.0)
     code = observe(scene, work, observed, time) if watch else 0
-    return spent(scene, work, NOW), opened, least, too_deep(scene, work), code
+    return spent(scene, work, at.NOW), opened, least, too_deep(scene, work), code

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.integrate import BDF, LSODA, Radau
 from scipy.optimize import brentq
 
+import flocsim.arrays as at
 from benchmarks.peers.compiled import inspect, list_anew, rate_state
 from benchmarks.speed.measure import Measured
-from flocsim.arrays import CANDIDATES, NOW, with_capacity, work_of
+from flocsim.arrays import with_capacity, work_of
 from flocsim.constants import WATER_VISCOSITY
 from flocsim.integrators import VelocityVerlet
 
@@ -68,13 +69,13 @@ class SciPyRun:
         """(state vector, longest step) with the pairs listed anew."""
         while (longest := self.pieces[1](self.scene, self.work)) < 0.0:
             self.work = with_capacity(self.work, 2 * len(self.work.candidates))
-        slips = self.work.slip[NOW, : self.work.tally[CANDIDATES]]
-        return np.concatenate([self.work.motion[NOW].ravel(), slips]), longest
+        slips = self.work.slip[at.NOW, : self.work.tally[at.CANDIDATES]]
+        return np.concatenate([self.work.motion[at.NOW].ravel(), slips]), longest
 
     def start_solver(self, method, time, until, tolerance, step):
         """A solver from the present state."""
         vector, longest = self.make_list()
-        slips = np.full(len(vector) - self.work.motion[NOW].size, tolerance)
+        slips = np.full(len(vector) - self.work.motion[at.NOW].size, tolerance)
         absolute = np.concatenate([state_tolerances(self.system, tolerance), slips])
         relative = max(tolerance / 1e-5, SMALLEST_RELATIVE)
         largest = min(longest, until - time)
@@ -136,5 +137,5 @@ class SciPyRun:
             if time.process_time() - began > budget:
                 status = status or "TIME_BUDGET"
         cpu = time.process_time() - began
-        motion = self.work.motion[NOW].copy()
+        motion = self.work.motion[at.NOW].copy()
         return Measured(motion, status or "FINISHED", cpu, steps, 0, self.evaluations), code

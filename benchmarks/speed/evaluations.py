@@ -9,18 +9,9 @@ import time
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from benchmarks.speed.scenes import rolling_pair
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    FORCE,
-    FREE,
-    NOW,
-    REBUILDS,
-    SLIP_RATES,
-    VELOCITY,
-    work_of,
-)
+from flocsim.arrays import work_of
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.integrators import Implicit, VelocityVerlet
@@ -41,12 +32,14 @@ def push(scene, work, step):
     """One symplectic Euler step with the forces in place NOW of ``work.rates``."""
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
-            gain = step * scene.bodies[body, FREE] / inertia(scene, body, axis)
-            work.motion[NOW, body, VELOCITY + axis] += gain * work.rates[NOW, body, FORCE + axis]
-            work.motion[NOW, body, axis] += step * work.motion[NOW, body, VELOCITY + axis]
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
-            work.slip[NOW, row] += step * work.slip[SLIP_RATES + NOW, row]
+            gain = step * scene.bodies[body, at.FREE] / inertia(scene, body, axis)
+            work.motion[at.NOW, body, at.VELOCITY + axis] += (
+                gain * work.rates[at.NOW, body, at.FORCE + axis]
+            )
+            work.motion[at.NOW, body, axis] += step * work.motion[at.NOW, body, at.VELOCITY + axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == 1:
+            work.slip[at.NOW, row] += step * work.slip[at.SLIP_RATES + at.NOW, row]
 
 
 def evaluate_and_push(scene, work, step, count, turn):
@@ -56,13 +49,13 @@ def evaluate_and_push(scene, work, step, count, turn):
     """
     touching = 0
     for k in range(count):
-        if spent(scene, work, NOW) > 0.5 and not list_candidates(scene, work):
+        if spent(scene, work, at.NOW) > 0.5 and not list_candidates(scene, work):
             return -1
-        locate_and_rate(scene, work, NOW)
-        sum_forces(scene, work, 0.0, NOW)
+        locate_and_rate(scene, work, at.NOW)
+        sum_forces(scene, work, 0.0, at.NOW)
         hand_over(scene, work)
-        for row in range(work.tally[CANDIDATES]):
-            if work.candidates[row, CLOSED] == 1:
+        for row in range(work.tally[at.CANDIDATES]):
+            if work.candidates[row, at.CLOSED] == 1:
                 touching += 1
                 break
         push(scene, work, -step if k // turn % 2 == 1 else step)
@@ -108,12 +101,12 @@ def cost(scene, turn, count):
     arrays = system.scene()
     work = work_of(arrays, *system.motion(), capacity=8192)
     loop(arrays, work, STEP, 1, turn)
-    rebuilds = work.tally[REBUILDS]
+    rebuilds = work.tally[at.REBUILDS]
     began = time.process_time()
     touching = loop(arrays, work, STEP, count, turn)
     took = time.process_time() - began
-    lists = max(work.tally[REBUILDS] - rebuilds, 1)
-    return Cost(1e6 * took / count, count / lists, int(work.tally[CANDIDATES]), touching / count)
+    lists = max(work.tally[at.REBUILDS] - rebuilds, 1)
+    return Cost(1e6 * took / count, count / lists, int(work.tally[at.CANDIDATES]), touching / count)
 
 
 def rolling_cost(preset, vertices, count):

@@ -5,10 +5,8 @@ import time
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    NOW,
-    work_of,
-)
+import flocsim.arrays as at
+from flocsim.arrays import work_of
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Status
@@ -49,7 +47,7 @@ def run_once(system, driver, until, budget):
             break
     cpu = time.process_time() - began
     name = "TIME_BUDGET" if status == Status.PAUSED else status.name
-    motion = run.work.motion[NOW].copy()
+    motion = run.work.motion[at.NOW].copy()
     return Measured(motion, name, cpu, run.steps, run.rejected, run.evaluations)
 
 

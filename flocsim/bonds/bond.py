@@ -7,19 +7,8 @@ located where they are now.
 import math
 from typing import NamedTuple
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    EQUIVALENT_RADIUS,
-    GAP,
-    INERTIA,
-    NOW,
-    SPIN,
-    VX,
-    VY,
-    ContactView,
-)
+import flocsim.arrays as at
+from flocsim.arrays import ContactView
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.geometry.contact.separation import separation
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
@@ -60,28 +49,28 @@ class Load(NamedTuple):
 
 def bond_between(scene, work, time, i, j):
     """The Bond of two bodies whose features are listed and located."""
-    nx, ny, distance = centre_line(scene, work, NOW, j, i)
+    nx, ny, distance = centre_line(scene, work, at.NOW, j, i)
     gap = least_listed_gap(work)
     surface = gap
-    if scene.surface_reach > 0.0 and work.tally[CANDIDATES] > 0:
-        flag_near(scene, work, NOW, 0.0)
-        surface = surface_view(scene, work, time, NOW, 0, work.tally[CANDIDATES]).gap
+    if scene.surface_reach > 0.0 and work.tally[at.CANDIDATES] > 0:
+        flag_near(scene, work, at.NOW, 0.0)
+        surface = surface_view(scene, work, time, at.NOW, 0, work.tally[at.CANDIDATES]).gap
     return Bond(i, j, nx, ny, distance, gap, surface)
 
 
 def is_closed(work, row):
     """Whether a listed pair of features touches now."""
-    return work.geometry[NOW, row, GAP] < 0.0
+    return work.geometry[at.NOW, row, at.GAP] < 0.0
 
 
 def size_of(scene, i, j):
     """The smaller bounding radius [m]: by so much outlines move as the bodies turn by one."""
-    return min(scene.bodies[i, BOUNDING_RADIUS], scene.bodies[j, BOUNDING_RADIUS])
+    return min(scene.bodies[i, at.BOUNDING_RADIUS], scene.bodies[j, at.BOUNDING_RADIUS])
 
 
 def radii_of(scene, bond):
     """r_i + r_j, equivalent radii [m]."""
-    return scene.bodies[bond.i, EQUIVALENT_RADIUS] + scene.bodies[bond.j, EQUIVALENT_RADIUS]
+    return scene.bodies[bond.i, at.EQUIVALENT_RADIUS] + scene.bodies[bond.j, at.EQUIVALENT_RADIUS]
 
 
 def are_spheres(scene, bond):
@@ -93,20 +82,20 @@ def are_spheres(scene, bond):
 def speeds_of(scene, work, bond):
     """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
     v, i, j = work.motion, bond.i, bond.j
-    ux, uy = v[NOW, j, VX] - v[NOW, i, VX], v[NOW, j, VY] - v[NOW, i, VY]
+    ux, uy = v[at.NOW, j, at.VX] - v[at.NOW, i, at.VX], v[at.NOW, j, at.VY] - v[at.NOW, i, at.VY]
     rx, ry = bond.nx * bond.distance, bond.ny * bond.distance
-    spin = v[NOW, i, SPIN]
+    spin = v[at.NOW, i, at.SPIN]
     shear = math.hypot(ux + spin * ry, uy - spin * rx)
-    turning = abs(v[NOW, j, SPIN] - spin) * size_of(scene, i, j)
+    turning = abs(v[at.NOW, j, at.SPIN] - spin) * size_of(scene, i, j)
     return abs(ux * bond.nx + uy * bond.ny), shear + turning
 
 
 def doublet_pose(scene, work, state, i, j):
     """Place [m] and angle of body j in the frame of i, which turns with it, in a state."""
     x, y = separation(scene, work, state, j, i)
-    turn = work.motion[state, i, ANGLE]
+    turn = work.motion[state, i, at.ANGLE]
     c, s = math.cos(turn), math.sin(turn)
-    return c * x + s * y, c * y - s * x, work.motion[state, j, ANGLE] - turn
+    return c * x + s * y, c * y - s * x, work.motion[state, j, at.ANGLE] - turn
 
 
 def way_between(scene, i, j, pose, before):
@@ -127,15 +116,15 @@ def energy_of(scene, work, bond):
     """What the bodies have to climb out with [J]: the energy of their motion against each other, of
     their spins, and twice that of their contacts' springs."""
     v, i, j = work.motion, bond.i, bond.j
-    ux, uy = v[NOW, j, VX] - v[NOW, i, VX], v[NOW, j, VY] - v[NOW, i, VY]
+    ux, uy = v[at.NOW, j, at.VX] - v[at.NOW, i, at.VX], v[at.NOW, j, at.VY] - v[at.NOW, i, at.VY]
     total = 0.5 * effective_mass(scene, i, j) * (ux * ux + uy * uy)
-    total += 0.5 * scene.bodies[i, INERTIA] * v[NOW, i, SPIN] * v[NOW, i, SPIN]
-    total += 0.5 * scene.bodies[j, INERTIA] * v[NOW, j, SPIN] * v[NOW, j, SPIN]
+    total += 0.5 * scene.bodies[i, at.INERTIA] * v[at.NOW, i, at.SPIN] * v[at.NOW, i, at.SPIN]
+    total += 0.5 * scene.bodies[j, at.INERTIA] * v[at.NOW, j, at.SPIN] * v[at.NOW, j, at.SPIN]
     if not has(scene, CONTACT_FORCE):
         return total
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if is_closed(work, row):
-            view = contact_view(scene, work, NOW, row)
+            view = contact_view(scene, work, at.NOW, row)
             normal, tangential = contact_force(scene, resting_contact(view, view.slip))
             total += abs(normal * view.overlap) + abs(tangential * view.slip)
     return total

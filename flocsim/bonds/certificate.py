@@ -19,7 +19,7 @@ All forces are those at rest: what resists an opening, as lubrication, holds not
 
 import math
 
-from flocsim.arrays import CANDIDATES, NOW, SPIN
+import flocsim.arrays as at
 from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, speeds_of
 from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
@@ -107,7 +107,7 @@ def leverage(work, bond, least):
     lies on one side of it."""
     left, right = math.inf, math.inf
     nx, ny, distance = bond.nx, bond.ny, bond.distance
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if not is_closed(work, row):
             continue
         x, y = contact_point(work, row, bond.i)
@@ -125,7 +125,7 @@ def is_held(scene, work, time, bond, load):
     along, shear = speeds_of(scene, work, bond)
     if not along < CALM * load.drift:
         return False
-    mass, spin = effective_mass(scene, bond.i, bond.j), work.motion[NOW, bond.i, SPIN]
+    mass, spin = effective_mass(scene, bond.i, bond.j), work.motion[at.NOW, bond.i, at.SPIN]
     needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)

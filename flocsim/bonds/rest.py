@@ -7,7 +7,7 @@ in their attraction against the load, and shapes, whose contacts no potential te
 takes as much to lift one by the smaller spheroradius against it.
 """
 
-from flocsim.arrays import BOUNDING_RADIUS, FREE, NOW, RADIUS, SPIN
+import flocsim.arrays as at
 from flocsim.bonds.bond import HOOK, NO_BOND, REST, are_spheres, radii_of
 from flocsim.bonds.certificate import CALM, capacity, lets_out
 from flocsim.bonds.statics import is_hooked
@@ -32,9 +32,9 @@ REST_TURNS = 3.0
 def swings(scene, work, i, j, load):
     """Whether a doublet that turns to hang still swings: it passes the worst direction of its load,
     but may yet be thrown open. One that any load may meet turns with the flow, or its cluster."""
-    outer = scene.bodies[i, BOUNDING_RADIUS] + scene.bodies[j, BOUNDING_RADIUS]
+    outer = scene.bodies[i, at.BOUNDING_RADIUS] + scene.bodies[j, at.BOUNDING_RADIUS]
     turns = load.x != 0.0 or load.y != 0.0
-    return turns and abs(work.motion[NOW, i, SPIN]) * outer > CALM * load.drift
+    return turns and abs(work.motion[at.NOW, i, at.SPIN]) * outer > CALM * load.drift
 
 
 def has_shown(scene, bond, load, rested):
@@ -48,7 +48,7 @@ def has_shown(scene, bond, load, rested):
     if near and rested >= FAR_LONGER:
         return True
     hangs = bond.nx * load.x + bond.ny * load.y >= HANGING or (load.x == 0.0 and load.y == 0.0)
-    hangs = hangs or scene.bodies[bond.i, FREE] == 0.0 or scene.bodies[bond.j, FREE] == 0.0
+    hangs = hangs or scene.bodies[bond.i, at.FREE] == 0.0 or scene.bodies[bond.j, at.FREE] == 0.0
     return bond.gap < 0.0 and hangs and rested >= 1.0
 
 
@@ -56,7 +56,7 @@ def outlasts_kicks(scene, time, bond, load):
     """Whether kicks let the bond rest."""
     barrier = BARRIER * load.kicks
     if not are_spheres(scene, bond):
-        radii = scene.bodies[bond.i, RADIUS], scene.bodies[bond.j, RADIUS]
+        radii = scene.bodies[bond.i, at.RADIUS], scene.bodies[bond.j, at.RADIUS]
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
     return load.force > 0.0 and not lets_out(scene, time, bond, load.force, barrier)
 

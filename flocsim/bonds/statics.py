@@ -20,7 +20,7 @@ Two spheres touch at one point, and no load along their line of centres is carri
 
 import math
 
-from flocsim.arrays import CANDIDATES, FREE, NORMAL_X, NORMAL_Y, NOW, VERTEX_BODY
+import flocsim.arrays as at
 from flocsim.bonds.bond import are_spheres, is_closed, resting_contact, size_of
 from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
@@ -48,9 +48,9 @@ def grip_of(scene, work):
     least = 0.0
     if not has(scene, CONTACT_FORCE):
         return least
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if is_closed(work, row):
-            view = contact_view(scene, work, NOW, row)
+            view = contact_view(scene, work, at.NOW, row)
             slip, limit = view.overlap, math.inf
             if has(scene, SLIP_LIMIT):
                 limit = slip_limit(scene, resting_contact(view, 0.0))
@@ -67,8 +67,8 @@ def grip_of(scene, work):
 
 def normal_on(work, bond, row):
     """The unit vector along which a contact pushes body j."""
-    x, y = work.geometry[NOW, row, NORMAL_X], work.geometry[NOW, row, NORMAL_Y]
-    return (x, y) if work.candidates[row, VERTEX_BODY] == bond.j else (-x, -y)
+    x, y = work.geometry[at.NOW, row, at.NORMAL_X], work.geometry[at.NOW, row, at.NORMAL_Y]
+    return (x, y) if work.candidates[row, at.VERTEX_BODY] == bond.j else (-x, -y)
 
 
 def push_of(work, bond, size, grip, edge):
@@ -94,7 +94,7 @@ def is_allowed(work, bond, size, grip, motion):
     """Whether no force of any contact does negative work along a motion (of j's centroid; ``size``
     times its turn)."""
     vx, vy, turn = motion
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if not is_closed(work, row):
             continue
         nx, ny = normal_on(work, bond, row)
@@ -116,9 +116,9 @@ def load_works(scene, bond, load, size, motion):
     at_j, at_i = load.x * vx + load.y * vy, load.x * tx + load.y * ty
     if load.x == 0.0 and load.y == 0.0:
         return vx * vx + vy * vy + tx * tx + ty * ty > ROUNDING * ROUNDING
-    if scene.bodies[bond.i, FREE] == 0.0:
+    if scene.bodies[bond.i, at.FREE] == 0.0:
         return at_j > ROUNDING
-    if scene.bodies[bond.j, FREE] == 0.0:
+    if scene.bodies[bond.j, at.FREE] == 0.0:
         return at_i > ROUNDING
     pulling = bond.nx * vx + bond.ny * vy
     askew = load.x * bond.nx + load.y * bond.ny
@@ -134,7 +134,7 @@ def is_hooked(scene, work, bond, load):
     grip, size = grip_of(scene, work), size_of(scene, bond.i, bond.j)
     if grip == 0.0 or are_spheres(scene, bond):
         return False
-    count = EDGES * work.tally[CANDIDATES]
+    count = EDGES * work.tally[at.CANDIDATES]
     for first in range(count):
         if not is_closed(work, first // EDGES):
             continue

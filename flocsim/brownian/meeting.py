@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import hooks
-from flocsim.arrays import NOW
 from flocsim.body import Body, Fluid
 from flocsim.brownian.splitting import length
 from flocsim.errors import UsageError
@@ -39,7 +39,7 @@ def always(observed):
 
 def watch_meeting(scene, work, observed, time):
     """The observer: 0 to go on, TOUCHED or ESCAPED."""
-    _, _, distance = centre_line(scene, work, NOW, 1, 0)
+    _, _, distance = centre_line(scene, work, at.NOW, 1, 0)
     if distance >= observed[ESCAPE]:
         return ESCAPED
     return TOUCHED if gap_between(scene, work, 1, 0) <= 0.0 else 0
@@ -120,7 +120,7 @@ def placed(first: Run, system: System, near: float, seed: int, replicate: int) -
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
     numbers = 2.0 * np.pi * np.random.Generator(np.random.Philox(stream)).random(3)
     run.scene = first.scene._replace(key=key_of(seed, replicate))
-    run.work.motion[NOW] = 0.0
-    run.work.motion[NOW, :, 2] = numbers[:2]
-    run.work.motion[NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
+    run.work.motion[at.NOW] = 0.0
+    run.work.motion[at.NOW, :, 2] = numbers[:2]
+    run.work.motion[at.NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
     return run

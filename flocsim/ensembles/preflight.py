@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.arrays import NOW, ContactView, PairView, work_of
+import flocsim.arrays as at
+from flocsim.arrays import ContactView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
@@ -133,7 +134,7 @@ def check_numbers(system: System) -> None:
         ContactView(overlap, rate, 0.0, 0.0, mass, *radii)
         for overlap in CLOSE_OVERLAPS for rate in (-1e-4, 1e-4)
     ]  # fmt: skip
-    bodies = [body_view(scene, work, 0.0, NOW, body) for body in range(2)]
+    bodies = [body_view(scene, work, 0.0, at.NOW, body) for body in range(2)]
     views = {"body": bodies, "centre": pairs, "surface": pairs, "contact": contacts}
     for name, force in system.pieces.used.items():
         pieces = laws_of([force], system.fluid)

@@ -8,22 +8,8 @@ from enum import IntEnum
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import hooks
-from flocsim.arrays import (
-    ACROSS,
-    BEARABLE_STEP,
-    CLOCK_SIZE,
-    COUNTS_SIZE,
-    ESTIMATE_SHARE,
-    LARGEST_STEP,
-    MAX_STEPS,
-    PAUSE_AT,
-    PREVIOUS_STEP,
-    SETTLED_STEP,
-    STEP,
-    TOLERANCE,
-    UNTIL,
-)
 
 
 class Status(IntEnum):
@@ -122,21 +108,21 @@ class Integrator(ABC):
 
     def fresh_clock(self) -> np.ndarray:
         """The float state of a run that starts at time zero."""
-        clock = np.zeros(CLOCK_SIZE)
-        clock[UNTIL] = math.inf
-        clock[STEP] = self.first_step
-        clock[TOLERANCE] = self.tolerance
-        clock[LARGEST_STEP] = self.largest_step
-        clock[ESTIMATE_SHARE] = self.estimate_share
-        clock[PREVIOUS_STEP] = math.inf
-        clock[BEARABLE_STEP] = math.inf
-        clock[SETTLED_STEP] = math.inf
-        clock[ACROSS] = float(self.across)
+        clock = np.zeros(at.CLOCK_SIZE)
+        clock[at.UNTIL] = math.inf
+        clock[at.STEP] = self.first_step
+        clock[at.TOLERANCE] = self.tolerance
+        clock[at.LARGEST_STEP] = self.largest_step
+        clock[at.ESTIMATE_SHARE] = self.estimate_share
+        clock[at.PREVIOUS_STEP] = math.inf
+        clock[at.BEARABLE_STEP] = math.inf
+        clock[at.SETTLED_STEP] = math.inf
+        clock[at.ACROSS] = float(self.across)
         return clock
 
     def fresh_counts(self, max_steps: int) -> np.ndarray:
         """The integer state of a run with a step budget."""
-        counts = np.zeros(COUNTS_SIZE, dtype=np.int64)
-        counts[MAX_STEPS] = max_steps
-        counts[PAUSE_AT] = np.iinfo(np.int64).max
+        counts = np.zeros(at.COUNTS_SIZE, dtype=np.int64)
+        counts[at.MAX_STEPS] = max_steps
+        counts[at.PAUSE_AT] = np.iinfo(np.int64).max
         return counts

@@ -2,18 +2,7 @@
 
 import attrs
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    DEVIATION,
-    FIRST_STAGE,
-    FREE,
-    MOTION_COLUMNS,
-    NOW,
-    SLIP_RATES,
-    TIME,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
@@ -46,36 +35,38 @@ ORDER_OF_ESTIMATE = 5.0
 
 def state_of(stage):
     """The state of a stage: the first one is NOW."""
-    return NOW if stage == 0 else FIRST_STAGE + stage - 1
+    return at.NOW if stage == 0 else at.FIRST_STAGE + stage - 1
 
 
 def rate_of(scene, work, state, body, axis):
     """Rate of a place (axis 0–2) or of a velocity (axis 3–5) in a state."""
     rate = work.rates[state, body, axis]
-    if axis < VELOCITY:
+    if axis < at.VELOCITY:
         return rate
-    return rate * scene.bodies[body, FREE] / inertia(scene, body, axis - VELOCITY)
+    return rate * scene.bodies[body, at.FREE] / inertia(scene, body, axis - at.VELOCITY)
 
 
 def combine(scene, work, weights, stages, base, end):
     """State ``end`` = ``base`` times state NOW + the weighted rates of the first stages."""
     for body in range(scene.bodies.shape[0]):
-        for axis in range(MOTION_COLUMNS):
+        for axis in range(at.MOTION_COLUMNS):
             total = 0.0
             for stage in range(stages):
                 if weights[stage] != 0.0:
                     total += weights[stage] * rate_of(scene, work, state_of(stage), body, axis)
-            work.motion[end, body, axis] = base * work.motion[NOW, body, axis] + total
+            work.motion[end, body, axis] = base * work.motion[at.NOW, body, axis] + total
 
 
 def combine_slips(scene, work, weights, stages, step, end):
     """Tangential displacements of the closed pairs in state ``end``."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == 1:
             total = 0.0
             for stage in range(stages):
-                total += weights[stage] * work.slip[SLIP_RATES + state_of(stage), row]
-            work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
+                total += weights[stage] * work.slip[at.SLIP_RATES + state_of(stage), row]
+            work.slip[end, row] = slip_in(
+                scene, work, end, row, work.slip[at.NOW, row] + step * total
+            )
 
 
 def times(weights, step):
@@ -113,10 +104,10 @@ class DormandPrince54(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where the motion is no longer finite."""
-        time = clock[TIME]
+        time = clock[at.TIME]
         evaluate_stages(scene, work, time, step)
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
-        combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
+        combine(scene, work, times(ESTIMATE, step), 7, 0.0, at.DEVIATION)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod

@@ -9,7 +9,7 @@ reached; leaving it out saves what compiling it takes.
 import math
 from collections.abc import Callable
 
-from flocsim.arrays import DENSE
+import flocsim.arrays as at
 from flocsim.geometry.contact import body_pairs
 from flocsim.hooks import choose_method, step_across
 from flocsim.integrators.backward_euler.choice import FEWEST
@@ -46,7 +46,7 @@ def left_out(bodies: int) -> dict[Callable, Callable]:
     found: dict[Callable, Callable] = {}
     if bodies < FEWEST:
         found |= {choose_method: choose_method, step_across: step_across}
-    if bodies <= DENSE:
+    if bodies <= at.DENSE:
         found |= {
             body_pairs.list_near: list_none,
             body_pairs.wandered: none_wandered,

@@ -4,22 +4,7 @@ from collections.abc import Callable
 
 import attrs
 
-from flocsim.arrays import (
-    ACROSS,
-    CHANGE,
-    DEVIATION,
-    FIRST_STAGE,
-    FORCE,
-    FREE,
-    NOW,
-    PACE,
-    STAGED_AT,
-    STAGED_STEP,
-    STIFFNESS,
-    TIME,
-    VELOCITY,
-    X,
-)
+import flocsim.arrays as at
 from flocsim.fields import quantity
 from flocsim.hooks import (
     choose_method,
@@ -62,10 +47,10 @@ def estimated_rate(work, row, first, step):
     """Weighted mean of the stages' increments over h, of a place or, ``first`` being VELOCITY, of a
     velocity."""
     body, axis = row // 3, first + row % 3
-    now = work.motion[NOW, body, axis]
+    now = work.motion[at.NOW, body, axis]
     total = 0.0
     for stage in range(3):
-        total += ESTIMATE[stage] * (work.motion[FIRST_STAGE + stage, body, axis] - now)
+        total += ESTIMATE[stage] * (work.motion[at.FIRST_STAGE + stage, body, axis] - now)
     return total / step
 
 
@@ -74,12 +59,12 @@ def write_error_load(scene, work, step):
     for body in range(work.motion.shape[1]):
         for axis in range(3):
             row = 3 * body + axis
-            load = work.rates[NOW, body, FORCE + axis]
-            load += inertia(scene, body, axis) * estimated_rate(work, row, VELOCITY, step)
+            load = work.rates[at.NOW, body, at.FORCE + axis]
+            load += inertia(scene, body, axis) * estimated_rate(work, row, at.VELOCITY, step)
             work.loads[REAL, row] = load
-            drift = work.motion[NOW, body, VELOCITY + axis]
-            work.motion[CHANGE, body, axis] = drift + estimated_rate(work, row, X, step)
-    subtract_product(work, STIFFNESS, step / EIGENVALUES[REAL].real)
+            drift = work.motion[at.NOW, body, at.VELOCITY + axis]
+            work.motion[at.CHANGE, body, axis] = drift + estimated_rate(work, row, at.X, step)
+    subtract_product(work, at.STIFFNESS, step / EIGENVALUES[REAL].real)
 
 
 def estimate_error(scene, work, step):
@@ -87,19 +72,19 @@ def estimate_error(scene, work, step):
     solve_for_free(scene, work)
     damped = step / EIGENVALUES[REAL].real
     for body in range(work.motion.shape[1]):
-        free = scene.bodies[body, FREE]
+        free = scene.bodies[body, at.FREE]
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            drift = work.motion[CHANGE, body, axis]
-            work.motion[DEVIATION, body, axis] = free * damped * (speed + drift)
-            work.motion[DEVIATION, body, VELOCITY + axis] = free * speed
+            drift = work.motion[at.CHANGE, body, axis]
+            work.motion[at.DEVIATION, body, axis] = free * damped * (speed + drift)
+            work.motion[at.DEVIATION, body, at.VELOCITY + axis] = free * speed
 
 
 def is_tried_again(scene, clock):
     """Whether the step before began here as well, and is taken anew so that it ends at a switch:
     what was found out about its start is known still. Not so with surface forces, as which pairs
     have a share in them hangs on the size of the step."""
-    staged = clock[STAGED_STEP] > 0.0 and clock[STAGED_AT] == clock[TIME]
+    staged = clock[at.STAGED_STEP] > 0.0 and clock[at.STAGED_AT] == clock[at.TIME]
     return staged and scene.surface_reach <= 0.0
 
 
@@ -124,22 +109,22 @@ class Implicit(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where Newton's method fails."""
-        if clock[ACROSS] == 1.0:
+        if clock[at.ACROSS] == 1.0:
             return step_across(scene, work, clock, step)
-        time = clock[TIME]
+        time = clock[at.TIME]
         remaining = max(end_of_run(clock) - time, step)
         grazes = any_grazes(work)
         if grazes:
             release_gaps(work)
         if grazes or not is_tried_again(scene, clock):
-            evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
+            evaluate_states(scene, work, time, 0.0, at.NOW, at.NOW + 1)
             gather_clusters(scene, work)
             assemble_jacobian(scene, work, time, remaining)
         if grazes:
             if not factorise_systems(scene, work, step):
                 return -1.0
             if hold_gaps(scene, work, clock):
-                evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
+                evaluate_states(scene, work, time, 0.0, at.NOW, at.NOW + 1)
             assemble_jacobian(scene, work, time, remaining)
         if not factorise_systems(scene, work, step):
             return -1.0
@@ -155,11 +140,11 @@ class Implicit(Integrator):
     @staticmethod
     def next_step(clock, step, ratio):
         """The step for which the estimate and Newton's pace stay in bounds."""
-        if clock[ACROSS] == 1.0:
+        if clock[at.ACROSS] == 1.0:
             return next_across(clock, step, ratio)
         factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
-        if clock[PACE] > 0.0:
-            factor = min(factor, (COMFORTABLE_PACE / clock[PACE]) ** 0.5)
+        if clock[at.PACE] > 0.0:
+            factor = min(factor, (COMFORTABLE_PACE / clock[at.PACE]) ** 0.5)
         return step * max(factor, SMALLEST_FACTOR)
 
     @property

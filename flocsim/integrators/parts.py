@@ -9,20 +9,8 @@ from collections.abc import Callable
 
 import attrs
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    FORCE,
-    FREE,
-    GAP,
-    LARGEST_STEP,
-    MOTION_COLUMNS,
-    NEW,
-    NOW,
-    TIME,
-    UNTIL,
-    VELOCITY,
-)
+import flocsim.arrays as at
+from flocsim.arrays import NEW, NOW, TIME, UNTIL, VELOCITY
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator
@@ -62,8 +50,8 @@ def evaluate(scene, work, time, state):
 def acceleration(scene, work, state, body, axis):
     """Rate of change of a body's velocity (axis 0, 1) or spin (2) in an evaluated state; 0 where
     the body is fixed."""
-    force = work.rates[state, body, FORCE + axis]
-    return scene.bodies[body, FREE] * force / inertia(scene, body, axis)
+    force = work.rates[state, body, at.FORCE + axis]
+    return scene.bodies[body, at.FREE] * force / inertia(scene, body, axis)
 
 
 def move_slips(scene, work, step):
@@ -71,18 +59,18 @@ def move_slips(scene, work, step):
     at both ends of a fixed step whose start has been evaluated."""
     locate_and_rate(scene, work, NEW)
     slip = work.slip
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         slip[NEW, row] = 0.0
-        if work.candidates[row, CLOSED] == 1:
+        if work.candidates[row, at.CLOSED] == 1:
             rate = tangential_rate(work, NEW, row)
-            if work.geometry[NOW, row, GAP] < 0.0:
+            if work.geometry[NOW, row, at.GAP] < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))
             slip[NEW, row] = slip[NOW, row] + step * rate
 
 
 def all_finite(work, state):
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
+        for axis in range(at.MOTION_COLUMNS):
             if not math.isfinite(work.motion[state, body, axis]):
                 return False
     return True
@@ -103,7 +91,7 @@ class FixedStep(Integrator):
 
     @staticmethod
     def next_step(clock, step, ratio):
-        return clock[LARGEST_STEP]
+        return clock[at.LARGEST_STEP]
 
     @property
     def first_step(self) -> float:  # type: ignore[override]

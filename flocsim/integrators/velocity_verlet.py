@@ -2,7 +2,7 @@
 
 import attrs
 
-from flocsim.arrays import FIRST_STAGE, FORCE, FREE, NEW, NOW, TIME, VELOCITY
+import flocsim.arrays as at
 from flocsim.integrators.parts import (
     FixedStep,
     all_finite,
@@ -13,7 +13,7 @@ from flocsim.integrators.parts import (
     sum_forces,
 )
 
-HALFWAY = FIRST_STAGE
+HALFWAY = at.FIRST_STAGE
 """The state whose velocity is that of the middle of the step."""
 
 
@@ -22,28 +22,28 @@ def kick_and_drift(scene, work, step):
     motion = work.motion
     for body in range(motion.shape[1]):
         for axis in range(3):
-            speed = motion[NOW, body, VELOCITY + axis]
-            kick = gain(scene, work, NOW, body, axis, step)
-            motion[HALFWAY, body, VELOCITY + axis] = speed + 0.5 * kick
-            motion[NEW, body, axis] = motion[NOW, body, axis] + step * (speed + 0.5 * kick)
+            speed = motion[at.NOW, body, at.VELOCITY + axis]
+            kick = gain(scene, work, at.NOW, body, axis, step)
+            motion[HALFWAY, body, at.VELOCITY + axis] = speed + 0.5 * kick
+            motion[at.NEW, body, axis] = motion[at.NOW, body, axis] + step * (speed + 0.5 * kick)
             # Drag at the half step's velocity would be half a step late: take a whole kick's.
-            motion[NEW, body, VELOCITY + axis] = speed + kick
+            motion[at.NEW, body, at.VELOCITY + axis] = speed + kick
 
 
 def finish_kick(scene, work, step):
     """The velocity of NEW: that of HALFWAY and half a kick at the force of NEW."""
     for body in range(work.motion.shape[1]):
         for axis in range(3):
-            kick = gain(scene, work, NEW, body, axis, 0.5 * step)
-            work.motion[NEW, body, VELOCITY + axis] = (
-                work.motion[HALFWAY, body, VELOCITY + axis] + kick
+            kick = gain(scene, work, at.NEW, body, axis, 0.5 * step)
+            work.motion[at.NEW, body, at.VELOCITY + axis] = (
+                work.motion[HALFWAY, body, at.VELOCITY + axis] + kick
             )
 
 
 def gain(scene, work, state, body, axis, step):
     """Change of a velocity in a step at the force of a state."""
-    force = work.rates[state, body, FORCE + axis]
-    return step * scene.bodies[body, FREE] * force / inertia(scene, body, axis)
+    force = work.rates[state, body, at.FORCE + axis]
+    return step * scene.bodies[body, at.FREE] * force / inertia(scene, body, axis)
 
 
 @attrs.frozen
@@ -56,10 +56,10 @@ class VelocityVerlet(FixedStep):
     @staticmethod
     def attempt(scene, work, clock, step):
         """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
-        evaluate(scene, work, clock[TIME], NOW)
+        evaluate(scene, work, clock[at.TIME], at.NOW)
         kick_and_drift(scene, work, step)
         move_slips(scene, work, step)
-        sum_forces(scene, work, clock[TIME] + step, NEW)
+        sum_forces(scene, work, clock[at.TIME] + step, at.NEW)
         finish_kick(scene, work, step)
         limit_slips(scene, work)
-        return 0.0 if all_finite(work, NEW) else -1.0
+        return 0.0 if all_finite(work, at.NEW) else -1.0

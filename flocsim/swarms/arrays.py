@@ -5,7 +5,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.arrays import ACROSS, MOTION_COLUMNS, STEP, Scene
+import flocsim.arrays as at
+from flocsim.arrays import Scene
 from flocsim.geometry.contact.sweep import DISC_COLUMNS
 
 ERROR_COLUMNS = 6
@@ -67,8 +68,8 @@ class Swarm(NamedTuple):
     first: np.ndarray
     vertices: np.ndarray
     tree: np.ndarray
-    motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
-    carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
+    motion: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]
+    carried: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]  # the vector of the state's error
     errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
     steps: np.ndarray  # (n,): size of the next step [s]
     methods: np.ndarray  # (n,): 1 where steps of its island went on across switches, as ACROSS
@@ -76,8 +77,8 @@ class Swarm(NamedTuple):
     first_link: np.ndarray  # (n + 1,): where the contacts of a later body begin
     links: Annotated[np.ndarray, ("k", LINK_COLUMNS)]
     slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
-    new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
-    new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
+    new_motion: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]  # from here on: at the window's end
+    new_carried: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]
     new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
     new_steps: np.ndarray
     new_methods: np.ndarray
@@ -100,19 +101,19 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         vertices=scene.vertices,
         tree=scene.tree,
         motion=motion,
-        carried=np.zeros((n, MOTION_COLUMNS)),
+        carried=np.zeros((n, at.MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
-        steps=np.full(n, clock[STEP]),
-        methods=np.full(n, clock[ACROSS]),
+        steps=np.full(n, clock[at.STEP]),
+        methods=np.full(n, clock[at.ACROSS]),
         wander=np.zeros(n),
         first_link=np.zeros(n + 1, dtype=np.int64),
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
         slips=np.zeros((0, SLIP_COLUMNS)),
         new_motion=motion.copy(),
-        new_carried=np.zeros((n, MOTION_COLUMNS)),
+        new_carried=np.zeros((n, at.MOTION_COLUMNS)),
         new_errors=np.zeros((n, ERROR_COLUMNS)),
-        new_steps=np.full(n, clock[STEP]),
-        new_methods=np.full(n, clock[ACROSS]),
+        new_steps=np.full(n, clock[at.STEP]),
+        new_methods=np.full(n, clock[at.ACROSS]),
         stated=np.zeros(n),
         strayed=np.zeros(n),
         discs=np.zeros((n, DISC_COLUMNS)),

@@ -8,47 +8,8 @@ changes no number.
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    CANDIDATES_FULL,
-    CARRIED,
-    CLOCK_SIZE,
-    COUNTS_SIZE,
-    ERROR_PLACE,
-    EVALUATIONS,
-    FREE,
-    FULL,
-    HORIZON,
-    KEPT,
-    KEPT_EARLIER,
-    KEPT_EDGE,
-    KEPT_FLIGHTS,
-    KEPT_FORCE,
-    KEPT_GAP,
-    KEPT_LATER,
-    KEPT_MODE,
-    KEPT_OFFSET,
-    KEPT_SLIP,
-    KEPT_VERTEX,
-    MOTION_COLUMNS,
-    MOTION_ROWS,
-    NOW,
-    OPEN,
-    PAIRS,
-    REJECTED,
-    STATED,
-    STATES,
-    STEP,
-    STEPS,
-    TALLY_SIZE,
-    TIME,
-    UNTIL,
-    VX,
-    VY,
-    X,
-    Y,
-    all_counting,
-)
+import flocsim.arrays as at
+from flocsim.arrays import all_counting
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
@@ -84,15 +45,15 @@ def watch_paths(scene, work, observed, time):
     """Note how far bodies stray from the paths on which others count; 1 where the island is to
     stop."""
     for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             since = time - observed[body, SINCE]
             x = (
-                work.motion[NOW, body, X]
+                work.motion[at.NOW, body, at.X]
                 - observed[body, START_X]
                 - since * observed[body, PATH_VX]
             )
             y = (
-                work.motion[NOW, body, Y]
+                work.motion[at.NOW, body, at.Y]
                 - observed[body, START_Y]
                 - since * observed[body, PATH_VY]
             )
@@ -123,22 +84,22 @@ def put_state(swarm, work, members, first):
     """The state of its bodies into its work; nothing else of that is left from before."""
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
-        for row in range(MOTION_ROWS):
-            for axis in range(MOTION_COLUMNS):
+        for row in range(at.MOTION_ROWS):
+            for axis in range(at.MOTION_COLUMNS):
                 work.motion[row, body, axis] = 0.0
-        for row in range(STATES):
-            for axis in range(MOTION_COLUMNS):
+        for row in range(at.STATES):
+            for axis in range(at.MOTION_COLUMNS):
                 work.rates[row, body, axis] = 0.0
         for column in range(work.bodies.shape[1]):
             work.bodies[body, column] = 0.0
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NOW, body, axis] = swarm.motion[member, axis]
-            work.motion[CARRIED, body, axis] = swarm.carried[member, axis]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NOW, body, axis] = swarm.motion[member, axis]
+            work.motion[at.CARRIED, body, axis] = swarm.carried[member, axis]
         for kind in range(ERROR_COLUMNS):
-            work.bodies[body, ERROR_PLACE + kind] = swarm.errors[member, kind]
+            work.bodies[body, at.ERROR_PLACE + kind] = swarm.errors[member, kind]
         work.order[body] = body
         work.cluster[body] = body
-    for place in range(TALLY_SIZE):
+    for place in range(at.TALLY_SIZE):
         work.tally[place] = 0
     for place in range(work.elimination.found.shape[0]):
         work.elimination.found[place] = 0
@@ -168,29 +129,29 @@ def put_slips(swarm, scene, work, members, first):
                 continue
             if count == work.kept.shape[0]:
                 return False
-            work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = body, other
-            work.kept[count, KEPT_VERTEX] = local_point(
+            work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = body, other
+            work.kept[count, at.KEPT_VERTEX] = local_point(
                 swarm, scene, members, first, size, swarm.links[link, AT_VERTEX], body, other
             )
-            work.kept[count, KEPT_EDGE] = local_point(
+            work.kept[count, at.KEPT_EDGE] = local_point(
                 swarm, scene, members, first, size, swarm.links[link, AT_EDGE], body, other
             )
-            work.kept[count, KEPT_MODE] = swarm.links[link, MODE]
-            work.slip[KEPT_GAP, count] = swarm.slips[link, HELD_GAP]
-            work.slip[KEPT_FORCE, count] = swarm.slips[link, HELD_FORCE]
-            work.slip[KEPT_FLIGHTS, count] = swarm.slips[link, MICRO_FLIGHTS]
-            work.slip[KEPT_SLIP, count] = swarm.slips[link, SLIP]
-            work.slip[KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
+            work.kept[count, at.KEPT_MODE] = swarm.links[link, MODE]
+            work.slip[at.KEPT_GAP, count] = swarm.slips[link, HELD_GAP]
+            work.slip[at.KEPT_FORCE, count] = swarm.slips[link, HELD_FORCE]
+            work.slip[at.KEPT_FLIGHTS, count] = swarm.slips[link, MICRO_FLIGHTS]
+            work.slip[at.KEPT_SLIP, count] = swarm.slips[link, SLIP]
+            work.slip[at.KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
             count += 1
-    work.tally[KEPT] = count + 1
+    work.tally[at.KEPT] = count + 1
     return True
 
 
 def touch_plainly(work):
     """Let no contact graze or be held: where steps go on across switches there is none of that."""
-    for kept in range(work.tally[KEPT] - 1):
-        work.kept[kept, KEPT_MODE] = OPEN
-        work.slip[KEPT_GAP, kept] = 0.0
+    for kept in range(work.tally[at.KEPT] - 1):
+        work.kept[kept, at.KEPT_MODE] = at.OPEN
+        work.slip[at.KEPT_GAP, kept] = 0.0
 
 
 def local_point(swarm, scene, members, first, size, point, body, other):
@@ -213,54 +174,54 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
 
     Steps go on across switches where those of any of its bodies did, from their shortest step.
     """
-    for place in range(CLOCK_SIZE):
+    for place in range(at.CLOCK_SIZE):
         clock[place] = start_clock[place]
-    for place in range(COUNTS_SIZE):
+    for place in range(at.COUNTS_SIZE):
         counts[place] = start_counts[place]
-    clock[TIME], clock[UNTIL] = swarm.times[BEGIN], swarm.times[END]
-    clock[HORIZON] = swarm.times[HORIZON_AT]
+    clock[at.TIME], clock[at.UNTIL] = swarm.times[BEGIN], swarm.times[END]
+    clock[at.HORIZON] = swarm.times[HORIZON_AT]
     step, across = math.inf, 0.0
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
-        if swarm.bodies[member, FREE] == 1.0:
+        if swarm.bodies[member, at.FREE] == 1.0:
             other = swarm.methods[member]
             if other > across:
                 step, across = math.inf, other
             step = min(step, swarm.steps[member]) if other == across else step
         observed[body, START_X], observed[body, START_Y] = (
-            swarm.motion[member, X],
-            swarm.motion[member, Y],
+            swarm.motion[member, at.X],
+            swarm.motion[member, at.Y],
         )
-        observed[body, PATH_VX] = swarm.motion[member, VX]
-        observed[body, PATH_VY] = swarm.motion[member, VY]
+        observed[body, PATH_VX] = swarm.motion[member, at.VX]
+        observed[body, PATH_VY] = swarm.motion[member, at.VY]
         observed[body, SINCE], observed[body, FURTHEST] = swarm.times[BEGIN], 0.0
-    clock[ACROSS] = across
-    clock[STEP] = step if step < math.inf else start_clock[STEP]
+    clock[at.ACROSS] = across
+    clock[at.STEP] = step if step < math.inf else start_clock[at.STEP]
 
 
 def take_slips(swarm, scene, work, found, members, first):
     """Write down the displacements of its contacts; False without room."""
     count, begin = keep_slips(work), found.filled[0]
-    work.tally[KEPT] = 0
+    work.tally[at.KEPT] = 0
     if begin + count > found.links.shape[0]:
         return False
     for kept in range(count):
-        later, earlier = work.kept[kept, KEPT_LATER], work.kept[kept, KEPT_EARLIER]
+        later, earlier = work.kept[kept, at.KEPT_LATER], work.kept[kept, at.KEPT_EARLIER]
         row = begin + kept
         found.links[row, LATER_BODY] = members[first + later]
         found.links[row, EARLIER_BODY] = members[first + earlier]
         found.links[row, AT_VERTEX] = global_point(
-            swarm, scene, members, first, work.kept[kept, KEPT_VERTEX], later, earlier
+            swarm, scene, members, first, work.kept[kept, at.KEPT_VERTEX], later, earlier
         )
         found.links[row, AT_EDGE] = global_point(
-            swarm, scene, members, first, work.kept[kept, KEPT_EDGE], later, earlier
+            swarm, scene, members, first, work.kept[kept, at.KEPT_EDGE], later, earlier
         )
-        found.links[row, MODE] = work.kept[kept, KEPT_MODE]
-        found.slips[row, HELD_GAP] = work.slip[KEPT_GAP, kept]
-        found.slips[row, HELD_FORCE] = work.slip[KEPT_FORCE, kept]
-        found.slips[row, MICRO_FLIGHTS] = work.slip[KEPT_FLIGHTS, kept]
-        found.slips[row, SLIP] = work.slip[KEPT_SLIP, kept]
-        found.slips[row, OFFSET] = work.slip[KEPT_OFFSET, kept]
+        found.links[row, MODE] = work.kept[kept, at.KEPT_MODE]
+        found.slips[row, HELD_GAP] = work.slip[at.KEPT_GAP, kept]
+        found.slips[row, HELD_FORCE] = work.slip[at.KEPT_FORCE, kept]
+        found.slips[row, MICRO_FLIGHTS] = work.slip[at.KEPT_FLIGHTS, kept]
+        found.slips[row, SLIP] = work.slip[at.KEPT_SLIP, kept]
+        found.slips[row, OFFSET] = work.slip[at.KEPT_OFFSET, kept]
     found.filled[0] = begin + count
     return True
 
@@ -270,16 +231,16 @@ def take_state(swarm, work, observed, clock, members, first):
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
         swarm.strayed[member] = observed[body, FURTHEST]
-        if swarm.bodies[member, FREE] == 0.0:
+        if swarm.bodies[member, at.FREE] == 0.0:
             continue
-        for axis in range(MOTION_COLUMNS):
-            swarm.new_motion[member, axis] = work.motion[NOW, body, axis]
-            swarm.new_carried[member, axis] = work.motion[CARRIED, body, axis]
+        for axis in range(at.MOTION_COLUMNS):
+            swarm.new_motion[member, axis] = work.motion[at.NOW, body, axis]
+            swarm.new_carried[member, axis] = work.motion[at.CARRIED, body, axis]
         for kind in range(ERROR_COLUMNS):
-            swarm.new_errors[member, kind] = work.bodies[body, ERROR_PLACE + kind]
-        swarm.new_steps[member] = clock[STEP]
-        swarm.stated[member] = work.bodies[body, STATED]
-        swarm.new_methods[member] = clock[ACROSS]
+            swarm.new_errors[member, kind] = work.bodies[body, at.ERROR_PLACE + kind]
+        swarm.new_steps[member] = clock[at.STEP]
+        swarm.stated[member] = work.bodies[body, at.STATED]
+        swarm.new_methods[member] = clock[at.ACROSS]
 
 
 def run_islands(
@@ -295,12 +256,12 @@ def run_islands(
         for pair in range(work.budget.shape[0]):
             work.budget[pair] = -1.0
         if watches_all(work):
-            work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
+            work.tally[at.PAIRS] = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
-            work.tally[FULL] = CANDIDATES_FULL
+            work.tally[at.FULL] = at.CANDIDATES_FULL
             return island
         put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, begin)
-        if clock[ACROSS] == 1.0:
+        if clock[at.ACROSS] == 1.0:
             touch_plainly(work)
         code = advance(scene, work, observed, clock, counts, record)
         if code == NO_ROOM:
@@ -308,8 +269,8 @@ def run_islands(
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
             return island
         codes[island] = code
-        costs[island, STEPS_TAKEN] = counts[STEPS]
-        costs[island, STEPS_REJECTED] = counts[REJECTED]
-        costs[island, FORCES_SUMMED] = work.tally[EVALUATIONS]
+        costs[island, STEPS_TAKEN] = counts[at.STEPS]
+        costs[island, STEPS_REJECTED] = counts[at.REJECTED]
+        costs[island, FORCES_SUMMED] = work.tally[at.EVALUATIONS]
         take_state(swarm, work, observed, clock, members, begin)
     return last

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.arrays import ANGLE, BOUNDING_RADIUS, VY, X, Y
+import flocsim.arrays as at
 from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Gauge
@@ -48,13 +48,13 @@ class Leaving:
     def outside(self, swarm: Swarm, present: np.ndarray) -> np.ndarray:
         """Which bodies are outside, with all of their circles, and will not come back themselves:
         through the top only what rises."""
-        x, y = swarm.motion[:, X], swarm.motion[:, Y]
-        reach = swarm.bodies[:, BOUNDING_RADIUS]
+        x, y = swarm.motion[:, at.X], swarm.motion[:, at.Y]
+        reach = swarm.bodies[:, at.BOUNDING_RADIUS]
         found = np.zeros(len(x), bool)
         if not self.repeats[0]:
             found |= (x < -reach) | (x > self.area[0] + reach)
         if not self.repeats[1]:
-            found |= (y > self.area[1] + reach) & (swarm.motion[:, VY] > 0.0)
+            found |= (y > self.area[1] + reach) & (swarm.motion[:, at.VY] > 0.0)
             if not self.floor:
                 found |= y < -reach
         return found & present
@@ -64,7 +64,7 @@ class Leaving:
         out = self.outside(swarm, present)
         if not out.any():
             return []
-        near = self.gauge.neighbours(swarm.motion[:, : ANGLE + 1])
+        near = self.gauge.neighbours(swarm.motion[:, : at.ANGLE + 1])
         both = present[near.pairs].all(axis=1)
         near = attrs.evolve(
             near, pairs=near.pairs[both], gap=near.gap[both], vector=near.vector[both]
@@ -77,8 +77,8 @@ class Leaving:
     def removed(self, swarm: Swarm, gone: np.ndarray) -> Swarm:
         """The swarm without some bodies (n,) bool, which lie outside from now on."""
         swarm.motion[gone] = 0.0
-        apart = PARKED * max(float(swarm.bodies[:, BOUNDING_RADIUS].max()), *self.area)
-        axis = X if not self.repeats[0] else Y
+        apart = PARKED * max(float(swarm.bodies[:, at.BOUNDING_RADIUS].max()), *self.area)
+        axis = at.X if not self.repeats[0] else at.Y
         swarm.motion[gone, axis] = -apart * (2.0 + np.arange(len(gone)))[gone]
         for array in (swarm.stated, swarm.strayed, swarm.carried, swarm.errors):
             array[gone] = 0.0
@@ -91,7 +91,7 @@ class Leaving:
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(
             tuple(self.key), spawn_key=(int(members[0]), count)
         )))  # fmt: skip
-        place, reach = swarm.motion[members, :2], swarm.bodies[members, BOUNDING_RADIUS]
+        place, reach = swarm.motion[members, :2], swarm.bodies[members, at.BOUNDING_RADIUS]
         low = (place - reach[:, None]).min(axis=0)
         high = (place + reach[:, None]).max(axis=0)
         wide, tall = high - low
@@ -117,7 +117,7 @@ class Leaving:
         self, swarm: Swarm, places: np.ndarray, reach: np.ndarray, others: np.ndarray
     ) -> bool:
         """Whether circles keep clear of those around other bodies."""
-        there, radii = swarm.motion[others, :2], swarm.bodies[others, BOUNDING_RADIUS]
+        there, radii = swarm.motion[others, :2], swarm.bodies[others, at.BOUNDING_RADIUS]
         for place, radius in zip(places, reach, strict=True):
             way = there - place
             for axis in range(2):

@@ -8,7 +8,7 @@ not pass on what acts on them: each is a part of all islands that can reach it.
 
 import math
 
-from flocsim.arrays import ANGLE, BOUNDING_RADIUS, FREE, RADIUS, SPIN, VX, VY, X, Y
+import flocsim.arrays as at
 from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.sweep import (
     MOVES,
@@ -27,11 +27,14 @@ def set_discs(swarm, span, reach):
     """The discs of a window of so many seconds."""
     for body in range(swarm.bodies.shape[0]):
         disc = swarm.discs[body]
-        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, X], swarm.motion[body, Y]
-        disc[WAY_X], disc[WAY_Y] = span * swarm.motion[body, VX], span * swarm.motion[body, VY]
-        disc[REACH] = swarm.bodies[body, BOUNDING_RADIUS] + swarm.wander[body]
+        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, at.X], swarm.motion[body, at.Y]
+        disc[WAY_X], disc[WAY_Y] = (
+            span * swarm.motion[body, at.VX],
+            span * swarm.motion[body, at.VY],
+        )
+        disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.wander[body]
         disc[REACH] += 0.5 * reach
-        disc[MOVES] = swarm.bodies[body, FREE]
+        disc[MOVES] = swarm.bodies[body, at.FREE]
         if disc[MOVES] == 0.0:
             # Found below, by its outline: its circle may be as wide as the box.
             disc[WAY_X] = disc[WAY_Y] = disc[REACH] = 0.0
@@ -40,7 +43,7 @@ def set_discs(swarm, span, reach):
 
 def core_distance2(swarm, wall, x, y):
     """Squared distance of a point from the core of a fixed body [m²]; the point as seen from it."""
-    cosine, sine = math.cos(swarm.motion[wall, ANGLE]), math.sin(swarm.motion[wall, ANGLE])
+    cosine, sine = math.cos(swarm.motion[wall, at.ANGLE]), math.sin(swarm.motion[wall, at.ANGLE])
     x, y = cosine * x + sine * y, cosine * y - sine * x
     first, v, least = swarm.first[wall], swarm.vertices, math.inf
     points = swarm.first[wall + 1] - first
@@ -49,7 +52,9 @@ def core_distance2(swarm, wall, x, y):
         end = edge_end(first, points, start) if points > 1 else start
         if rings:
             end = start + int(v[start, ONWARD])
-        distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
+        distance2 = segment_distance2(
+            x, y, v[start, at.X], v[start, at.Y], v[end, at.X], v[end, at.Y]
+        )
         least = min(least, distance2)
     return least
 
@@ -66,11 +71,11 @@ def widest_swell(swarm, wall):
 def reaches_wall(swarm, body, wall, span, reach, width, height):
     """Whether a body can come to act on a fixed one in a window."""
     m = swarm.motion
-    x = nearest_way(m[body, X] - m[wall, X], width)
-    y = nearest_way(m[body, Y] - m[wall, Y], height)
-    way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
-    way += span * abs(m[wall, SPIN]) * swarm.bodies[wall, BOUNDING_RADIUS]
-    near = swarm.bodies[body, BOUNDING_RADIUS] + swarm.bodies[wall, RADIUS] + reach
+    x = nearest_way(m[body, at.X] - m[wall, at.X], width)
+    y = nearest_way(m[body, at.Y] - m[wall, at.Y], height)
+    way = span * math.hypot(m[body, at.VX] - m[wall, at.VX], m[body, at.VY] - m[wall, at.VY])
+    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall, at.BOUNDING_RADIUS]
+    near = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.bodies[wall, at.RADIUS] + reach
     near += way + swarm.wander[body] + widest_swell(swarm, wall)
     return core_distance2(swarm, wall, x, y) < near * near
 
@@ -97,12 +102,12 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
         labels[body] = body
     for pair in range(total):
         a, b = pairs[pair, 0], pairs[pair, 1]
-        if swarm.bodies[a, FREE] * swarm.bodies[b, FREE] == 1.0:
+        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
             one, other = first_of(labels, a), first_of(labels, b)
             labels[max(one, other)] = min(one, other)
     for body in range(n):
         labels[body] = labels[labels[body]]
-        free = swarm.bodies[body, FREE] == 1.0
+        free = swarm.bodies[body, at.FREE] == 1.0
         for each in range(walls.shape[0]):
             touches[body, each] = free and reaches_wall(
                 swarm, body, walls[each], span, reach, width, height

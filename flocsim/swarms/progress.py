@@ -12,7 +12,7 @@ import math
 import attrs
 import numpy as np
 
-from flocsim.arrays import BOUNDING_RADIUS, FREE, MASS, VX, VY
+import flocsim.arrays as at
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import (
     BEGIN,
@@ -96,8 +96,8 @@ class Progress:
         self.leaving = leaving
         self.gone = np.zeros(len(swarm.bodies), bool)
         self.returns = np.zeros(len(swarm.bodies), dtype=np.int64)
-        self.free = swarm.bodies[:, FREE] == 1.0
-        self.least_wander = LEAST_WANDER * swarm.bodies[:, BOUNDING_RADIUS]
+        self.free = swarm.bodies[:, at.FREE] == 1.0
+        self.least_wander = LEAST_WANDER * swarm.bodies[:, at.BOUNDING_RADIUS]
         swarm.wander[:] = self.least_wander
         swarm.times[HORIZON_AT] = until
         self.time, self.effort = 0.0, Effort()
@@ -109,11 +109,11 @@ class Progress:
     @property
     def mean_radius(self) -> float:
         """The mean bounding radius of the bodies that move [m]."""
-        return float(np.mean(self.swarm.bodies[self.free, BOUNDING_RADIUS]))
+        return float(np.mean(self.swarm.bodies[self.free, at.BOUNDING_RADIUS]))
 
     def time_to_go(self, way: float) -> float:
         """The time in which no body goes further than that against the mean of all [s]."""
-        velocity = self.swarm.motion[self.free][:, [VX, VY]]
+        velocity = self.swarm.motion[self.free][:, [at.VX, at.VY]]
         fastest = float(np.hypot(*(velocity - velocity.mean(axis=0)).T).max())
         return way / fastest if fastest > 0.0 else math.inf
 
@@ -237,7 +237,7 @@ class Progress:
         ):  # fmt: skip
             old[free] = new[free]
         length = swarm.times[END] - swarm.times[BEGIN]
-        swarm.motion[~free, :VX] += length * swarm.motion[~free, VX:]
+        swarm.motion[~free, : at.VX] += length * swarm.motion[~free, at.VX :]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, [(finished.links, finished.slips)])
@@ -250,7 +250,7 @@ class Progress:
         self.gone |= gone
         self.free &= ~gone
         swarm = self.swarm
-        swarm.bodies[gone, FREE] = swarm.bodies[gone, MASS] = 0.0
+        swarm.bodies[gone, at.FREE] = swarm.bodies[gone, at.MASS] = 0.0
 
     def let_leave(self) -> None:
         """Deal with what has left the box, as ``leaving`` says."""

@@ -11,18 +11,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    FREE,
-    FULL,
-    MASS,
-    NOTHING_FULL,
-    REJECTED,
-    STEPS,
-    Scene,
-    Work,
-    with_room,
-    work_of,
-)
+import flocsim.arrays as at
+from flocsim.arrays import Scene, Work, with_room, work_of
 from flocsim.integrators.base import Integrator
 from flocsim.swarms.arrays import (
     COST_COLUMNS,
@@ -82,7 +72,7 @@ class ThreadArrays:
     def tried(self) -> int:
         """Steps tried in the island that runs."""
         running = self.running
-        return 0 if running is None else int(running.counts[STEPS] + running.counts[REJECTED])
+        return 0 if running is None else int(running.counts[at.STEPS] + running.counts[at.REJECTED])
 
     def halt(self) -> None:
         """Let the islands that run stop at their next steps."""
@@ -194,8 +184,8 @@ class Runner:
         self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
     ) -> Islands:
         """The islands of a window of so many seconds."""
-        gone = swarm.bodies[:, MASS] == 0.0
-        walls = np.flatnonzero((swarm.bodies[:, FREE] == 0.0) & ~gone)
+        gone = swarm.bodies[:, at.MASS] == 0.0
+        walls = np.flatnonzero((swarm.bodies[:, at.FREE] == 0.0) & ~gone)
         labels = np.zeros(len(swarm.bodies), dtype=np.int64)
         touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
         while True:
@@ -222,7 +212,7 @@ class Runner:
             )  # fmt: skip
             if first == last:
                 return
-            if place.work.tally[FULL] == NOTHING_FULL:
+            if place.work.tally[at.FULL] == at.NOTHING_FULL:
                 own.found = larger(own.found)
             else:
                 place.work = with_room(place.work)

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import CANDIDATES, GAP, NOW, TIME, VELOCITY, copy_of, counts_as_pair
+import flocsim.arrays as at
+from flocsim.arrays import copy_of, counts_as_pair
 from flocsim.compiler.composer import compose
 from flocsim.compiler.reads import where
 from flocsim.forces.check import asked_at
@@ -38,36 +39,36 @@ MAY_BE_INFINITE = ("slip_limit", "contact_event")
 def locate(scene, work):
     """List the pairs of outlines that are near, and where they are; False without room."""
     room = list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     return room
 
 
 def views_of(system, scene, work, time):
     """{first part of laws' names: [what they are shown]} in the state NOW."""
     views = {
-        "body": [body_view(scene, work, time, NOW, body) for body in range(len(system.bodies))],
+        "body": [body_view(scene, work, time, at.NOW, body) for body in range(len(system.bodies))],
         "centre": [
-            centre_view(scene, work, time, NOW, a, b)
+            centre_view(scene, work, time, at.NOW, a, b)
             for a in range(len(system.bodies))
             for b in range(a)
             if counts_as_pair(scene.bodies, a, b)
         ],
     }
     if compose(locate, system.fillings(), jit=False)(scene, work):
-        rows = range(work.tally[CANDIDATES])
-        touching = [row for row in rows if work.geometry[NOW, row, GAP] < 0.0]
-        flag_near(scene, work, NOW, 0.0)
+        rows = range(work.tally[at.CANDIDATES])
+        touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
+        flag_near(scene, work, at.NOW, 0.0)
         views["surface"] = [
-            surface_view(scene, work, time, NOW, first, end) for first, end in runs_of(work)
+            surface_view(scene, work, time, at.NOW, first, end) for first, end in runs_of(work)
         ]
-        views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
+        views["contact"] = [contact_view(scene, work, at.NOW, row) for row in touching]
     return views
 
 
 def runs_of(work):
     """(first row, row behind the last) of the listed pairs of features of every two bodies."""
     row = 0
-    while row < work.tally[CANDIDATES]:
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
         yield row, end
         row = end
@@ -130,7 +131,7 @@ def force_to_blame(system: Any, run: Run) -> str:
     """The force of a System that gives NaN, or more than LARGEST, where a Run has ended, in words;
     or ""."""
     scene: Any = system.scene(jit=False)
-    start = run.work.motion[NOW].copy()
+    start = run.work.motion[at.NOW].copy()
     if not np.isfinite(start).all():
         return ""
     work = copy_of(run.work)
@@ -138,9 +139,9 @@ def force_to_blame(system: Any, run: Run) -> str:
     pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
     classes = [type(force) for force in used.values()]
     for ahead in AHEAD:
-        work.motion[NOW] = start
-        work.motion[NOW, :, :VELOCITY] += ahead * start[:, VELOCITY:]
-        views = views_of(system, scene, work, run.clock[TIME] + ahead)
+        work.motion[at.NOW] = start
+        work.motion[at.NOW, :, : at.VELOCITY] += ahead * start[:, at.VELOCITY :]
+        views = views_of(system, scene, work, run.clock[at.TIME] + ahead)
         for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)
             if words:

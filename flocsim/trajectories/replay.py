@@ -11,29 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    EDGE_BODY,
-    EDGE_START,
-    FIRST_STAGE,
-    FORCE,
-    GAP,
-    MAX_STEPS,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    STAGED_AT,
-    STAGED_STEP,
-    START,
-    UNTIL,
-    VERTEX,
-    VERTEX_BODY,
-    Scene,
-    Work,
-    copy_of,
-    with_room,
-)
+import flocsim.arrays as at
+from flocsim.arrays import Scene, Work, copy_of, with_room
 from flocsim.body import Body, Fluid
 from flocsim.forces.base import Force, names_of
 from flocsim.forces.codegen import laws_of
@@ -107,30 +86,33 @@ class Instant:
     @property
     def motion(self) -> np.ndarray:
         """x, y, angle and their rates (n, 6)."""
-        return self.work.motion[NOW]
+        return self.work.motion[at.NOW]
 
     def forces(self, scene: Scene) -> np.ndarray:
         """(n, 3) force and torque on every body [N, N, N m] of a scene with these or other laws."""
-        sum_forces(scene, self.work, self.time, NOW)
-        return self.work.rates[NOW, :, FORCE : FORCE + 3].copy()
+        sum_forces(scene, self.work, self.time, at.NOW)
+        return self.work.rates[at.NOW, :, at.FORCE : at.FORCE + 3].copy()
 
     def contacts(self) -> list[Contact]:
         """All contact points."""
         work, found = self.work, []
-        for row in range(work.tally[CANDIDATES]):
-            if work.candidates[row, CLOSED] == 1:
-                a, b = (int(work.candidates[row, place]) for place in (VERTEX_BODY, EDGE_BODY))
-                geometry = work.geometry[NOW, row]
+        for row in range(work.tally[at.CANDIDATES]):
+            if work.candidates[row, at.CLOSED] == 1:
+                a, b = (
+                    int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY)
+                )
+                geometry = work.geometry[at.NOW, row]
                 dx, dy = contact_point(work, row, a)
                 force = (0.0, 0.0)
                 if has(self.scene, CONTACT_FORCE):
-                    force = contact_force(self.scene, contact_view(self.scene, work, NOW, row))
+                    force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
+                motion = work.motion[at.NOW, a]
                 found.append(
                     Contact(
                         (a, b),
-                        (float(work.motion[NOW, a, 0] + dx), float(work.motion[NOW, a, 1] + dy)),
-                        (float(geometry[NORMAL_X]), float(geometry[NORMAL_Y])),
-                        float(-geometry[GAP]), float(work.slip[NOW, row]),
+                        (float(motion[0] + dx), float(motion[1] + dy)),
+                        (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
+                        float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
                         (float(force[0]), float(force[1])),
                     )
                 )  # fmt: skip
@@ -142,8 +124,8 @@ class Replay:
 
     def __init__(self, origin: Origin) -> None:
         self.origin, self.run, self.leg = origin, origin.begin(), 0
-        self.run.counts[MAX_STEPS] = np.iinfo(np.int64).max
-        self.run.clock[UNTIL] = origin.legs[0][1]
+        self.run.counts[at.MAX_STEPS] = np.iinfo(np.int64).max
+        self.run.clock[at.UNTIL] = origin.legs[0][1]
         self.scene = self.scene_of(origin.forces)
 
     def scene_of(self, forces: Sequence[Force]) -> Scene:
@@ -170,7 +152,7 @@ class Replay:
             last = legs[self.leg][0]
             if self.run.steps >= last and self.leg + 1 < len(legs):
                 self.leg += 1
-                self.run.clock[UNTIL] = legs[self.leg][1]
+                self.run.clock[at.UNTIL] = legs[self.leg][1]
                 continue
             self.run.advance(min(step, last) - self.run.steps)
 
@@ -183,7 +165,7 @@ class Replay:
             step = int(np.searchsorted(steps, time, side="right")) - 1
             if steps[step] == time:
                 self.to_step(step)
-                yield self.instant(time, self.run.work.motion[NOW], self.slips())
+                yield self.instant(time, self.run.work.motion[at.NOW], self.slips())
                 continue
             yield self.instant(time, *self.within(float(time), step, steps))
 
@@ -197,7 +179,7 @@ class Replay:
         ahead = copy.copy(self)
         ahead.run = self.run.copy()
         ahead.to_step(step + 1)
-        start, before, after = self.run.work.motion[NOW], self.slips(), ahead.slips()
+        start, before, after = self.run.work.motion[at.NOW], self.slips(), ahead.slips()
         share = (time - begin) / (end - begin)
         slips = {
             key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
@@ -208,30 +190,35 @@ class Replay:
     def slips(self) -> Slips:
         """The tangential displacements of all listed pairs now."""
         work = self.run.work
-        rows = range(work.tally[CANDIDATES])
-        return {key_of(work, row): float(work.slip[NOW, row]) for row in rows}
+        rows = range(work.tally[at.CANDIDATES])
+        return {key_of(work, row): float(work.slip[at.NOW, row]) for row in rows}
 
     def instant(self, time: float, motion: np.ndarray, slips: Slips) -> Instant:
         """The Instant of a motion (n, 6) near where the run is now."""
         work = copy_of(self.run.work)
-        work.motion[NOW] = motion
+        work.motion[at.NOW] = motion
         touching = has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0
         if touching or not watches_all(work):
-            while not work.tally[CANDIDATES] and not list_candidates(self.scene, work):
+            while not work.tally[at.CANDIDATES] and not list_candidates(self.scene, work):
                 work = with_room(work)
         if touching:
-            locate_contacts(self.scene, work, NOW)
+            locate_contacts(self.scene, work, at.NOW)
             set_closed(work)
-            for row in range(work.tally[CANDIDATES]):
-                work.slip[NOW, row] = slips.get(key_of(work, row), 0.0)
+            for row in range(work.tally[at.CANDIDATES]):
+                work.slip[at.NOW, row] = slips.get(key_of(work, row), 0.0)
             if self.scene.surface_reach > 0.0:
-                flag_near(self.scene, work, NOW, 0.0)
+                flag_near(self.scene, work, at.NOW, 0.0)
         return Instant(float(time), self.scene, work)
 
 
 def key_of(work, row):
     pair = work.candidates[row]
-    return int(pair[VERTEX_BODY]), int(pair[VERTEX]), int(pair[EDGE_BODY]), int(pair[EDGE_START])
+    return (
+        int(pair[at.VERTEX_BODY]),
+        int(pair[at.VERTEX]),
+        int(pair[at.EDGE_BODY]),
+        int(pair[at.EDGE_START]),
+    )
 
 
 def step_motion(
@@ -243,13 +230,13 @@ def step_motion(
     and where the stages are no longer those of the step, Hermite's through both ends.
     """
     work, clock = run.work, run.clock
-    stages = work.motion[[START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE]]
-    whole = float(clock[STAGED_STEP])
-    if whole == 0.0 and np.array_equal(stages[3], work.motion[NOW]):
+    stages = work.motion[[at.START, at.FIRST_STAGE, SECOND_STAGE, THIRD_STAGE]]
+    whole = float(clock[at.STAGED_STEP])
+    if whole == 0.0 and np.array_equal(stages[3], work.motion[at.NOW]):
         whole = end - begin
-    own = origin.has_stages and clock[STAGED_AT] == begin and whole > 0.0
+    own = origin.has_stages and clock[at.STAGED_AT] == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
-        return hermite(begin, end, start, work.motion[NOW], time)
+        return hermite(begin, end, start, work.motion[at.NOW], time)
     return cubic(stage_weights((time - begin) / whole), *stages)
 
 

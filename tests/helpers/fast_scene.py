@@ -6,8 +6,9 @@ from functools import cache
 
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import CANDIDATES, NOW, work_of
+from flocsim.arrays import work_of
 from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
@@ -25,11 +26,11 @@ def right_hand_side(scene, work):
     """List the candidates and sum the forces of state NOW; False where the list has no room."""
     if not list_candidates(scene, work):
         return False
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     set_closed(work)
-    flag_near(scene, work, NOW, 0.0)
-    locate_and_rate(scene, work, NOW)
-    sum_forces(scene, work, 0.0, NOW)
+    flag_near(scene, work, at.NOW, 0.0)
+    locate_and_rate(scene, work, at.NOW)
+    sum_forces(scene, work, 0.0, at.NOW)
     return True
 
 
@@ -39,7 +40,7 @@ def flagged(system):
     work = work_of(scene, *system.motion())
     work.budget[:] = -1.0
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
     return scene, work
 
@@ -76,7 +77,7 @@ def keys_of(scene, work):
     first = scene.first
     return [
         (int(a), int(point - first[a]), int(b), int(start - first[b]))
-        for a, point, b, start in work.candidates[: work.tally[CANDIDATES], :4]
+        for a, point, b, start in work.candidates[: work.tally[at.CANDIDATES], :4]
     ]
 
 
@@ -97,14 +98,14 @@ class FastScene:
             # A second listing has to hand the displacements back to the same pairs.
             self.put_slips(slips)
             assert self.evaluate(self.scene, self.work)
-        return self.work.rates[NOW, :, 3:].copy()
+        return self.work.rates[at.NOW, :, 3:].copy()
 
     def put_slips(self, slips):
         """Write displacements {pair: ξ} into the list; every pair must be in it."""
         keys = keys_of(self.scene, self.work)
         for key, slip in slips.items():
             row = keys.index(key if key in keys else self.other_way_round(key))
-            self.work.slip[NOW, row] = slip
+            self.work.slip[at.NOW, row] = slip
 
     def other_way_round(self, key):
         """The key of two spheres' one pair, whichever is called the vertex."""
@@ -113,7 +114,7 @@ class FastScene:
 
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
-        rows = self.work.geometry[NOW, : self.work.tally[CANDIDATES]]
+        rows = self.work.geometry[at.NOW, : self.work.tally[at.CANDIDATES]]
         return {
             key: row
             for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)
@@ -123,7 +124,7 @@ class FastScene:
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""
         nx, ny, across, along = row[0], row[1], row[3], row[4]
-        x, y = self.work.motion[NOW, key[0], :2]
+        x, y = self.work.motion[at.NOW, key[0], :2]
         return np.array([x + along * nx + across * ny, y + along * ny - across * nx])
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.arrays import EARLIER, LATER, PAIRS
+import flocsim.arrays as at
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 
 
@@ -12,8 +12,8 @@ def whole_matrix(work, which):
     matrix = np.zeros((n, 3, n, 3))
     for body in range(n):
         matrix[body, :, body] = blocks[body]
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         matrix[a, :, b] = blocks[lower_block(work, pair)]
         matrix[b, :, a] = blocks[upper_block(work, pair)]
     return matrix.reshape(3 * n, 3 * n)

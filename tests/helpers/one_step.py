@@ -1,7 +1,8 @@
 """Single steps of backward Euler, uncompiled, of a few bodies."""
 
+import flocsim.arrays as at
 from flocsim import System
-from flocsim.arrays import BUSY, NOW, TIME, UNTIL, VX, work_of
+from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
@@ -12,14 +13,14 @@ from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 
 def from_before(scene, work, clock, step):
     """One step from contacts as they are at its start, or else from anywhere."""
-    clock[BUSY] = 0.0
+    clock[at.BUSY] = 0.0
     begin_step(work, clock)
     return solve_step(scene, work, clock, step)
 
 
 def from_anywhere(scene, work, clock, step):
     """One step of whose contacts nothing is known."""
-    clock[BUSY] = 1.0
+    clock[at.BUSY] = 1.0
     begin_step(work, clock)
     return solve_step(scene, work, clock, step)
 
@@ -43,7 +44,7 @@ class Stage:
         self.scene = system.scene(jit=False)
         self.work = work_of(self.scene, *system.motion())
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
-        self.clock[UNTIL] = 1.0
+        self.clock[at.UNTIL] = 1.0
         assert self.linked(keep_lists)(self.scene, self.work, self.counts, 0.0)
 
     def linked(self, function):
@@ -60,16 +61,16 @@ class Stage:
 
     def locate(self):
         """Contacts anew, of what stands in NOW."""
-        self.linked(locate_contacts)(self.scene, self.work, NOW)
+        self.linked(locate_contacts)(self.scene, self.work, at.NOW)
 
     @property
     def time(self):
-        return self.clock[TIME]
+        return self.clock[at.TIME]
 
     @property
     def position(self):
-        return self.work.motion[NOW, :, :VX].copy()
+        return self.work.motion[at.NOW, :, : at.VX].copy()
 
     @property
     def velocity(self):
-        return self.work.motion[NOW, :, VX:].copy()
+        return self.work.motion[at.NOW, :, at.VX :].copy()

@@ -8,8 +8,9 @@ import math
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System, hooks
-from flocsim.arrays import NOW, work_of
+from flocsim.arrays import work_of
 from flocsim.forces import BodyForce, CentreForce, Contact, ContactForce, SurfaceForce
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators import Status
@@ -139,7 +140,7 @@ def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit
     run.work = work_of(run.scene, *system.motion(), capacity)
     status = run.to_end()
     return Watched(
-        motion=run.work.motion[NOW].copy(), status=status, time=run.time, steps=run.steps,
+        motion=run.work.motion[at.NOW].copy(), status=status, time=run.time, steps=run.steps,
         rejected=run.rejected, error=run.error,
         contacts=int(observed[CONTACTS]), deepest=float(observed[DEEPEST]),
         touch_time=float(observed[TOUCH_TIME]), touch_gap=float(observed[TOUCH_GAP]),

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
-from flocsim.arrays import NOW, work_of
+from flocsim.arrays import work_of
 from flocsim.bonds.bond import Load, bond_between
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -34,7 +35,7 @@ class TwoBodies:
         motion = np.zeros((2, 3)) if motion is None else np.asarray(motion)
         self.work = work_of(self.scene, np.asarray(places, dtype=float), motion)
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, NOW)
+        locate_contacts(self.scene, self.work, at.NOW)
         set_modes(self.scene, self.work)
 
     @property

@@ -9,8 +9,9 @@ import attrs
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere
-from flocsim.arrays import LARGEST_STEP, NEW, NOW, TIME, TOLERANCE, UNTIL, work_of
+from flocsim.arrays import work_of
 from flocsim.forces import Contact, StokesDrag
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
@@ -29,9 +30,9 @@ def even_steps(scene, work, clock, counts, step, count):
     for _ in range(count):
         if attempt(scene, work, clock, step) < 0.0:
             return False
-        locate_contacts(scene, work, NEW)
+        locate_contacts(scene, work, at.NEW)
         take_new_state(work)
-        clock[TIME] += step
+        clock[at.TIME] += step
     return True
 
 
@@ -61,10 +62,10 @@ def end_of(name, integrator, count):
     driver = system.compose(entry=even_steps, jit=False)
     scene = system.scene(jit=False)
     work, clock = work_of(scene, *system.motion()), integrator.fresh_clock()
-    clock[TOLERANCE] = min(clock[TOLERANCE], EXACT)
-    clock[UNTIL], clock[LARGEST_STEP] = until, until / count
+    clock[at.TOLERANCE] = min(clock[at.TOLERANCE], EXACT)
+    clock[at.UNTIL], clock[at.LARGEST_STEP] = until, until / count
     assert driver(scene, work, clock, integrator.fresh_counts(count), until / count, count)
-    return work.motion[NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
+    return work.motion[at.NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
 def orders(scene, integrator, counts, exact):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere
-from flocsim.arrays import TOUCHES
 from flocsim.integrators import Status
 from flocsim.swarms.arrays import with_links
 from flocsim.swarms.leaving import REENTER, REMOVE, Leaving
@@ -75,7 +75,7 @@ def test_a_cluster_comes_back_as_it_is():
     others = [(x * 3.0 * R, HIGH - 0.2 * R) for x in range(1, 5)]
     swarm = swarm_at([*pair, *others])
     progress = progress_of(swarm, REENTER)
-    links = np.array([[1, 0, 1, 0, TOUCHES]])
+    links = np.array([[1, 0, 1, 0, at.TOUCHES]])
     progress.swarm = with_links(progress.swarm, [(links, np.array([[1e-9, 0.0, 0.0, 0.0, 0.0]]))])
     progress.swarm.motion[:2, 3:] = [1e-4, -2e-4, 3.0]
     before = progress.swarm.motion.copy()

@@ -5,8 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import CLOSED, GRAZES, KEPT_MODE, OPEN, work_of
+from flocsim.arrays import work_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.swarms.arrays import (
     EARLIER_BODY,
@@ -168,7 +169,7 @@ def test_what_a_contact_goes_by_besides_places_goes_on_behind_a_window():
         fluid=WATER,
     )
     arrays = swarm.begin(1.0).swarm
-    links = np.array([[1, 0, 1, 0, GRAZES]])
+    links = np.array([[1, 0, 1, 0, at.GRAZES]])
     arrays = with_links(arrays, [(links, np.array([[1e-12, 2e-13, 3e-9, 4e-14, 5.0]]))])
     system = System(swarm.bodies, forces(), fluid=WATER)
     scene = system.scene(jit=False)
@@ -177,11 +178,11 @@ def test_what_a_contact_goes_by_besides_places_goes_on_behind_a_window():
     work.budget[:] = -1.0
     assert put_slips(arrays, scene, work, members, 0)
     list_candidates(scene, work)
-    assert work.candidates[0, CLOSED] == GRAZES
+    assert work.candidates[0, at.CLOSED] == at.GRAZES
     assert take_slips(arrays, scene, work, found, members, 0)
     assert found.filled[0] == 1
     assert found.links[0].tolist() == links[0].tolist()
     assert found.slips[0].tolist() == [1e-12, 2e-13, 3e-9, 4e-14, 5.0]
     assert put_slips(arrays, scene, work, members, 0)
     touch_plainly(work)
-    assert work.kept[0, KEPT_MODE] == OPEN
+    assert work.kept[0, at.KEPT_MODE] == at.OPEN

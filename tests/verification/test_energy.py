@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, System
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, INERTIA, MASS, NOW, SPIN, VX, VY
 from flocsim.forces import Contact, StokesDrag
 from flocsim.integrators import Status
 from tests.helpers.methods import by_adaptive
@@ -22,12 +22,12 @@ def energies(run):
     """(kinetic, normal, tangential) energy [J] of a Run now, its greatest overlap [m], and how many
     contacts it has."""
     work, bodies = run.work, run.scene.bodies
-    now, listed = work.motion[NOW], int(work.tally[CANDIDATES])
-    speeds = bodies[:, MASS] * (now[:, VX] ** 2 + now[:, VY] ** 2)
-    kinetic = 0.5 * np.sum(speeds + bodies[:, INERTIA] * now[:, SPIN] ** 2)
-    closed = work.candidates[:listed, CLOSED] > 0
-    overlap = -work.geometry[NOW, :listed, GAP][closed]
-    slip = work.slip[NOW, :listed][closed]
+    now, listed = work.motion[at.NOW], int(work.tally[at.CANDIDATES])
+    speeds = bodies[:, at.MASS] * (now[:, at.VX] ** 2 + now[:, at.VY] ** 2)
+    kinetic = 0.5 * np.sum(speeds + bodies[:, at.INERTIA] * now[:, at.SPIN] ** 2)
+    closed = work.candidates[:listed, at.CLOSED] > 0
+    overlap = -work.geometry[at.NOW, :listed, at.GAP][closed]
+    slip = work.slip[at.NOW, :listed][closed]
     parts = kinetic, 0.5 * K_N * np.sum(overlap**2), 0.5 * K_T * np.sum(slip**2)
     return parts, overlap.max(initial=0.0), int(closed.sum())
 

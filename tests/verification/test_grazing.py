@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, GRAZES, INERTIA, MASS, NOW, TOUCHES
 from flocsim.forces import Contact, Gravity
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.amplification import end_distance
@@ -43,13 +43,13 @@ def rod_on_a_bar(lean, gravity, speed, tolerance=1e-9, law=None):
 
 def energy(run, gravity):
     """Of the rod's motion, weight and springs [J]."""
-    work, (mass, inertia) = run.work, run.scene.bodies[1, [MASS, INERTIA]]
-    _, y, _, vx, vy, spin = work.motion[NOW, 1]
+    work, (mass, inertia) = run.work, run.scene.bodies[1, [at.MASS, at.INERTIA]]
+    _, y, _, vx, vy, spin = work.motion[at.NOW, 1]
     total = 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * spin**2 + mass * gravity * y
     law = Contact()
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
-            overlap, slip = work.geometry[NOW, row, GAP], work.slip[NOW, row]
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+            overlap, slip = work.geometry[at.NOW, row, at.GAP], work.slip[at.NOW, row]
             total += 0.5 * law.k_n * overlap**2 + 0.5 * law.k_t * slip**2
     return total
 
@@ -59,8 +59,8 @@ def carried(system, gravity=0.0, until=UNTIL):
     run = system.begin(until, max_steps=100_000)
     grazing, energies = 0, []
     while (status := run.advance(1)) == Status.PAUSED:
-        rows = run.work.candidates[: run.work.tally[CANDIDATES]]
-        grazing += bool(np.any(rows[:, CLOSED] == GRAZES))
+        rows = run.work.candidates[: run.work.tally[at.CANDIDATES]]
+        grazing += bool(np.any(rows[:, at.CLOSED] == at.GRAZES))
         energies.append(energy(run, gravity))
     assert status == Status.FINISHED
     return run, grazing, np.array(energies)
@@ -73,7 +73,7 @@ def test_the_limit_is_what_the_cycles_come_to_in_a_fraction_of_their_steps(scene
     exact, never, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
     assert grazing > 0 and never == 0
     assert 3 * run.steps < exact.steps
-    ends = (each.work.motion[NOW, :, :3] for each in (run, exact))
+    ends = (each.work.motion[at.NOW, :, :3] for each in (run, exact))
     assert end_distance(system.bodies, *ends) < run.error
 
 
@@ -92,8 +92,8 @@ def test_a_mirrored_scene_goes_the_mirrored_way(scene):
     lean, gravity, speed = scene
     run, _, _ = carried(rod_on_a_bar(lean, gravity, speed))
     other, _, _ = carried(rod_on_a_bar(-lean, gravity, -speed))
-    x, y, angle = run.work.motion[NOW, 1, :3]
-    found = other.work.motion[NOW, 1, :3]
+    x, y, angle = run.work.motion[at.NOW, 1, :3]
+    found = other.work.motion[at.NOW, 1, :3]
     # The rod's other end is the lower one then, but nothing tells its ends apart.
     assert np.abs(found - [-x, y, -angle])[:2].max() < run.error + other.error
 
@@ -102,4 +102,4 @@ def test_without_a_tangential_force_nothing_grazes():
     for law in (Contact(friction=0.0), Contact(k_t=0.0)):
         run, grazing, _ = carried(rod_on_a_bar(0.6, 1.0, -1e-3, law=law))
         assert grazing == 0 and run.steps < 100
-        assert run.work.motion[NOW, 1, 3] == pytest.approx(-1e-3, rel=1e-12)
+        assert run.work.motion[at.NOW, 1, 3] == pytest.approx(-1e-3, rel=1e-12)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.arrays import NOW
+import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import Config
@@ -214,7 +214,7 @@ def ending(row):
 
 def place_of(run: Run) -> np.ndarray:
     """Where bodies are (n, 3) [m, m, rad]."""
-    return run.work.motion[NOW, :, :3]
+    return run.work.motion[at.NOW, :, :3]
 
 
 def remark(scene: Scene, reference: Run, exact: Integrator) -> str:
@@ -234,7 +234,7 @@ def amplification(scene: Scene, reference: Run, exact: Integrator) -> float:
     shift = np.array([body.position for body in nudged(still, nudge)])
 
     def move(run):
-        run.work.motion[NOW, :, :2] += shift
+        run.work.motion[at.NOW, :, :2] += shift
 
     companion, _ = scene.run(exact, MORE_STEPS, reference.time, move)
     if companion.time < reference.time:

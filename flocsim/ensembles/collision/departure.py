@@ -9,19 +9,7 @@ in extension it does so for ever then.
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    INERTIA,
-    MASS,
-    NOW,
-    RADIUS,
-    SPIN,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.ensembles.collision.observed import (
     BODY_I,
     BODY_J,
@@ -58,18 +46,22 @@ CLEARANCE = 0.25
 def is_parting(scene, work, observed, time, nx, ny):
     """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
     motion = work.motion
-    rate = nx * (motion[NOW, BODY_J, VX] - motion[NOW, BODY_I, VX])
-    rate += ny * (motion[NOW, BODY_J, VY] - motion[NOW, BODY_I, VY])
+    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
+    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
     drift = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y]
     if has(scene, CENTRE_FORCE):
-        repulsion = centre_force(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I))
+        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
         drift += repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
     return rate > 0.0 and drift > 0.0
 
 
 def is_away(scene, work, observed, distance, gap):
     """Whether the outlines are further apart than the escape gap; cheap bounds first."""
-    far = distance - scene.bodies[BODY_I, BOUNDING_RADIUS] - scene.bodies[BODY_J, BOUNDING_RADIUS]
+    far = (
+        distance
+        - scene.bodies[BODY_I, at.BOUNDING_RADIUS]
+        - scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    )
     if far > observed[ESCAPE]:
         return True
     return (
@@ -83,25 +75,25 @@ def left_over(scene, work, observed):
     """How far j may still be carried off the drift against i by its present velocity [m]."""
     v, drift_time = work.motion, 0.0
     for body, mobility in ((BODY_I, observed[MOBILITY_I]), (BODY_J, observed[MOBILITY_J])):
-        drift_time = max(drift_time, scene.bodies[body, MASS] * mobility)
-    x = v[NOW, BODY_J, VX] - v[NOW, BODY_I, VX] - observed[DRIFT_X]
-    y = v[NOW, BODY_J, VY] - v[NOW, BODY_I, VY] - observed[DRIFT_Y]
+        drift_time = max(drift_time, scene.bodies[body, at.MASS] * mobility)
+    x = v[at.NOW, BODY_J, at.VX] - v[at.NOW, BODY_I, at.VX] - observed[DRIFT_X]
+    y = v[at.NOW, BODY_J, at.VY] - v[at.NOW, BODY_I, at.VY] - observed[DRIFT_Y]
     return drift_time * math.hypot(x, y)
 
 
 def turn_left(scene, work, time, body, passing):
     """How far an outline may still be moved by its turning [m] within the time of passing [s]."""
-    outer = scene.bodies[body, BOUNDING_RADIUS]
-    spin, damping = work.motion[NOW, body, SPIN], 0.0
+    outer = scene.bodies[body, at.BOUNDING_RADIUS]
+    spin, damping = work.motion[at.NOW, body, at.SPIN], 0.0
     if not has(scene, VELOCITY_DERIVATIVES) or spin == 0.0:
         return outer * abs(spin) * passing
-    view = body_view(scene, work, time, NOW, body)
+    view = body_view(scene, work, time, at.NOW, body)
     damping = -velocity_derivatives(scene, view)[8]
     if not damping > 0.0:
         return outer * abs(spin) * passing
     _, _, torque = body_force(scene, view)
     last = spin + torque / damping
-    turned = abs(spin - last) * scene.bodies[body, INERTIA] / damping + abs(last) * passing
+    turned = abs(spin - last) * scene.bodies[body, at.INERTIA] / damping + abs(last) * passing
     return outer * turned
 
 
@@ -109,19 +101,22 @@ def can_meet_again(scene, work, observed, time):
     """Whether the outlines may come together along the drift that is left."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
-    x = work.motion[NOW, BODY_J, X] - work.motion[NOW, BODY_I, X]
-    y = work.motion[NOW, BODY_J, Y] - work.motion[NOW, BODY_I, Y]
+    x = work.motion[at.NOW, BODY_J, at.X] - work.motion[at.NOW, BODY_I, at.X]
+    y = work.motion[at.NOW, BODY_J, at.Y] - work.motion[at.NOW, BODY_I, at.Y]
     along, aside = x * ux + y * uy, abs(x * uy - y * ux)
-    outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
+    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
     clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
     if (math.hypot(x, y) if along >= 0.0 else aside) >= outer + clear:
         return False
     passing = (outer + clear + max(-along, 0.0)) / drift
     clear += turn_left(scene, work, time, BODY_I, passing)
     clear += turn_left(scene, work, time, BODY_J, passing)
-    contact = scene.bodies[BODY_I, RADIUS] + scene.bodies[BODY_J, RADIUS]
+    contact = scene.bodies[BODY_I, at.RADIUS] + scene.bodies[BODY_J, at.RADIUS]
     turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
-    c, s = math.cos(work.motion[NOW, BODY_I, ANGLE]), math.sin(work.motion[NOW, BODY_I, ANGLE])
+    c, s = (
+        math.cos(work.motion[at.NOW, BODY_I, at.ANGLE]),
+        math.sin(work.motion[at.NOW, BODY_I, at.ANGLE]),
+    )
     ux, uy = c * ux + s * uy, c * uy - s * ux
     for _ in range(MOST_ADVANCES):
         gap = core_distance(scene, BODY_J, BODY_I, (turn_c, turn_s, x, y)) - contact
@@ -138,18 +133,18 @@ def can_meet_again(scene, work, observed, time):
 def is_carried_away(scene, work, observed, time, nx, ny, distance):
     """Whether a flow alone draws the bodies apart, beyond where their outlines reach and faster
     than attraction draws them together."""
-    outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
+    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
     if distance < outer + observed[ESCAPE]:
         return False
     stretch = nx * (observed[FLOW_XX] * nx + observed[FLOW_XY] * ny)
     stretch += ny * (observed[FLOW_YX] * nx + observed[FLOW_YY] * ny)
     speed = stretch * distance
     if has(scene, CENTRE_FORCE):
-        repulsion = centre_force(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I))
+        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
         speed += min(repulsion, 0.0) * (observed[MOBILITY_I] + observed[MOBILITY_J])
     motion = work.motion
-    rate = nx * (motion[NOW, BODY_J, VX] - motion[NOW, BODY_I, VX])
-    rate += ny * (motion[NOW, BODY_J, VY] - motion[NOW, BODY_I, VY])
+    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
+    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
     return speed > 0.0 and rate > 0.0
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import attrs
 
-from flocsim.arrays import NOW
+import flocsim.arrays as at
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, WHY, replicate_row
 from flocsim.integrators.base import Integrator, Status
@@ -75,7 +75,7 @@ class Draw:
     def system(self) -> System:
         """The plain System where the replicate starts."""
         system, bodies = self.encounter.system, []
-        starts = self.encounter.start(self.angles, self.share).motion[NOW].tolist()
+        starts = self.encounter.start(self.angles, self.share).motion[at.NOW].tolist()
         for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
             place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
             bodies.append(attrs.evolve(body, **place))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import EQUIVALENT_RADIUS
+import flocsim.arrays as at
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
@@ -82,8 +82,8 @@ def replicate_row(status, angles, run):
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
-        "r_i": run.scene.bodies[numbers.BODY_I, EQUIVALENT_RADIUS],
-        "r_j": run.scene.bodies[numbers.BODY_J, EQUIVALENT_RADIUS],
+        "r_i": run.scene.bodies[numbers.BODY_I, at.EQUIVALENT_RADIUS],
+        "r_j": run.scene.bodies[numbers.BODY_J, at.EQUIVALENT_RADIUS],
         "D_0": zone,
         "outcome": outcome,
         "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,

@@ -6,7 +6,7 @@ one that has not touched and rests so, one body over the other, in a secondary m
 one that has touched and is proved to stay together (flocsim.bonds).
 """
 
-from flocsim.arrays import NOW
+import flocsim.arrays as at
 from flocsim.bonds.bond import NO_BOND
 from flocsim.ensembles.collision.departure import has_departed
 from flocsim.ensembles.collision.observed import (
@@ -61,7 +61,7 @@ def follow(observed, distance):
 def look_at_pair(scene, work, observed, time):
     """(direction from i to j, d_c, the least gap of the listed features), their first touch and
     their distances noted."""
-    nx, ny, distance = centre_line(scene, work, NOW, BODY_J, BODY_I)
+    nx, ny, distance = centre_line(scene, work, at.NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(observed, time, distance)

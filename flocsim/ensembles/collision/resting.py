@@ -6,7 +6,7 @@ turns round in it, and the rest time is that of a whole turn.
 
 import math
 
-from flocsim.arrays import NOW
+import flocsim.arrays as at
 from flocsim.bonds.bond import CERTIFICATE, Load, bond_between, doublet_pose, way_between
 from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
@@ -38,14 +38,14 @@ def load_on(observed):
 def start_rest(scene, work, observed, time):
     """From now on the doublet may be resting as it is."""
     observed[REST_SINCE] = time
-    pose = doublet_pose(scene, work, NOW, BODY_I, BODY_J)
+    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
     observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = pose
 
 
 def rest_of(scene, work, observed, time, load):
     """How long the doublet has kept its pose without swinging, in rest times."""
     before = observed[REST_X], observed[REST_Y], observed[REST_ANGLE]
-    pose = doublet_pose(scene, work, NOW, BODY_I, BODY_J)
+    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
     moved = way_between(scene, BODY_I, BODY_J, pose, before)
     if moved > STILL * load.drift * observed[REST_TIME]:
         start_rest(scene, work, observed, time)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from flocsim.arrays import EVALUATIONS
+import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILED
 from flocsim.ensembles.pilot.sample import Task
@@ -70,7 +70,7 @@ def try_out(
         raise
     except Exception:
         return Trial(cpu=clock() - began, setup=setup), None
-    cost = WEIGHTS.get(type(job.integrator), 1.0) * int(run.work.tally[EVALUATIONS])
+    cost = WEIGHTS.get(type(job.integrator), 1.0) * int(run.work.tally[at.EVALUATIONS])
     outcome, inside, bond = (int(row[name]) for name in ("outcome", "inside", "bond"))
     found = Trial(outcome, inside, cost, run.time, clock() - began, setup, bond)
     return found, run

@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.arrays import UNTIL
+import flocsim.arrays as at
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels.study import study_of
@@ -88,7 +88,7 @@ def replicate_of(replicate: int, place: Place, study: Study, most: int | None = 
         row = draw.row(run, status)
         origin = Origin(
             system.bodies, system.forces, system.fluid, method or system.integrator, fresh, run,
-            ((run.steps, float(run.clock[UNTIL])),),
+            ((run.steps, float(run.clock[at.UNTIL])),),
         )  # fmt: skip
         lasted = time.perf_counter() - began
         return row, Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)

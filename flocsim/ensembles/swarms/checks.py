@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import GRAZES, OPEN
+import flocsim.arrays as at
 from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
 from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
@@ -144,7 +144,7 @@ def check_state(part: Part, form: Form) -> None:
     bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
     demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
     demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")
-    demand(np.all((links[:, MODE] >= OPEN) & (links[:, MODE] <= GRAZES)), "links")
+    demand(np.all((links[:, MODE] >= at.OPEN) & (links[:, MODE] <= at.GRAZES)), "links")
     demand(is_count(part.facts.get("moments"), form.moments), "moments")
     demand(part.facts["moments"] >= 1, "moments")
 

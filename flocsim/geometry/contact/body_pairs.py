@@ -8,18 +8,7 @@ on it reaches, and than two bodies may go until the next listing.
 
 import math
 
-from flocsim.arrays import (
-    ACTING,
-    ALL_PAIRS,
-    BOUNDING_RADIUS,
-    FREE,
-    FULL,
-    LISTED,
-    NOW,
-    PAIRS,
-    PAIRS_FULL,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.separation import length_of
 from flocsim.geometry.contact.sweep import (
     MOVES,
@@ -39,15 +28,15 @@ anew."""
 
 def watches_all(work):
     """Whether all pairs that count are watched."""
-    return work.bodies.shape[0] <= ALL_PAIRS
+    return work.bodies.shape[0] <= at.ALL_PAIRS
 
 
 def wander_of(scene):
     """How far a body may go until the pairs are listed anew [m]."""
     total, free = 0.0, 0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
-            total += scene.bodies[body, BOUNDING_RADIUS]
+        if scene.bodies[body, at.FREE] == 1.0:
+            total += scene.bodies[body, at.BOUNDING_RADIUS]
             free += 1
     return WANDER * total / max(free, 1)
 
@@ -57,11 +46,11 @@ def drift_of(scene, work, state, axis):
     where one is fixed."""
     total = 0.0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 0.0:
+        if scene.bodies[body, at.FREE] == 0.0:
             return 0.0
         total += work.motion[state, body, axis]
-        if axis < VELOCITY:
-            total -= work.bodies[body, LISTED + axis]
+        if axis < at.VELOCITY:
+            total -= work.bodies[body, at.LISTED + axis]
     return total / scene.bodies.shape[0]
 
 
@@ -71,8 +60,8 @@ def wandered(scene, work, state):
     most, furthest = wander_of(scene), 0.0
     drift_x, drift_y = drift_of(scene, work, state, 0), drift_of(scene, work, state, 1)
     for body in range(scene.bodies.shape[0]):
-        x = work.motion[state, body, 0] - work.bodies[body, LISTED] - drift_x
-        y = work.motion[state, body, 1] - work.bodies[body, LISTED + 1] - drift_y
+        x = work.motion[state, body, 0] - work.bodies[body, at.LISTED] - drift_x
+        y = work.motion[state, body, 1] - work.bodies[body, at.LISTED + 1] - drift_y
         furthest = max(furthest, length_of(x, y))
     return furthest / most
 
@@ -81,11 +70,11 @@ def wandered(scene, work, state):
 def time_to_wander(scene, work, share):
     """The time [s] in which no body goes further than a share of its way, at constant speed."""
     most, fastest = wander_of(scene), 0.0
-    drift_x = drift_of(scene, work, NOW, VELOCITY)
-    drift_y = drift_of(scene, work, NOW, VELOCITY + 1)
+    drift_x = drift_of(scene, work, at.NOW, at.VELOCITY)
+    drift_y = drift_of(scene, work, at.NOW, at.VELOCITY + 1)
     for body in range(scene.bodies.shape[0]):
-        x = work.motion[NOW, body, VELOCITY] - drift_x
-        y = work.motion[NOW, body, VELOCITY + 1] - drift_y
+        x = work.motion[at.NOW, body, at.VELOCITY] - drift_x
+        y = work.motion[at.NOW, body, at.VELOCITY + 1] - drift_y
         fastest = max(fastest, length_of(x, y))
     return share * most / fastest if fastest > 0.0 else math.inf
 
@@ -95,18 +84,18 @@ def list_near(scene, work, cut):
     """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
     discs, (width, height) = work.discs, scene.box
     for body in range(work.bodies.shape[0]):
-        discs[body, PLACE_X] = work.motion[NOW, body, 0]
-        discs[body, PLACE_Y] = work.motion[NOW, body, 1]
+        discs[body, PLACE_X] = work.motion[at.NOW, body, 0]
+        discs[body, PLACE_Y] = work.motion[at.NOW, body, 1]
         discs[body, WAY_X] = discs[body, WAY_Y] = 0.0
-        discs[body, REACH] = scene.bodies[body, BOUNDING_RADIUS] + 0.5 * cut
-        discs[body, MOVES] = scene.bodies[body, FREE]
+        discs[body, REACH] = scene.bodies[body, at.BOUNDING_RADIUS] + 0.5 * cut
+        discs[body, MOVES] = scene.bodies[body, at.FREE]
     total = near_pairs(discs, work.order, width, height, work.starts, work.pairs)
     if total > work.pairs.shape[0]:
-        work.tally[FULL], work.tally[PAIRS] = PAIRS_FULL, 0
+        work.tally[at.FULL], work.tally[at.PAIRS] = at.PAIRS_FULL, 0
         return False
     for pair in range(total):
-        work.pairs[pair, ACTING] = 0
-    work.tally[PAIRS] = total
+        work.pairs[pair, at.ACTING] = 0
+    work.tally[at.PAIRS] = total
     return True
 
 

@@ -7,28 +7,7 @@ body_pairs.py.
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    EARLIER,
-    EDGE_BODY,
-    EQUIVALENT_RADIUS,
-    FREE,
-    LATER,
-    LISTED,
-    NOW,
-    PAIR,
-    PAIRS,
-    RADIUS,
-    REBUILDS,
-    SPIN,
-    VERTEX_BODY,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.separation import length_of, separation
@@ -54,7 +33,7 @@ TOO_WIDE = 4.0
 def edge_length(scene, body):
     """The mean length of a body's edges [m], as if its outline were a circle's."""
     points = scene.first[body + 1] - scene.first[body]
-    return 2.0 * math.pi * scene.bodies[body, EQUIVALENT_RADIUS] / points
+    return 2.0 * math.pi * scene.bodies[body, at.EQUIVALENT_RADIUS] / points
 
 
 def widened(skin, way):
@@ -64,16 +43,16 @@ def widened(skin, way):
 
 def skin_of(scene, work, a, b, ahead):
     """Cut-off gap of the list of a pair of bodies for steps of ``ahead`` [s] [m]."""
-    size = min(scene.bodies[a, BOUNDING_RADIUS], scene.bodies[b, BOUNDING_RADIUS])
+    size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
     edge = min(edge_length(scene, a), edge_length(scene, b))
-    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
     skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
     return widened(skin, relative_speed(scene, work, a, b) * ahead)
 
 
 def list_for_surface_force(scene, work, pair, skin, reach):
     """List what can become the closest pair before the budget is spent; the budget [m]."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
     least = gap_between(scene, work, a, b)
     if least > reach + skin:
         return least - reach
@@ -88,11 +67,11 @@ def widest_cut(scene, work, ahead):
     ``ahead`` [s] [m]."""
     largest, contact, edge, fastest = 0.0, 0.0, 0.0, 0.0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
-            largest = max(largest, scene.bodies[body, BOUNDING_RADIUS])
+        if scene.bodies[body, at.FREE] == 1.0:
+            largest = max(largest, scene.bodies[body, at.BOUNDING_RADIUS])
             edge = max(edge, edge_length(scene, body))
             fastest = max(fastest, outline_speed(scene, work, body))
-        contact = max(contact, scene.bodies[body, RADIUS])
+        contact = max(contact, scene.bodies[body, at.RADIUS])
     skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
     reach = max(0.0, scene.surface_reach, scene.centre_reach)
     return reach + widened(skin, 2.0 * fastest * ahead)
@@ -101,31 +80,35 @@ def widest_cut(scene, work, ahead):
 def list_pair(scene, work, pair, ahead):
     """List the candidates of two bodies for steps of ``ahead`` [s]; how far they may move before it
     must be made again."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-    ox, oy = separation(scene, work, NOW, a, b)
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    ox, oy = separation(scene, work, at.NOW, a, b)
     reach = scene.surface_reach
     skin = skin_of(scene, work, a, b, ahead)
-    apart = length_of(ox, oy) - scene.bodies[a, BOUNDING_RADIUS] - scene.bodies[b, BOUNDING_RADIUS]
+    apart = (
+        length_of(ox, oy)
+        - scene.bodies[a, at.BOUNDING_RADIUS]
+        - scene.bodies[b, at.BOUNDING_RADIUS]
+    )
     if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
     if reach > 0.0:
         return list_for_surface_force(scene, work, pair, skin, reach)
-    before = work.tally[CANDIDATES]
+    before = work.tally[at.CANDIDATES]
     if not list_polygons(scene, work, pair, skin):
         return -math.inf
-    if work.tally[CANDIDATES] == before:
+    if work.tally[at.CANDIDATES] == before:
         return max(skin, gap_between(scene, work, a, b))
     return skin
 
 
 def since_listing(work, state, body, axis):
     """How much one coordinate of a body has changed since the listing."""
-    return work.motion[state, body, axis] - work.bodies[body, LISTED + axis]
+    return work.motion[state, body, axis] - work.bodies[body, at.LISTED + axis]
 
 
 def core_radius(scene, body):
     """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
-    return scene.bodies[body, BOUNDING_RADIUS] - scene.bodies[body, RADIUS]
+    return scene.bodies[body, at.BOUNDING_RADIUS] - scene.bodies[body, at.RADIUS]
 
 
 def shifted_by(dx, dy, ox, oy, turn):
@@ -144,12 +127,12 @@ def moved(scene, work, state, a, b, enough):
     """
     dx, dy = separation(scene, work, state, a, b)
     # Of the same image of a as now.
-    ox = work.bodies[a, LISTED + X] - work.bodies[b, LISTED + X]
-    oy = work.bodies[a, LISTED + Y] - work.bodies[b, LISTED + Y]
-    ox += dx - (work.motion[state, a, X] - work.motion[state, b, X])
-    oy += dy - (work.motion[state, a, Y] - work.motion[state, b, Y])
-    turn_a = since_listing(work, state, a, ANGLE)
-    turn_b = since_listing(work, state, b, ANGLE)
+    ox = work.bodies[a, at.LISTED + at.X] - work.bodies[b, at.LISTED + at.X]
+    oy = work.bodies[a, at.LISTED + at.Y] - work.bodies[b, at.LISTED + at.Y]
+    ox += dx - (work.motion[state, a, at.X] - work.motion[state, b, at.X])
+    oy += dy - (work.motion[state, a, at.Y] - work.motion[state, b, at.Y])
+    turn_a = since_listing(work, state, a, at.ANGLE)
+    turn_b = since_listing(work, state, b, at.ANGLE)
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
     plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
     if plain < enough:
@@ -164,14 +147,14 @@ def spent(scene, work, state):
     """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
     worst = 0.0
     if not watches_all(work):
-        if work.tally[REBUILDS] == 0:
+        if work.tally[at.REBUILDS] == 0:
             return math.inf
         worst = wandered(scene, work, state)
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         budget = work.budget[pair]
         if budget <= 0.0:
             return math.inf
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
     return worst
 
@@ -179,9 +162,9 @@ def spent(scene, work, state):
 def relative_speed(scene, work, a, b):
     """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
     v = work.motion
-    x, y = separation(scene, work, NOW, a, b)
-    vx, vy = v[NOW, a, VX] - v[NOW, b, VX], v[NOW, a, VY] - v[NOW, b, VY]
-    spin_a, spin_b = v[NOW, a, SPIN], v[NOW, b, SPIN]
+    x, y = separation(scene, work, at.NOW, a, b)
+    vx, vy = v[at.NOW, a, at.VX] - v[at.NOW, b, at.VX], v[at.NOW, a, at.VY] - v[at.NOW, b, at.VY]
+    spin_a, spin_b = v[at.NOW, a, at.SPIN], v[at.NOW, b, at.SPIN]
     turning = abs(spin_a - spin_b)
     seen_from_b = length_of(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
     seen_from_a = length_of(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
@@ -191,15 +174,17 @@ def relative_speed(scene, work, a, b):
 def outline_speed(scene, work, body):
     """A bound of how fast the core of a body moves now [m/s]."""
     v = work.motion
-    turning = abs(v[NOW, body, SPIN]) * core_radius(scene, body)
-    return length_of(v[NOW, body, VX], v[NOW, body, VY]) + turning
+    turning = abs(v[at.NOW, body, at.SPIN]) * core_radius(scene, body)
+    return length_of(v[at.NOW, body, at.VX], v[at.NOW, body, at.VY]) + turning
 
 
 def time_within(scene, work, share):
     """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
     longest = math.inf if watches_all(work) else time_to_wander(scene, work, share)
-    for pair in range(work.tally[PAIRS]):
-        speed = relative_speed(scene, work, work.pairs[pair, LATER], work.pairs[pair, EARLIER])
+    for pair in range(work.tally[at.PAIRS]):
+        speed = relative_speed(
+            scene, work, work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        )
         if speed > 0.0:
             longest = min(longest, share * work.budget[pair] / speed)
     return longest
@@ -209,9 +194,9 @@ def too_wide(scene, work, ahead):
     """Whether the lists of few bodies are far wider than steps of ``ahead`` [s] need."""
     before = -1
     if watches_all(work):
-        for row in range(work.tally[CANDIDATES]):
-            pair = work.candidates[row, PAIR]
-            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        for row in range(work.tally[at.CANDIDATES]):
+            pair = work.candidates[row, at.PAIR]
+            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
             if pair != before and work.budget[pair] > TOO_WIDE * skin_of(scene, work, a, b, ahead):
                 return True
             before = pair
@@ -226,15 +211,15 @@ def list_candidates(scene, work):
 def list_ahead(scene, work, ahead):
     """The same, for steps of ``ahead`` [s]."""
     kept = keep_slips(work)
-    work.tally[CANDIDATES] = 0
-    work.tally[REBUILDS] += 1
+    work.tally[at.CANDIDATES] = 0
+    work.tally[at.REBUILDS] += 1
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
-            work.bodies[body, LISTED + axis] = work.motion[NOW, body, axis]
+            work.bodies[body, at.LISTED + axis] = work.motion[at.NOW, body, axis]
     if not list_pairs(scene, work, widest_cut(scene, work, ahead)):
         return False
     room = True
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         budget = list_pair(scene, work, pair, ahead)
         work.budget[pair] = budget
         room = room and budget > 0.0

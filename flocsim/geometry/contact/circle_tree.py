@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from flocsim.arrays import X, Y
+import flocsim.arrays as at
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
 
@@ -181,11 +181,16 @@ def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, X], vertices[point, Y])
+        x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             distance2 = segment_distance2(
-                x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
+                x,
+                y,
+                vertices[start, at.X],
+                vertices[start, at.Y],
+                vertices[end, at.X],
+                vertices[end, at.Y],
             )
             least = min(least, distance2)
     return least

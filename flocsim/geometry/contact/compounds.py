@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.arrays import EDGE_BODY, EDGE_START, LATER, RADIUS, VERTEX, VERTEX_BODY, X, Y
+import flocsim.arrays as at
 from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.circle_tree import (
@@ -100,10 +100,10 @@ def begins_pair(vertices, point, start, is_later):
 
 def feature_distance2(vertices, pose, point, start):
     """Squared distance of the cores of a point and of what begins at another body's point [m²]."""
-    x, y = posed(pose, vertices[point, X], vertices[point, Y])
+    x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
     end = start + int(vertices[start, ONWARD])
     return segment_distance2(
-        x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
+        x, y, vertices[start, at.X], vertices[start, at.Y], vertices[end, at.X], vertices[end, at.Y]
     )
 
 
@@ -115,7 +115,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     room = True
     for point in range(start_a, end_a):
         for start in range(start_b, end_b):
-            if begins_pair(vertices, point, start, a == work.pairs[pair, LATER]):
+            if begins_pair(vertices, point, start, a == work.pairs[pair, at.LATER]):
                 limit = reach + vertices[point, SWELL] + vertices[start, SWELL]
                 if feature_distance2(vertices, pose, point, start) < limit * limit:
                     end = start + int(vertices[start, ONWARD])
@@ -173,11 +173,11 @@ def swollen_distance(outlines, a, b, pose):
 
 def swollen_radii(scene, work, row):
     """points.row_radii, of the parts that the vertex and the edge belong to [m]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    point, start = work.candidates[row, VERTEX], work.candidates[row, EDGE_START]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    point, start = work.candidates[row, at.VERTEX], work.candidates[row, at.EDGE_START]
     return (
-        scene.bodies[a, RADIUS] + scene.vertices[point, SWELL],
-        scene.bodies[b, RADIUS] + scene.vertices[start, SWELL],
+        scene.bodies[a, at.RADIUS] + scene.vertices[point, SWELL],
+        scene.bodies[b, at.RADIUS] + scene.vertices[start, SWELL],
     )
 
 

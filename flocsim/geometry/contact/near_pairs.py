@@ -5,27 +5,7 @@ Both trees of circles are walked against each other (see circle_tree.py), in the
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    CANDIDATES,
-    CANDIDATES_FULL,
-    CLOSED,
-    EARLIER,
-    EDGE_BODY,
-    EDGE_END,
-    EDGE_START,
-    FULL,
-    LATER,
-    NEAR,
-    NOW,
-    PAIR,
-    RADIUS,
-    SLIDING,
-    VERTEX,
-    VERTEX_BODY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.circle_tree import (
     START,
     at_leaves,
@@ -47,27 +27,27 @@ from flocsim.hooks import hook
 
 def pose_of(scene, work, a, b):
     """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
-    x, y = separation(scene, work, NOW, a, b)
-    turn = work.motion[NOW, a, ANGLE] - work.motion[NOW, b, ANGLE]
-    c, s = math.cos(work.motion[NOW, b, ANGLE]), math.sin(work.motion[NOW, b, ANGLE])
+    x, y = separation(scene, work, at.NOW, a, b)
+    turn = work.motion[at.NOW, a, at.ANGLE] - work.motion[at.NOW, b, at.ANGLE]
+    c, s = math.cos(work.motion[at.NOW, b, at.ANGLE]), math.sin(work.motion[at.NOW, b, at.ANGLE])
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
 def add_pair(work, pair, a, point, b, start, end):
     """Append a pair of features to the list; False where no room is left."""
-    row = work.tally[CANDIDATES]
+    row = work.tally[at.CANDIDATES]
     if row == work.candidates.shape[0]:
-        work.tally[FULL] = CANDIDATES_FULL
+        work.tally[at.FULL] = at.CANDIDATES_FULL
         return False
-    work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX] = a, point
+    work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.VERTEX] = a, point
     (
-        work.candidates[row, EDGE_BODY],
-        work.candidates[row, EDGE_START],
-        work.candidates[row, EDGE_END],
+        work.candidates[row, at.EDGE_BODY],
+        work.candidates[row, at.EDGE_START],
+        work.candidates[row, at.EDGE_END],
     ) = b, start, end
-    work.candidates[row, CLOSED], work.candidates[row, NEAR] = 0, 0
-    work.candidates[row, SLIDING], work.candidates[row, PAIR] = 0, pair
-    work.tally[CANDIDATES] = row + 1
+    work.candidates[row, at.CLOSED], work.candidates[row, at.NEAR] = 0, 0
+    work.candidates[row, at.SLIDING], work.candidates[row, at.PAIR] = 0, pair
+    work.tally[at.CANDIDATES] = row + 1
     return True
 
 
@@ -81,11 +61,16 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     start_b, end_b = run_of(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, X], vertices[point, Y])
+        x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             distance2 = segment_distance2(
-                x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
+                x,
+                y,
+                vertices[start, at.X],
+                vertices[start, at.Y],
+                vertices[end, at.X],
+                vertices[end, at.Y],
             )
             if distance2 < reach * reach:
                 room = add_pair(work, pair, a, point, b, start, end) and room
@@ -95,13 +80,13 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 @hook
 def list_polygons(scene, work, pair, cutoff):
     """List the pairs of features of two bodies, both ways round; False for a full list."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
     side_a, side_b = side_of(scene, a), side_of(scene, b)
     _, points_a, _, _ = side_a
     _, points_b, _, _ = side_b
     if points_a == 1 and points_b == 1:
         return list_spheres(scene, work, pair, cutoff)
-    reach = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS] + cutoff
+    reach = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS] + cutoff
     pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
     plan = plan_of(scene.tree, side_a, side_b)
@@ -122,7 +107,7 @@ def list_polygons(scene, work, pair, cutoff):
 
 def list_spheres(scene, work, pair, cutoff):
     """List the one pair of two spheres where its gap is below the cut-off; False if full."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
     point = scene.first[b]
@@ -131,12 +116,12 @@ def list_spheres(scene, work, pair, cutoff):
 
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
-    ox, oy = separation(scene, work, NOW, a, b)
-    return length_of(ox, oy) - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+    ox, oy = separation(scene, work, at.NOW, a, b)
+    return length_of(ox, oy) - scene.bodies[a, at.RADIUS] - scene.bodies[b, at.RADIUS]
 
 
 @hook
 def gap_between(scene, work, a, b):
     """The distance between two outlines now [m], negative where they overlap."""
-    contact = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
+    contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
     return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact

@@ -11,34 +11,7 @@ the vertex is shifted along t: 0 where the foot lies inside the edge, which alon
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    CANDIDATES,
-    CLOSED,
-    COSINE,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    EDGE_END,
-    EDGE_START,
-    FOOT,
-    GAP,
-    GAP_OFFSET,
-    NEAR,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    RADIUS,
-    SIDE,
-    SINE,
-    TURNING,
-    VERTEX,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.rotation import cosine_and_sine
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.shapes.cores import closest_share
@@ -51,8 +24,8 @@ TINY = 1e-300
 @hook
 def turn_body(work, state, body):
     """Cosine and sine of a body's angle in a state, into ``work.bodies``."""
-    cosine, sine = cosine_and_sine(work, body, work.motion[state, body, ANGLE])
-    work.bodies[body, COSINE], work.bodies[body, SINE] = cosine, sine
+    cosine, sine = cosine_and_sine(work, body, work.motion[state, body, at.ANGLE])
+    work.bodies[body, at.COSINE], work.bodies[body, at.SINE] = cosine, sine
 
 
 def turn_bodies(work, state):
@@ -63,43 +36,43 @@ def turn_bodies(work, state):
 
 def turned(scene, work, body, point):
     """A core point relative to its body's centroid, in the frame of the scene."""
-    x = scene.vertices[point, X]
-    y = scene.vertices[point, Y]
-    c = work.bodies[body, COSINE]
-    s = work.bodies[body, SINE]
+    x = scene.vertices[point, at.X]
+    y = scene.vertices[point, at.Y]
+    c = work.bodies[body, at.COSINE]
+    s = work.bodies[body, at.SINE]
     return c * x - s * y, s * x + c * y
 
 
 def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side):
     """Write one geometry row from the normal and the two arms of the contact point."""
     geometry = work.geometry
-    geometry[state, row, NORMAL_X] = nx
-    geometry[state, row, NORMAL_Y] = ny
-    geometry[state, row, GAP] = gap - work.slip[GAP_OFFSET, row]
-    geometry[state, row, VERTEX_ARM_N] = ax * ny - ay * nx
-    geometry[state, row, VERTEX_ARM_T] = ax * nx + ay * ny
-    geometry[state, row, EDGE_ARM_N] = bx * ny - by * nx
-    geometry[state, row, EDGE_ARM_T] = bx * nx + by * ny
-    geometry[state, row, TURNING] = turning
-    geometry[state, row, FOOT] = foot
-    geometry[state, row, SIDE] = side
+    geometry[state, row, at.NORMAL_X] = nx
+    geometry[state, row, at.NORMAL_Y] = ny
+    geometry[state, row, at.GAP] = gap - work.slip[at.GAP_OFFSET, row]
+    geometry[state, row, at.VERTEX_ARM_N] = ax * ny - ay * nx
+    geometry[state, row, at.VERTEX_ARM_T] = ax * nx + ay * ny
+    geometry[state, row, at.EDGE_ARM_N] = bx * ny - by * nx
+    geometry[state, row, at.EDGE_ARM_T] = bx * nx + by * ny
+    geometry[state, row, at.TURNING] = turning
+    geometry[state, row, at.FOOT] = foot
+    geometry[state, row, at.SIDE] = side
 
 
 @hook
 def row_radii(scene, work, row):
     """(of the vertex, of the edge) of a pair: the radii of the disks that sweep them [m]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    return scene.bodies[a, RADIUS], scene.bodies[b, RADIUS]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    return scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS]
 
 
 @hook
 def locate_polygons(scene, work, state, row):
     """Geometry of one vertex–edge pair; a vertex right on the edge gets an arbitrary normal."""
-    a, point = work.candidates[row, VERTEX_BODY], work.candidates[row, VERTEX]
+    a, point = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.VERTEX]
     b, start, end = (
-        work.candidates[row, EDGE_BODY],
-        work.candidates[row, EDGE_START],
-        work.candidates[row, EDGE_END],
+        work.candidates[row, at.EDGE_BODY],
+        work.candidates[row, at.EDGE_START],
+        work.candidates[row, at.EDGE_END],
     )
     px, py = turned(scene, work, a, point)
     sx, sy = turned(scene, work, b, start)
@@ -127,15 +100,15 @@ def locate_polygons(scene, work, state, row):
 
 def locate_spheres(scene, work, state, row):
     """Geometry of two spheres: nothing to turn."""
-    a = work.candidates[row, VERTEX_BODY]
-    b = work.candidates[row, EDGE_BODY]
+    a = work.candidates[row, at.VERTEX_BODY]
+    b = work.candidates[row, at.EDGE_BODY]
     ox, oy = separation(scene, work, state, a, b)
     distance = length_of(ox, oy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = ox / distance, oy / distance
-    middle = 0.5 * (distance + scene.bodies[b, RADIUS] - scene.bodies[a, RADIUS])
-    gap = distance - scene.bodies[a, RADIUS] - scene.bodies[b, RADIUS]
+    middle = 0.5 * (distance + scene.bodies[b, at.RADIUS] - scene.bodies[a, at.RADIUS])
+    gap = distance - scene.bodies[a, at.RADIUS] - scene.bodies[b, at.RADIUS]
     bx, by = middle * nx, middle * ny
     turning = 1.0 / max(distance, TINY)
     store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
@@ -145,9 +118,9 @@ def locate_contacts(scene, work, state):
     """Geometry of all listed pairs in a state; the smallest gap (inf without pairs)."""
     turn_bodies(work, state)
     least = math.inf
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         locate_polygons(scene, work, state, row)
-        least = min(least, work.geometry[state, row, GAP])
+        least = min(least, work.geometry[state, row, at.GAP])
     return least
 
 
@@ -155,14 +128,14 @@ def locate_contacts(scene, work, state):
 def locate_acting(scene, work, state):
     """Geometry, in a state, of the listed pairs through which forces act in this step."""
     turn_bodies(work, state)
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0:
             locate_polygons(scene, work, state, row)
 
 
 def least_listed_gap(work):
     """The smallest gap among the listed pairs now (inf where none is listed)."""
     least = math.inf
-    for row in range(work.tally[CANDIDATES]):
-        least = min(least, work.geometry[NOW, row, GAP])
+    for row in range(work.tally[at.CANDIDATES]):
+        least = min(least, work.geometry[at.NOW, row, at.GAP])
     return least

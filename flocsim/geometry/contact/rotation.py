@@ -13,7 +13,7 @@ turned back, finds the same.
 
 import math
 
-from flocsim.arrays import KNOWN_ANGLE, KNOWN_COSINE, KNOWN_SINE
+import flocsim.arrays as at
 
 PER_RADIAN = 64.0
 """Angles for which both are known lie this close."""
@@ -25,10 +25,10 @@ LARGEST = 1e6
 def know_nearest(work, body, nearest):
     """Remember cosine and sine of a multiple of 1/64, unless they are; no cosine of one is 0."""
     bodies = work.bodies
-    if nearest != bodies[body, KNOWN_ANGLE] or bodies[body, KNOWN_COSINE] == 0.0:
-        bodies[body, KNOWN_ANGLE] = nearest
-        bodies[body, KNOWN_COSINE] = math.cos(nearest)
-        bodies[body, KNOWN_SINE] = math.sin(nearest)
+    if nearest != bodies[body, at.KNOWN_ANGLE] or bodies[body, at.KNOWN_COSINE] == 0.0:
+        bodies[body, at.KNOWN_ANGLE] = nearest
+        bodies[body, at.KNOWN_COSINE] = math.cos(nearest)
+        bodies[body, at.KNOWN_SINE] = math.sin(nearest)
 
 
 def cosine_and_sine(work, body, angle):
@@ -41,5 +41,5 @@ def cosine_and_sine(work, body, angle):
     square = rest * rest
     c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0))
     s = rest * (1.0 - square * (1.0 / 6.0 - square / 120.0))
-    cosine, sine = work.bodies[body, KNOWN_COSINE], work.bodies[body, KNOWN_SINE]
+    cosine, sine = work.bodies[body, at.KNOWN_COSINE], work.bodies[body, at.KNOWN_SINE]
     return cosine * c - sine * s, sine * c + cosine * s

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 
-from flocsim.arrays import X, Y
+import flocsim.arrays as at
 from flocsim.hooks import hook
 
 
@@ -18,14 +18,16 @@ def length_of(x, y):
 def separation(scene, work, state, a, b):
     """(x, y) of body a as seen from body b, in a state [m]."""
     motion = work.motion
-    return motion[state, a, X] - motion[state, b, X], motion[state, a, Y] - motion[state, b, Y]
+    return motion[state, a, at.X] - motion[state, b, at.X], motion[state, a, at.Y] - motion[
+        state, b, at.Y
+    ]
 
 
 def nearest_image(scene, work, state, a, b):
     """The same where space repeats itself: of a's image that is nearest to b."""
     motion = work.motion
-    x = motion[state, a, X] - motion[state, b, X]
-    y = motion[state, a, Y] - motion[state, b, Y]
+    x = motion[state, a, at.X] - motion[state, b, at.X]
+    y = motion[state, a, at.Y] - motion[state, b, at.Y]
     width, height = scene.box
     if width < math.inf:
         x -= width * math.floor(x / width + 0.5)

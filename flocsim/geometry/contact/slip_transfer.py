@@ -2,52 +2,14 @@
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CARRIED,
-    CLOSED,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    EDGE_END,
-    EDGE_START,
-    FLIGHT,
-    FLIGHTS,
-    FRESH,
-    GAP,
-    GAP_OFFSET,
-    GRAZES,
-    GRAZING_FORCE,
-    KEPT,
-    KEPT_EARLIER,
-    KEPT_EDGE,
-    KEPT_FLIGHTS,
-    KEPT_FORCE,
-    KEPT_GAP,
-    KEPT_LATER,
-    KEPT_MODE,
-    KEPT_OFFSET,
-    KEPT_SLIP,
-    KEPT_VERTEX,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    PAIR,
-    RADIUS,
-    SLIP_OFFSET,
-    VERTEX,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-    X,
-)
+import flocsim.arrays as at
 from flocsim.hooks import hook
 
 
 def is_kept(work, row, mode):
     """Whether there is anything to be known of a pair besides where its bodies are."""
-    known = work.slip[NOW, row] != 0.0 or work.slip[GAP_OFFSET, row] != 0.0
-    return known or work.slip[FLIGHTS, row] != 0.0 or mode == GRAZES
+    known = work.slip[at.NOW, row] != 0.0 or work.slip[at.GAP_OFFSET, row] != 0.0
+    return known or work.slip[at.FLIGHTS, row] != 0.0 or mode == at.GRAZES
 
 
 def keep_slips(work):
@@ -56,64 +18,69 @@ def keep_slips(work):
 
     Those that an earlier attempt has set aside, whose list found no room, are still the ones.
     """
-    if work.tally[KEPT] > 0:
-        return work.tally[KEPT] - 1
+    if work.tally[at.KEPT] > 0:
+        return work.tally[at.KEPT] - 1
     count = 0
-    for row in range(work.tally[CANDIDATES]):
-        mode = work.candidates[row, CLOSED]
+    for row in range(work.tally[at.CANDIDATES]):
+        mode = work.candidates[row, at.CLOSED]
         if is_kept(work, row, mode):
-            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-            work.kept[count, KEPT_LATER], work.kept[count, KEPT_EARLIER] = max(a, b), min(a, b)
-            work.kept[count, KEPT_VERTEX] = work.candidates[row, VERTEX]
-            work.kept[count, KEPT_EDGE] = work.candidates[row, EDGE_START]
-            work.kept[count, KEPT_MODE] = mode
-            work.slip[KEPT_SLIP, count] = work.slip[NOW, row]
-            work.slip[KEPT_FORCE, count] = work.slip[GRAZING_FORCE, row]
-            work.slip[KEPT_GAP, count] = work.slip[GAP_OFFSET, row]
-            work.slip[KEPT_OFFSET, count] = work.slip[SLIP_OFFSET, row]
-            work.slip[KEPT_FLIGHTS, count] = work.slip[FLIGHTS, row]
+            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = (
+                max(a, b),
+                min(a, b),
+            )
+            work.kept[count, at.KEPT_VERTEX] = work.candidates[row, at.VERTEX]
+            work.kept[count, at.KEPT_EDGE] = work.candidates[row, at.EDGE_START]
+            work.kept[count, at.KEPT_MODE] = mode
+            work.slip[at.KEPT_SLIP, count] = work.slip[at.NOW, row]
+            work.slip[at.KEPT_FORCE, count] = work.slip[at.GRAZING_FORCE, row]
+            work.slip[at.KEPT_GAP, count] = work.slip[at.GAP_OFFSET, row]
+            work.slip[at.KEPT_OFFSET, count] = work.slip[at.SLIP_OFFSET, row]
+            work.slip[at.KEPT_FLIGHTS, count] = work.slip[at.FLIGHTS, row]
             count += 1
-    work.tally[KEPT] = count + 1
+    work.tally[at.KEPT] = count + 1
     return count
 
 
 def comes_before(work, kept, later, earlier):
     """Whether the bodies of a kept displacement come before two others in the list."""
-    if work.kept[kept, KEPT_LATER] != later:
-        return work.kept[kept, KEPT_LATER] < later
-    return work.kept[kept, KEPT_EARLIER] < earlier
+    if work.kept[kept, at.KEPT_LATER] != later:
+        return work.kept[kept, at.KEPT_LATER] < later
+    return work.kept[kept, at.KEPT_EARLIER] < earlier
 
 
 def restore_slips(work, count):
     """Give the kept displacements back to the same pairs of the new list; both are in the order of
     their bodies."""
     first = 0
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[NOW, row] = work.slip[SLIP_OFFSET, row] = work.slip[GAP_OFFSET, row] = 0.0
-        work.slip[FLIGHT, row] = work.slip[FLIGHTS, row] = 0.0
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.NOW, row] = work.slip[at.SLIP_OFFSET, row] = work.slip[at.GAP_OFFSET, row] = (
+            0.0
+        )
+        work.slip[at.FLIGHT, row] = work.slip[at.FLIGHTS, row] = 0.0
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
         later, earlier = max(a, b), min(a, b)
         while first < count and comes_before(work, first, later, earlier):
             first += 1
         for k in range(first, count):
-            if work.kept[k, KEPT_LATER] != later or work.kept[k, KEPT_EARLIER] != earlier:
+            if work.kept[k, at.KEPT_LATER] != later or work.kept[k, at.KEPT_EARLIER] != earlier:
                 break
-            same = work.kept[k, KEPT_VERTEX] == work.candidates[row, VERTEX]
-            if same and work.kept[k, KEPT_EDGE] == work.candidates[row, EDGE_START]:
-                work.slip[NOW, row] = work.slip[KEPT_SLIP, k]
-                work.slip[SLIP_OFFSET, row] = work.slip[KEPT_OFFSET, k]
-                work.slip[GAP_OFFSET, row] = work.slip[KEPT_GAP, k]
-                work.slip[FLIGHTS, row] = work.slip[KEPT_FLIGHTS, k]
-                if work.kept[k, KEPT_MODE] == GRAZES:
-                    work.candidates[row, CLOSED] = GRAZES
-                    work.slip[GRAZING_FORCE, row] = work.slip[KEPT_FORCE, k]
-                    work.slip[FRESH, row] = 0.0
-    work.tally[KEPT] = 0
+            same = work.kept[k, at.KEPT_VERTEX] == work.candidates[row, at.VERTEX]
+            if same and work.kept[k, at.KEPT_EDGE] == work.candidates[row, at.EDGE_START]:
+                work.slip[at.NOW, row] = work.slip[at.KEPT_SLIP, k]
+                work.slip[at.SLIP_OFFSET, row] = work.slip[at.KEPT_OFFSET, k]
+                work.slip[at.GAP_OFFSET, row] = work.slip[at.KEPT_GAP, k]
+                work.slip[at.FLIGHTS, row] = work.slip[at.KEPT_FLIGHTS, k]
+                if work.kept[k, at.KEPT_MODE] == at.GRAZES:
+                    work.candidates[row, at.CLOSED] = at.GRAZES
+                    work.slip[at.GRAZING_FORCE, row] = work.slip[at.KEPT_FORCE, k]
+                    work.slip[at.FRESH, row] = 0.0
+    work.tally[at.KEPT] = 0
 
 
 def first_of_pair(work, row):
     """The first row of the two bodies of a row: their rows follow one another."""
-    while row > 0 and work.candidates[row - 1, PAIR] == work.candidates[row, PAIR]:
+    while row > 0 and work.candidates[row - 1, at.PAIR] == work.candidates[row, at.PAIR]:
         row -= 1
     return row
 
@@ -134,10 +101,14 @@ def same_end(start, end, other_start, other_end):
 def rolls_on_to(scene, work, row, other):
     """Whether a pair of features of the same two bodies neighbours another, either way round."""
     pairs = work.candidates
-    point, start, end = pairs[row, VERTEX], pairs[row, EDGE_START], pairs[row, EDGE_END]
-    on, first, last = pairs[other, VERTEX], pairs[other, EDGE_START], pairs[other, EDGE_END]
-    if pairs[row, VERTEX_BODY] == pairs[other, VERTEX_BODY]:
-        near = same_corner(scene, pairs[row, VERTEX_BODY], point, on)
+    point, start, end = pairs[row, at.VERTEX], pairs[row, at.EDGE_START], pairs[row, at.EDGE_END]
+    on, first, last = (
+        pairs[other, at.VERTEX],
+        pairs[other, at.EDGE_START],
+        pairs[other, at.EDGE_END],
+    )
+    if pairs[row, at.VERTEX_BODY] == pairs[other, at.VERTEX_BODY]:
+        near = same_corner(scene, pairs[row, at.VERTEX_BODY], point, on)
         return near and same_end(start, end, first, last)
     return on in (start, end) and point in (first, last)
 
@@ -150,14 +121,14 @@ def heir_of(scene, work, row):
     """
     found = -1
     least = math.inf
-    low = min(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
-    high = max(work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY])
-    near = scene.bodies[low, RADIUS] + scene.bodies[high, RADIUS]
+    low = min(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
+    high = max(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
+    near = scene.bodies[low, at.RADIUS] + scene.bodies[high, at.RADIUS]
     x, y = contact_point(work, row, low)
-    for other in range(first_of_pair(work, row), work.tally[CANDIDATES]):
-        if work.candidates[other, PAIR] != work.candidates[row, PAIR]:
+    for other in range(first_of_pair(work, row), work.tally[at.CANDIDATES]):
+        if work.candidates[other, at.PAIR] != work.candidates[row, at.PAIR]:
             break
-        if work.geometry[NOW, other, GAP] < 0.0:
+        if work.geometry[at.NOW, other, at.GAP] < 0.0:
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
             if distance < least and (distance <= near or rolls_on_to(scene, work, row, other)):
@@ -168,12 +139,12 @@ def heir_of(scene, work, row):
 
 def contact_point(work, row, body):
     """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
-    geometry = work.geometry[NOW]
-    nx, ny = geometry[row, NORMAL_X], geometry[row, NORMAL_Y]
-    if work.candidates[row, VERTEX_BODY] == body:
-        across, along = geometry[row, VERTEX_ARM_N], geometry[row, VERTEX_ARM_T]
+    geometry = work.geometry[at.NOW]
+    nx, ny = geometry[row, at.NORMAL_X], geometry[row, at.NORMAL_Y]
+    if work.candidates[row, at.VERTEX_BODY] == body:
+        across, along = geometry[row, at.VERTEX_ARM_N], geometry[row, at.VERTEX_ARM_T]
     else:
-        across, along = geometry[row, EDGE_ARM_N], geometry[row, EDGE_ARM_T]
+        across, along = geometry[row, at.EDGE_ARM_N], geometry[row, at.EDGE_ARM_T]
     return along * nx + across * ny, along * ny - across * nx
 
 
@@ -184,30 +155,36 @@ def hand_over(scene, work):
     Σ ½ k_t ξ² of the two bodies never grows, since what it grew by would drive them without end.
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
-    for row in range(work.tally[CANDIDATES]):
-        grazes = work.candidates[row, CLOSED] == GRAZES
-        if work.slip[NOW, row] != 0.0 and work.geometry[NOW, row, GAP] >= 0.0 and not grazes:
+    for row in range(work.tally[at.CANDIDATES]):
+        grazes = work.candidates[row, at.CLOSED] == at.GRAZES
+        if (
+            work.slip[at.NOW, row] != 0.0
+            and work.geometry[at.NOW, row, at.GAP] >= 0.0
+            and not grazes
+        ):
             heir = heir_of(scene, work, row)
             if heir >= 0:
-                own, given = work.slip[NOW, heir], work.slip[NOW, row]
+                own, given = work.slip[at.NOW, heir], work.slip[at.NOW, row]
                 most = math.hypot(own, given)
                 agreement = tangent_agreement(work, row, heir)
                 total = own + given * agreement
-                work.slip[NOW, heir] = min(max(total, -most), most)
-                wrong = slip_error(work, row, X) + work.slip[SLIP_OFFSET, row]
-                work.slip[SLIP_OFFSET, heir] += wrong * agreement
-            work.slip[NOW, row] = 0.0
+                work.slip[at.NOW, heir] = min(max(total, -most), most)
+                wrong = slip_error(work, row, at.X) + work.slip[at.SLIP_OFFSET, row]
+                work.slip[at.SLIP_OFFSET, heir] += wrong * agreement
+            work.slip[at.NOW, row] = 0.0
 
 
 def slip_error(work, row, first):
     """How wrong a pair's two contact points lie along the tangent, as carried on with the motion
     [m], for ``first`` X; how wrong they move there [m/s], for VELOCITY."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     e, g = work.motion, work.geometry
-    along = g[NOW, row, NORMAL_X] * (e[CARRIED, a, first + 1] - e[CARRIED, b, first + 1])
-    along -= g[NOW, row, NORMAL_Y] * (e[CARRIED, a, first] - e[CARRIED, b, first])
-    along += g[NOW, row, VERTEX_ARM_T] * e[CARRIED, a, first + 2]
-    return along - g[NOW, row, EDGE_ARM_T] * e[CARRIED, b, first + 2]
+    along = g[at.NOW, row, at.NORMAL_X] * (
+        e[at.CARRIED, a, first + 1] - e[at.CARRIED, b, first + 1]
+    )
+    along -= g[at.NOW, row, at.NORMAL_Y] * (e[at.CARRIED, a, first] - e[at.CARRIED, b, first])
+    along += g[at.NOW, row, at.VERTEX_ARM_T] * e[at.CARRIED, a, first + 2]
+    return along - g[at.NOW, row, at.EDGE_ARM_T] * e[at.CARRIED, b, first + 2]
 
 
 def tangent_agreement(work, row, other):
@@ -215,11 +192,11 @@ def tangent_agreement(work, row, other):
 
     A pair listed the other way round has the opposite tangent, and its slip the same sign.
     """
-    geometry = work.geometry[NOW]
+    geometry = work.geometry[at.NOW]
     cosine = (
-        geometry[row, NORMAL_X] * geometry[other, NORMAL_X]
-        + geometry[row, NORMAL_Y] * geometry[other, NORMAL_Y]
+        geometry[row, at.NORMAL_X] * geometry[other, at.NORMAL_X]
+        + geometry[row, at.NORMAL_Y] * geometry[other, at.NORMAL_Y]
     )
-    if work.candidates[row, VERTEX_BODY] == work.candidates[other, VERTEX_BODY]:
+    if work.candidates[row, at.VERTEX_BODY] == work.candidates[other, at.VERTEX_BODY]:
         return cosine
     return -cosine

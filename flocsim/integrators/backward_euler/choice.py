@@ -14,22 +14,7 @@ Counts of steps alone decide: clocks have no say, so that the choice is the same
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    FREE,
-    LOCATED,
-    LOOK_AT,
-    LOOKED,
-    LOOKED_AT,
-    LOOKED_TRIED,
-    NOW,
-    REJECTED,
-    STEPS,
-    SWITCHES,
-    TIME,
-    TOLERANCE,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.backward_euler.step import (
     end_at_switches,
@@ -57,10 +42,10 @@ def largest_change(scene, work):
     """How much the velocity of an outline has changed since the last look [m/s]."""
     largest = 0.0
     for body in range(work.motion.shape[1]):
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             for axis in range(3):
-                now = work.motion[NOW, body, VELOCITY + axis]
-                change = abs(now - work.motion[LOOKED, body, VELOCITY + axis])
+                now = work.motion[at.NOW, body, at.VELOCITY + axis]
+                change = abs(now - work.motion[at.LOOKED, body, at.VELOCITY + axis])
                 largest = max(largest, lever(scene, body, axis) * change)
     return largest
 
@@ -68,35 +53,35 @@ def largest_change(scene, work):
 def pays(scene, work, clock, trials, passed):
     """Whether backward Euler would have passed that time in far fewer steps than were tried: its
     error of a step is half of that times the change of velocity."""
-    steps = 1.0 + passed * largest_change(scene, work) / clock[TOLERANCE]
+    steps = 1.0 + passed * largest_change(scene, work) / clock[at.TOLERANCE]
     ahead = AHEAD if work.bodies.shape[0] >= FEWEST else FAR_AHEAD
     return ahead * steps <= trials
 
 
 def hand_over(scene, work, clock, counts):
     """Hand over to backward Euler, or take back, where that is due."""
-    if not has(scene, CONTACT_FORCE) and clock[ACROSS] == 0.0:
+    if not has(scene, CONTACT_FORCE) and clock[at.ACROSS] == 0.0:
         return
-    tried = counts[STEPS] + counts[REJECTED] + counts[LOCATED]
-    trials = tried - counts[LOOKED_TRIED]
-    if clock[ACROSS] == 1.0:
+    tried = counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED]
+    trials = tried - counts[at.LOOKED_TRIED]
+    if clock[at.ACROSS] == 1.0:
         enough = trials >= ENOUGH_TRIALS
-        quiet = enough and clock[SWITCHES] < FEW_SWITCHES * trials
+        quiet = enough and clock[at.SWITCHES] < FEW_SWITCHES * trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
         elif not enough:
             return
-    elif clock[LOOKED_AT] < math.inf:
-        if counts[STEPS] < counts[LOOK_AT]:
+    elif clock[at.LOOKED_AT] < math.inf:
+        if counts[at.STEPS] < counts[at.LOOK_AT]:
             return
-        passed = clock[TIME] - clock[LOOKED_AT]
+        passed = clock[at.TIME] - clock[at.LOOKED_AT]
         if pays(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             go_across(clock, passed)
-    counts[LOOK_AT], counts[LOOKED_TRIED] = counts[STEPS] + PROBE, tried
-    clock[LOOKED_AT], clock[SWITCHES] = clock[TIME], 0.0
+    counts[at.LOOK_AT], counts[at.LOOKED_TRIED] = counts[at.STEPS] + PROBE, tried
+    clock[at.LOOKED_AT], clock[at.SWITCHES] = clock[at.TIME], 0.0
     for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
-            work.motion[LOOKED, body, axis] = work.motion[NOW, body, axis]
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+            work.motion[at.LOOKED, body, axis] = work.motion[at.NOW, body, axis]
 
 
 def step_or_give_back(scene, work, clock, step):

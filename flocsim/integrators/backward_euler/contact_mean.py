@@ -17,25 +17,8 @@ nothing: a pair that opens is taken to be closed at the start by FADING of the t
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    DAMPING,
-    EDGE_BODY,
-    FADES,
-    GAP,
-    NEW,
-    NOW,
-    OVERLAP,
-    PAIR,
-    PART,
-    RADIUS,
-    SLIDING,
-    STIFFNESS,
-    TRIAL,
-    VERTEX_BODY,
-    ContactView,
-)
+import flocsim.arrays as at
+from flocsim.arrays import ContactView
 from flocsim.compiler.composer import apart
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
@@ -54,37 +37,39 @@ tolerance, or of its overlap at the start where that is more."""
 
 def takes_part(work, row):
     """Whether a pair is closed at the start of the step, TRIAL, or at its end, NOW."""
-    return work.geometry[NOW, row, GAP] < 0.0 or work.geometry[TRIAL, row, GAP] < 0.0
+    return work.geometry[at.NOW, row, at.GAP] < 0.0 or work.geometry[at.TRIAL, row, at.GAP] < 0.0
 
 
 def closed_share(work, row):
     """The part of the step for which a pair is closed, as its gap goes along a line."""
-    before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
+    before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
     if before < 0.0:
-        return 1.0 if after <= 0.0 else work.slip[FADES, row] / (work.slip[FADES, row] + after)
+        return (
+            1.0 if after <= 0.0 else work.slip[at.FADES, row] / (work.slip[at.FADES, row] + after)
+        )
     return after / (after - before) if after < 0.0 else 0.0
 
 
 def share_slope(work, row):
     """By how much that grows with the gap at the end [1/m]."""
-    before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
+    before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
     if before < 0.0 < after:
-        return -work.slip[FADES, row] / (work.slip[FADES, row] + after) ** 2
+        return -work.slip[at.FADES, row] / (work.slip[at.FADES, row] + after) ** 2
     return -before / (after - before) ** 2 if after < 0.0 <= before else 0.0
 
 
 def end_overlap(work, row):
     """Δ₁⁺ of a pair, by its gap at the end [m]."""
-    return max(-work.geometry[NOW, row, GAP], 0.0)
+    return max(-work.geometry[at.NOW, row, at.GAP], 0.0)
 
 
 def view_with(scene, work, row, step, after, slip, rate):
     """The ContactView of a pair over the step, of an overlap ``after`` at its end [m]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    pressing = (after - max(-work.geometry[TRIAL, row, GAP], 0.0)) / step
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    pressing = (after - max(-work.geometry[at.TRIAL, row, at.GAP], 0.0)) / step
     return ContactView(
         after, pressing, slip, rate, effective_mass(scene, a, b),
-        scene.bodies[a, RADIUS], scene.bodies[b, RADIUS],
+        scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS],
     )  # fmt: skip
 
 
@@ -105,14 +90,14 @@ def sticking_slopes(scene, view, limit, step):
 def friction_view(scene, work, row, step):
     """The ContactView of a pair over the step of the overlap that its friction goes by; ξ₁ goes to
     NEW, whether it slides to SLIDING."""
-    bearing, rate = work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
-    slip, side = work.slip[NOW, row] + work.slip[PART, row] * step * rate, 0
+    bearing, rate = work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
+    slip, side = work.slip[at.NOW, row] + work.slip[at.PART, row] * step * rate, 0
     if has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view_with(scene, work, row, step, bearing, 0.0, 0.0))
         if abs(slip) > limit:
             side = 1 if slip > 0.0 else -1
             slip = side * limit
-    work.slip[NEW, row], work.candidates[row, SLIDING] = slip, side
+    work.slip[at.NEW, row], work.candidates[row, at.SLIDING] = slip, side
     return view_with(scene, work, row, step, bearing, slip, rate)
 
 
@@ -129,32 +114,32 @@ def normal_stiffness(scene, work, row, step, after):
 
 def friction_force(scene, work, row, step):
     """s T of a pair [N]; it is flagged where it slides."""
-    return work.slip[PART, row] * contact_force(scene, friction_view(scene, work, row, step))[1]
+    return work.slip[at.PART, row] * contact_force(scene, friction_view(scene, work, row, step))[1]
 
 
 @apart
 def add_mean_forces(scene, work, step):
     """Add the forces of all contacts in the step to those in NOW; friction goes by the overlaps at
     its end."""
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[OVERLAP, row] = end_overlap(work, row)
-        work.slip[PART, row] = closed_share(work, row)
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.OVERLAP, row] = end_overlap(work, row)
+        work.slip[at.PART, row] = closed_share(work, row)
         if takes_part(work, row):
-            normal = normal_force(scene, work, row, step, work.slip[OVERLAP, row])
-            push_pair(work, NOW, row, normal, friction_force(scene, work, row, step))
+            normal = normal_force(scene, work, row, step, work.slip[at.OVERLAP, row])
+            push_pair(work, at.NOW, row, normal, friction_force(scene, work, row, step))
         else:
-            work.slip[NEW, row], work.candidates[row, SLIDING] = 0.0, 0
+            work.slip[at.NEW, row], work.candidates[row, at.SLIDING] = 0.0, 0
 
 
 def add_slopes(scene, work, row, normal, tangential, coupled):
     """Add to the system what the force of a contact falls by for a metre of the gap, and with the
     rate along the tangent [N/m, N s/m]; and by how much friction falls for a metre of the gap."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    pair = work.candidates[row, PAIR]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    pair = work.candidates[row, at.PAIR]
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal)
-    add_product(scene, work, STIFFNESS, pair, a, b, across, along, coupled)
-    add_product(scene, work, DAMPING, pair, a, b, across, across, tangential)
+    add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal)
+    add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, coupled)
+    add_product(scene, work, at.DAMPING, pair, a, b, across, across, tangential)
 
 
 def friction_slopes(scene, work, row, step):
@@ -162,24 +147,24 @@ def friction_slopes(scene, work, row, step):
     overlap [N/m] and its part of the step [N]."""
     view = friction_view(scene, work, row, step)
     found = contact_derivatives(scene, view)
-    part, side = work.slip[PART, row], work.candidates[row, SLIDING]
+    part, side = work.slip[at.PART, row], work.candidates[row, at.SLIDING]
     by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
     if side != 0:
-        by_limit = side * limit_slope(scene, work, NOW, row) * found[7]
+        by_limit = side * limit_slope(scene, work, at.NOW, row) * found[7]
         by_slip = 0.0
     elif has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view)
         if 0.0 < limit < math.inf:
             by_slip, by_rate = sticking_slopes(scene, view, limit, step)
     by_overlap = part * (found[3] + found[5] / step + by_limit)
-    by_part = found[1] - part * by_slip * step * tangential_rate(work, NOW, row)
+    by_part = found[1] - part * by_slip * step * tangential_rate(work, at.NOW, row)
     return part * (by_rate + part * step * by_slip), by_overlap, by_part
 
 
 @apart
 def add_all_derivatives(scene, work, step):
     """Add the derivatives of all contacts in the step by the places and velocities at its end."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
             after, stiffness = end_overlap(work, row), 0.0
             slope, by_overlap, by_part = friction_slopes(scene, work, row, step)
@@ -199,8 +184,8 @@ of those that close in a step need no other one."""
 
 def flag_close(scene, work):
     """Flag, as closed, all pairs that are or may well be so in this step; none is taken back."""
-    for row in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-        near = CLOSE * (scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS])
-        if work.geometry[NOW, row, GAP] < near or work.geometry[TRIAL, row, GAP] < 0.0:
-            work.candidates[row, CLOSED] = 1
+    for row in range(work.tally[at.CANDIDATES]):
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        near = CLOSE * (scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS])
+        if work.geometry[at.NOW, row, at.GAP] < near or work.geometry[at.TRIAL, row, at.GAP] < 0.0:
+            work.candidates[row, at.CLOSED] = 1

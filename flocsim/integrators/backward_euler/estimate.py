@@ -11,17 +11,7 @@ a₁ being the acceleration of the step and a₀ that of the last one: what the 
 error of velocity is sent through once more, for what the next step leaves of it.
 """
 
-from flocsim.arrays import (
-    CHANGE,
-    DEVIATION,
-    FREE,
-    LAST_RATES,
-    NOW,
-    RATES_KNOWN,
-    START,
-    STIFFNESS,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
@@ -32,15 +22,15 @@ from flocsim.integrators.rhs.views import inertia
 def write_rates(work, step):
     """Write the accelerations of the step, which has begun in START, into LAST_RATES."""
     for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
-            change = work.motion[NOW, body, axis] - work.motion[START, body, axis]
-            work.motion[LAST_RATES, body, axis] = change / step
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+            change = work.motion[at.NOW, body, axis] - work.motion[at.START, body, axis]
+            work.motion[at.LAST_RATES, body, axis] = change / step
 
 
 @apart
 def solve_loads(scene, work, weight):
     """The solution of the system for the loads less ``weight`` K CHANGE."""
-    subtract_product(work, STIFFNESS, weight)
+    subtract_product(work, at.STIFFNESS, weight)
     solve_for_free(scene, work)
 
 
@@ -48,25 +38,27 @@ def solve_loads(scene, work, weight):
 def estimate_step(scene, work, clock, step):
     """The error of the step, whose end stands in NOW, into DEVIATION."""
     motion, loads = work.motion, work.loads
-    if clock[RATES_KNOWN] == 0.0:
+    if clock[at.RATES_KNOWN] == 0.0:
         write_rates(work, step)
     for body in range(motion.shape[1]):
         for axis in range(3):
-            place = VELOCITY + axis
-            less = motion[START, body, place] - motion[NOW, body, place]
-            slower = motion[LAST_RATES, body, place] + less / step
+            place = at.VELOCITY + axis
+            less = motion[at.START, body, place] - motion[at.NOW, body, place]
+            slower = motion[at.LAST_RATES, body, place] + less / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
-            motion[CHANGE, body, axis] = less
+            motion[at.CHANGE, body, axis] = less
     solve_loads(scene, work, 0.5 * step)
     for body in range(motion.shape[1]):
-        free = scene.bodies[body, FREE]
+        free = scene.bodies[body, at.FREE]
         for axis in range(3):
             speed = loads[REAL, 3 * body + axis].real
-            error = free * step * (0.5 * motion[CHANGE, body, axis] + speed)
-            motion[DEVIATION, body, axis] = motion[CHANGE, body, axis] = error
+            error = free * step * (0.5 * motion[at.CHANGE, body, axis] + speed)
+            motion[at.DEVIATION, body, axis] = motion[at.CHANGE, body, axis] = error
             loads[REAL, 3 * body + axis] = inertia(scene, body, axis) / step * speed
     solve_loads(scene, work, 1.0)
     for body in range(motion.shape[1]):
-        free = scene.bodies[body, FREE]
+        free = scene.bodies[body, at.FREE]
         for axis in range(3):
-            motion[DEVIATION, body, VELOCITY + axis] = free * loads[REAL, 3 * body + axis].real
+            motion[at.DEVIATION, body, at.VELOCITY + axis] = (
+                free * loads[REAL, 3 * body + axis].real
+            )

@@ -22,28 +22,7 @@ friction nearly everywhere.
 
 import math
 
-from flocsim.arrays import (
-    AHEAD,
-    BEHIND,
-    CANDIDATES,
-    CHANGE,
-    CLOSED,
-    EDGE_BODY,
-    FADES,
-    GAP,
-    HARDNESS,
-    LEFT,
-    LIMIT,
-    NOW,
-    OVERLAP,
-    PART,
-    RUBBING,
-    STUCK,
-    TRIAL,
-    VELOCITY,
-    VERTEX_BODY,
-    YIELDS,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
@@ -68,16 +47,16 @@ SMALL = 0.01
 
 
 def in_play(work, row):
-    return work.candidates[row, CLOSED] == 1
+    return work.candidates[row, at.CLOSED] == 1
 
 
 def rate_along(work, row, kind, entries):
     """What velocities, or their change, come to along a direction of both bodies of a pair."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     total = 0.0
     for axis in range(3):
-        total += entries[0][axis] * work.motion[kind, a, VELOCITY + axis]
-        total += entries[1][axis] * work.motion[kind, b, VELOCITY + axis]
+        total += entries[0][axis] * work.motion[kind, a, at.VELOCITY + axis]
+        total += entries[1][axis] * work.motion[kind, b, at.VELOCITY + axis]
     return total
 
 
@@ -85,15 +64,15 @@ def part_of_step(work, row, limited):
     """The part of the step for which a pair is closed, by how much that grows with δ, and by how
     much it falls with s [1/m]: at their ends contact_mean's."""
     over, left, before = (
-        work.slip[OVERLAP, row],
-        work.slip[LEFT, row],
-        work.geometry[TRIAL, row, GAP],
+        work.slip[at.OVERLAP, row],
+        work.slip[at.LEFT, row],
+        work.geometry[at.TRIAL, row, at.GAP],
     )
     if before >= 0.0:
         return over / (over + before), before / (over + before) ** 2, 0.0
     if limited:
         return 1.0, 0.0, 0.0
-    held = over + work.slip[FADES, row]
+    held = over + work.slip[at.FADES, row]
     return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
 
 
@@ -103,7 +82,7 @@ def press(scene, work, row, step):
     Of its friction is written down, over a normal stiffness, HARDNESS [N/m]: by how much it grows
     with v_t, YIELDS [s], what it would be if the pair stuck, STUCK, and at most, LIMIT [m]; 0 where
     nothing limits it, or there is none."""
-    slip, overlap, rate = work.slip, work.slip[OVERLAP, row], tangential_rate(work, NOW, row)
+    slip, overlap, rate = work.slip, work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
     view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
     found, limit = contact_derivatives(scene, view), 0.0
     stiffness = hardness = found[2] + found[4] / step
@@ -119,67 +98,76 @@ def press(scene, work, row, step):
             most = view_with(scene, work, row, step, overlap, held, abs(rate))
             limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * spring * held) / hardness
     part, _, _ = part_of_step(work, row, limit > 0.0)
-    slip[PART, row], slip[HARDNESS, row], slip[LIMIT, row] = part, hardness, limit
-    slip[YIELDS, row] = (spring * part * step + drag) / hardness
-    slip[STUCK, row] = spring / hardness * slip[NOW, row] + slip[YIELDS, row] * rate
+    slip[at.PART, row], slip[at.HARDNESS, row], slip[at.LIMIT, row] = part, hardness, limit
+    slip[at.YIELDS, row] = (spring * part * step + drag) / hardness
+    slip[at.STUCK, row] = spring / hardness * slip[at.NOW, row] + slip[at.YIELDS, row] * rate
     return found[0], stiffness
 
 
 def mean_product(work):
     """The mean of δ s, p (L − f) and q (L + f) over the pairs in play [m²]."""
     total, count, slip = 0.0, 0, work.slip
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            total += slip[OVERLAP, row] * slip[LEFT, row]
+            total += slip[at.OVERLAP, row] * slip[at.LEFT, row]
             count += 1
-            if slip[LIMIT, row] > 0.0:
-                ahead, behind = slip[AHEAD, row], slip[BEHIND, row]
-                both = ahead + behind + slip[RUBBING, row] * (behind - ahead)
-                total += slip[LIMIT, row] * both
+            if slip[at.LIMIT, row] > 0.0:
+                ahead, behind = slip[at.AHEAD, row], slip[at.BEHIND, row]
+                both = ahead + behind + slip[at.RUBBING, row] * (behind - ahead)
+                total += slip[at.LIMIT, row] * both
                 count += 2
     return total / max(count, 1)
 
 
 def pull(work, row, target):
     """By how much a pair's δ is to change where its gap stays [m]."""
-    overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
-    off = left - work.geometry[NOW, row, GAP] - overlap
+    overlap, left = work.slip[at.OVERLAP, row], work.slip[at.LEFT, row]
+    off = left - work.geometry[at.NOW, row, at.GAP] - overlap
     return (target - overlap * left + overlap * off) / (overlap + left)
 
 
 def drag(work, row, target):
     """(w, by how much a pair's friction f is to change where v_t stays [m])."""
-    limit = work.slip[LIMIT, row]
-    force = work.slip[RUBBING, row] * limit
+    limit = work.slip[at.LIMIT, row]
+    force = work.slip[at.RUBBING, row] * limit
     above, below = limit - force, limit + force
-    weight = 1.0 / (1.0 + work.slip[AHEAD, row] / above + work.slip[BEHIND, row] / below)
-    return weight, weight * (work.slip[STUCK, row] - force - target / above + target / below)
+    weight = 1.0 / (1.0 + work.slip[at.AHEAD, row] / above + work.slip[at.BEHIND, row] / below)
+    return weight, weight * (work.slip[at.STUCK, row] - force - target / above + target / below)
 
 
 def limited_friction(work, row, target, turns):
     """(s T, how it falls with v_t, how it falls for a metre of the gap) of a pair with a limit; the
     last one, by L, only if forces are to turn."""
-    slip, both = work.slip, work.slip[OVERLAP, row] + work.slip[LEFT, row]
+    slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
     weight, change = drag(work, row, target)
-    whole = slip[PART, row] * slip[HARDNESS, row]
-    force, slope = slip[RUBBING, row] * slip[LIMIT, row], whole * weight * slip[YIELDS, row]
+    whole = slip[at.PART, row] * slip[at.HARDNESS, row]
+    force, slope = (
+        slip[at.RUBBING, row] * slip[at.LIMIT, row],
+        whole * weight * slip[at.YIELDS, row],
+    )
     if not turns:
         return -whole * (force + change), slope, 0.0
     by_limit = (1.0 - weight) * force
-    change += by_limit * pull(work, row, target) / slip[OVERLAP, row]
+    change += by_limit * pull(work, row, target) / slip[at.OVERLAP, row]
     return -whole * (force + change), slope, -whole * by_limit / both
 
 
 def other_friction(scene, work, row, step, target):
     """The same of one without."""
-    slip, both = work.slip, work.slip[OVERLAP, row] + work.slip[LEFT, row]
+    slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
     force = friction_force(scene, work, row, step)
     slope, _, by_part = friction_slopes(scene, work, row, step)
     _, grows, falls = part_of_step(work, row, False)
     closing = pull(work, row, target)
-    leaving = closing - (slip[LEFT, row] - work.geometry[NOW, row, GAP] - slip[OVERLAP, row])
+    leaving = closing - (
+        slip[at.LEFT, row] - work.geometry[at.NOW, row, at.GAP] - slip[at.OVERLAP, row]
+    )
     force += by_part * (grows * closing - falls * leaving)
-    return force, slope, by_part * (grows * slip[OVERLAP, row] + falls * slip[LEFT, row]) / both
+    return (
+        force,
+        slope,
+        by_part * (grows * slip[at.OVERLAP, row] + falls * slip[at.LEFT, row]) / both,
+    )
 
 
 @apart
@@ -187,17 +175,17 @@ def write_forces(scene, work, step, target, turns):
     """Forces and derivatives of the pairs in play, δ and f changed as far as their gaps and v_t are
     not; if they turn, with what that does, which is too large before they fit, and can make systems
     indefinite: without it they are those of a convex problem."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            overlap, left = work.slip[OVERLAP, row], work.slip[LEFT, row]
+            overlap, left = work.slip[at.OVERLAP, row], work.slip[at.LEFT, row]
             normal, stiffness = press(scene, work, row, step)
             normal += stiffness * pull(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
-            if work.slip[LIMIT, row] > 0.0:
+            if work.slip[at.LIMIT, row] > 0.0:
                 tangential, slope, coupled = limited_friction(work, row, target, turns)
-            elif work.slip[YIELDS, row] > 0.0:
+            elif work.slip[at.YIELDS, row] > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
-            push_pair(work, NOW, row, normal, tangential)
+            push_pair(work, at.NOW, row, normal, tangential)
             works = overlap / (overlap + left) * stiffness
             add_slopes(scene, work, row, works, slope, coupled)
             if turns:
@@ -212,20 +200,24 @@ def room(share, size, change):
 def change_friction(work, row, target, share, go):
     """The share of the changes of p, q and f that keeps them where they belong, not above the one
     that is given; if they are to ``go``, they go that far."""
-    known, limit = work.slip, work.slip[LIMIT, row]
+    known, limit = work.slip, work.slip[at.LIMIT, row]
     weight, change = drag(work, row, target)
-    rate = rate_along(work, row, CHANGE, tangent_rows(work, row))
-    stuck = known[YIELDS, row] * rate
+    rate = rate_along(work, row, at.CHANGE, tangent_rows(work, row))
+    stuck = known[at.YIELDS, row] * rate
     change += weight * stuck
-    ahead, behind, force = known[AHEAD, row], known[BEHIND, row], known[RUBBING, row] * limit
+    ahead, behind, force = (
+        known[at.AHEAD, row],
+        known[at.BEHIND, row],
+        known[at.RUBBING, row] * limit,
+    )
     above, below = limit - force, limit + force
     more = (target + ahead * change) / above - ahead
     less = (target - behind * change) / below - behind
     if go:
-        known[STUCK, row] += share * stuck
-        known[RUBBING, row] += share * change / limit
-        known[AHEAD, row] += share * more
-        known[BEHIND, row] += share * less
+        known[at.STUCK, row] += share * stuck
+        known[at.RUBBING, row] += share * change / limit
+        known[at.AHEAD, row] += share * more
+        known[at.BEHIND, row] += share * less
         return share
     share = room(room(share, ahead, more), behind, less)
     return room(room(share, above, -change), below, change)
@@ -234,20 +226,20 @@ def change_friction(work, row, target, share, go):
 def change_pair(work, row, step, target, share, go):
     """The same of δ and s, and of friction."""
     known = work.slip
-    overlap, left = known[OVERLAP, row], known[LEFT, row]
-    opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
+    overlap, left = known[at.OVERLAP, row], known[at.LEFT, row]
+    opening = step * rate_along(work, row, at.CHANGE, normal_rows(work, row))
     closing = pull(work, row, target) - overlap / (overlap + left) * opening
-    leaving = opening + closing - (left - work.geometry[NOW, row, GAP] - overlap)
-    if known[LIMIT, row] > 0.0:
+    leaving = opening + closing - (left - work.geometry[at.NOW, row, at.GAP] - overlap)
+    if known[at.LIMIT, row] > 0.0:
         share = change_friction(work, row, target, share, go)
     if go:
-        known[OVERLAP, row] += share * closing
-        known[LEFT, row] += share * leaving
+        known[at.OVERLAP, row] += share * closing
+        known[at.LEFT, row] += share * leaving
         # The limit of friction goes with δ, and p and q the other way, as their products stay.
-        grown = known[OVERLAP, row] / overlap
-        known[LIMIT, row] *= grown
-        known[AHEAD, row] /= grown
-        known[BEHIND, row] /= grown
+        grown = known[at.OVERLAP, row] / overlap
+        known[at.LIMIT, row] *= grown
+        known[at.AHEAD, row] /= grown
+        known[at.BEHIND, row] /= grown
         return share
     return room(room(share, overlap, closing), left, leaving)
 
@@ -256,10 +248,10 @@ def change_pair(work, row, step, target, share, go):
 def change_pairs(work, step, target):
     """Change all pairs in play as the velocities in CHANGE do, as far as they may: the share."""
     share = 1.0
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             share = change_pair(work, row, step, target, share, False)
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             change_pair(work, row, step, target, share, True)
     return share
@@ -268,14 +260,14 @@ def change_pairs(work, step, target):
 def in_doubt(work, row, least):
     """Whether a pair has neither δ nor s below a small share of both, or of a size [m]; or, closed,
     neither how far it slides nor what is left until it does below that or a small share of L."""
-    known, limit = work.slip, work.slip[LIMIT, row]
-    both = known[OVERLAP, row] + known[LEFT, row]
-    if min(known[OVERLAP, row], known[LEFT, row]) > SMALL * max(both, least):
+    known, limit = work.slip, work.slip[at.LIMIT, row]
+    both = known[at.OVERLAP, row] + known[at.LEFT, row]
+    if min(known[at.OVERLAP, row], known[at.LEFT, row]) > SMALL * max(both, least):
         return True
-    if known[OVERLAP, row] < known[LEFT, row]:
+    if known[at.OVERLAP, row] < known[at.LEFT, row]:
         return False
-    force, least = known[RUBBING, row] * limit, min(least, SMALL * max(limit, least))
-    sides = max(min(known[AHEAD, row], limit - force), min(known[BEHIND, row], limit + force))
+    force, least = known[at.RUBBING, row] * limit, min(least, SMALL * max(limit, least))
+    sides = max(min(known[at.AHEAD, row], limit - force), min(known[at.BEHIND, row], limit + force))
     return limit > 0.0 and sides > least
 
 
@@ -283,12 +275,12 @@ def is_off(work, row, least):
     """Whether the gap of a pair is not s − δ, or how far it slides not e − f, by far more than
     their parts, or than a size [m]."""
     known = work.slip
-    both = known[OVERLAP, row] + known[LEFT, row]
-    off = known[LEFT, row] - work.geometry[NOW, row, GAP] - known[OVERLAP, row]
+    both = known[at.OVERLAP, row] + known[at.LEFT, row]
+    off = known[at.LEFT, row] - work.geometry[at.NOW, row, at.GAP] - known[at.OVERLAP, row]
     if abs(off) > SMALL * max(both, SMALL * least):
         return True
-    limit, ahead, behind = known[LIMIT, row], known[AHEAD, row], known[BEHIND, row]
-    off = known[STUCK, row] - known[RUBBING, row] * limit - ahead + behind
+    limit, ahead, behind = known[at.LIMIT, row], known[at.AHEAD, row], known[at.BEHIND, row]
+    off = known[at.STUCK, row] - known[at.RUBBING, row] * limit - ahead + behind
     return limit > 0.0 and abs(off) > SMALL * max(limit + ahead + behind, least)
 
 
@@ -296,7 +288,7 @@ def is_off(work, row, least):
 def settled(work, least, fitting):
     """Whether of all pairs it is known if they close and slide, by a size [m]; and, for
     ``fitting``, if that fits their gaps and rates."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         open_question = in_doubt(work, row, least) or (fitting and is_off(work, row, least))
         if open_question and in_play(work, row):
             return False

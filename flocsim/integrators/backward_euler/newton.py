@@ -13,33 +13,7 @@ meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CHANGE,
-    CLOSED,
-    EDGE_BODY,
-    FADES,
-    FORCE,
-    FREE,
-    GAP,
-    GEOMETRY_COLUMNS,
-    LEADER_FORCE,
-    LEADER_RATE,
-    MEMORY,
-    MOTION_COLUMNS,
-    NEW,
-    NOW,
-    OPEN,
-    RADIUS,
-    SOLVES,
-    START,
-    TIME,
-    TOLERANCE,
-    TOUCHES,
-    TRIAL,
-    VELOCITY,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
@@ -70,52 +44,54 @@ MOST_ITERATIONS = 8
 def begin_step(work, clock):
     """Keep the start of the step."""
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[START, body, axis] = work.motion[NOW, body, axis]
-    for row in range(work.tally[CANDIDATES]):
-        for column in range(GEOMETRY_COLUMNS):
-            work.geometry[TRIAL, row, column] = work.geometry[NOW, row, column]
-        work.candidates[row, CLOSED] = OPEN
-        least = FADING * clock[TOLERANCE]
-        work.slip[FADES, row] = max(-work.geometry[NOW, row, GAP], least)
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        for column in range(at.GEOMETRY_COLUMNS):
+            work.geometry[at.TRIAL, row, column] = work.geometry[at.NOW, row, column]
+        work.candidates[row, at.CLOSED] = at.OPEN
+        least = FADING * clock[at.TOLERANCE]
+        work.slip[at.FADES, row] = max(-work.geometry[at.NOW, row, at.GAP], least)
 
 
 def put_back(work):
     """Go back to the motion at the start of the step."""
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NOW, body, axis] = work.motion[START, body, axis]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NOW, body, axis] = work.motion[at.START, body, axis]
 
 
 def end_step(work):
     """Make the iterate the new state, its contacts flagged that take part in the step, and its
     start the current one again."""
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NEW, body, axis] = work.motion[NOW, body, axis]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NEW, body, axis] = work.motion[at.NOW, body, axis]
     put_back(work)
-    for row in range(work.tally[CANDIDATES]):
-        work.candidates[row, CLOSED] = TOUCHES if takes_part(work, row) else OPEN
-        for column in range(GEOMETRY_COLUMNS):
-            work.geometry[NOW, row, column] = work.geometry[TRIAL, row, column]
+    for row in range(work.tally[at.CANDIDATES]):
+        work.candidates[row, at.CLOSED] = at.TOUCHES if takes_part(work, row) else at.OPEN
+        for column in range(at.GEOMETRY_COLUMNS):
+            work.geometry[at.NOW, row, column] = work.geometry[at.TRIAL, row, column]
 
 
 def place_ends(work, step):
     """Places at the end from the velocities there."""
     for body in range(work.motion.shape[1]):
         for axis in range(3):
-            start = work.motion[START, body, axis]
-            work.motion[NOW, body, axis] = start + step * work.motion[NOW, body, VELOCITY + axis]
+            start = work.motion[at.START, body, axis]
+            work.motion[at.NOW, body, axis] = (
+                start + step * work.motion[at.NOW, body, at.VELOCITY + axis]
+            )
 
 
 @apart
 def evaluate_others(scene, work, time, step):
     """All forces at the end of the step but those of contacts, which are located."""
     place_ends(work, step)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     if scene.surface_reach > 0.0:
-        flag_near(scene, work, NOW, 0.0)
-    sum_other_forces(scene, work, time + step, NOW)
+        flag_near(scene, work, at.NOW, 0.0)
+    sum_other_forces(scene, work, time + step, at.NOW)
 
 
 def evaluate_end(scene, work, time, step):
@@ -128,23 +104,25 @@ def evaluate_end(scene, work, time, step):
 
 def is_too_deep(scene, work):
     """Whether a pair overlaps by more than half of what the contact law takes."""
-    for row in range(work.tally[CANDIDATES]):
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-        size = scene.bodies[a, RADIUS] + scene.bodies[b, RADIUS]
-        if -work.geometry[NOW, row, GAP] > 0.5 * DEEPEST_OVERLAP * size:
+    for row in range(work.tally[at.CANDIDATES]):
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        size = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
+        if -work.geometry[at.NOW, row, at.GAP] > 0.5 * DEEPEST_OVERLAP * size:
             return True
     return False
 
 
 def momentum_change(scene, work, body, axis, step):
     """Mass times acceleration in the step."""
-    before = work.motion[START, body, VELOCITY + axis]
-    return inertia(scene, body, axis) * (work.motion[NOW, body, VELOCITY + axis] - before) / step
+    before = work.motion[at.START, body, at.VELOCITY + axis]
+    return (
+        inertia(scene, body, axis) * (work.motion[at.NOW, body, at.VELOCITY + axis] - before) / step
+    )
 
 
 def unbalanced(scene, work, body, axis, step):
     """Force less mass times acceleration."""
-    force = work.rates[NOW, body, FORCE + axis]
+    force = work.rates[at.NOW, body, at.FORCE + axis]
     return force - momentum_change(scene, work, body, axis, step)
 
 
@@ -154,27 +132,27 @@ def write_load(scene, work, step):
     bodies, n = work.bodies, work.bodies.shape[0]
     for body in range(n):
         for axis in range(2):
-            bodies[body, LEADER_FORCE + axis] = bodies[body, LEADER_RATE + axis] = 0.0
+            bodies[body, at.LEADER_FORCE + axis] = bodies[body, at.LEADER_RATE + axis] = 0.0
     for body in range(n):
         leader = work.cluster[body]
         for axis in range(2):
-            bodies[leader, LEADER_FORCE + axis] += work.rates[NOW, body, FORCE + axis]
+            bodies[leader, at.LEADER_FORCE + axis] += work.rates[at.NOW, body, at.FORCE + axis]
             rate = momentum_change(scene, work, body, axis, step)
-            bodies[leader, LEADER_RATE + axis] += rate
+            bodies[leader, at.LEADER_RATE + axis] += rate
     for body in range(n):
-        free = scene.bodies[body, FREE]
+        free = scene.bodies[body, at.FREE]
         for axis in range(3):
             load = unbalanced(scene, work, body, axis, step)
             if axis < 2 and work.cluster[body] == body:
-                load = bodies[body, LEADER_FORCE + axis] - bodies[body, LEADER_RATE + axis]
+                load = bodies[body, at.LEADER_FORCE + axis] - bodies[body, at.LEADER_RATE + axis]
             work.loads[REAL, 3 * body + axis] = free * load
 
 
 @apart
 def assemble_rest(scene, work, clock, step):
     """Derivatives of all forces at the end of the step but those of contacts."""
-    remaining = max(end_of_run(clock) - clock[TIME], step)
-    assemble_others(scene, work, clock[TIME] + step, remaining)
+    remaining = max(end_of_run(clock) - clock[at.TIME], step)
+    assemble_others(scene, work, clock[at.TIME] + step, remaining)
 
 
 def refresh(scene, work, clock, step):
@@ -192,13 +170,13 @@ def solve_change(scene, work, step):
     """Newton's change of velocities into CHANGE; the largest that it makes in place [m]."""
     write_load(scene, work, step)
     solve_real(work)
-    work.tally[SOLVES] += 1
+    work.tally[at.SOLVES] += 1
     largest = 0.0
     for body in range(work.bodies.shape[0]):
-        memory = step + work.bodies[body, MEMORY]
+        memory = step + work.bodies[body, at.MEMORY]
         for axis in range(3):
-            change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body, FREE]
-            work.motion[CHANGE, body, VELOCITY + axis] = change
+            change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body, at.FREE]
+            work.motion[at.CHANGE, body, at.VELOCITY + axis] = change
             if not abs(change) < math.inf:
                 return math.inf
             largest = max(largest, lever(scene, body, axis) * memory * abs(change))
@@ -208,13 +186,13 @@ def solve_change(scene, work, step):
 def go_along(work, way):
     """Add a share of the change to the velocities."""
     for body in range(work.bodies.shape[0]):
-        for axis in range(VELOCITY, VELOCITY + 3):
-            work.motion[NOW, body, axis] += way * work.motion[CHANGE, body, axis]
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+            work.motion[at.NOW, body, axis] += way * work.motion[at.CHANGE, body, axis]
 
 
 def goal_of(scene, work, clock, step):
     """What a change may be at most where it is the last one [m]."""
-    return max(NEWTON_SHARE * clock[TOLERANCE], rounding_size(scene, work, NOW, step))
+    return max(NEWTON_SHARE * clock[at.TOLERANCE], rounding_size(scene, work, at.NOW, step))
 
 
 @apart
@@ -222,7 +200,7 @@ def solve_end(scene, work, clock, step):
     """Find the end of the step, of which begin_step has kept the start, from velocities that are
     near it; False where it is not found."""
     for _ in range(MOST_ITERATIONS):
-        if not evaluate_end(scene, work, clock[TIME], step):
+        if not evaluate_end(scene, work, clock[at.TIME], step):
             return False
         if not refresh(scene, work, clock, step):
             return False
@@ -231,5 +209,5 @@ def solve_end(scene, work, clock, step):
             return False
         go_along(work, 1.0)
         if change <= goal_of(scene, work, clock, step):
-            return evaluate_end(scene, work, clock[TIME], step)
+            return evaluate_end(scene, work, clock[at.TIME], step)
     return False

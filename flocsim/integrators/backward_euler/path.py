@@ -8,28 +8,7 @@ which pairs close and slide, with those where they have come to.
 
 import math
 
-from flocsim.arrays import (
-    AHEAD,
-    BEHIND,
-    BUSY,
-    CANDIDATES,
-    CHANGE,
-    EDGE_BODY,
-    FORCE,
-    FREE,
-    GAP,
-    LEFT,
-    LIMIT,
-    NOW,
-    OVERLAP,
-    RUBBING,
-    SLIDING,
-    START,
-    STUCK,
-    TIME,
-    TRIAL,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
@@ -87,8 +66,8 @@ def usual_force(scene, work):
     """How large forces are that stop, or hold, a body [N], in the mean."""
     total, count = 0.0, 0
     for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
-            fx, fy = work.rates[NOW, body, FORCE], work.rates[NOW, body, FORCE + 1]
+        if scene.bodies[body, at.FREE] == 1.0:
+            fx, fy = work.rates[at.NOW, body, at.FORCE], work.rates[at.NOW, body, at.FORCE + 1]
             total += math.hypot(fx, fy)
             count += 1
     return total / max(count, 1)
@@ -97,13 +76,13 @@ def usual_force(scene, work):
 def usual_sizes(scene, work, step):
     """(a usual δ, a usual s [m]); 0 where no pair is in play."""
     count, stopped, way, deepest, stiffness = 0, 0.0, 0.0, 0.0, 0.0
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-            speed = abs(rate_along(work, row, START, normal_rows(work, row)))
+            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            speed = abs(rate_along(work, row, at.START, normal_rows(work, row)))
             stopped += effective_mass(scene, a, b) * speed / step
             way += step * speed
-            deepest = max(deepest, -work.geometry[NOW, row, GAP])
+            deepest = max(deepest, -work.geometry[at.NOW, row, at.GAP])
             stiffness += normal_stiffness(scene, work, row, step, 1e-12)
             count += 1
     if count == 0 or not stiffness > 0.0:
@@ -114,47 +93,49 @@ def usual_sizes(scene, work, step):
 
 def begin_anywhere(scene, work, step, usual, way):
     """δ, s and friction of all pairs in play to begin with, of which nothing is known."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             known = work.slip
-            known[OVERLAP, row] = max(-work.geometry[TRIAL, row, GAP], AWAY * usual)
-            known[LEFT, row] = max(work.geometry[NOW, row, GAP] + known[OVERLAP, row], AWAY * way)
+            known[at.OVERLAP, row] = max(-work.geometry[at.TRIAL, row, at.GAP], AWAY * usual)
+            known[at.LEFT, row] = max(
+                work.geometry[at.NOW, row, at.GAP] + known[at.OVERLAP, row], AWAY * way
+            )
             press(scene, work, row, step)
-            known[RUBBING, row] = 0.0
-            known[AHEAD, row] = max(known[STUCK, row], AWAY * usual)
-            known[BEHIND, row] = max(-known[STUCK, row], AWAY * usual)
+            known[at.RUBBING, row] = 0.0
+            known[at.AHEAD, row] = max(known[at.STUCK, row], AWAY * usual)
+            known[at.BEHIND, row] = max(-known[at.STUCK, row], AWAY * usual)
 
 
 def begin_as_before(scene, work, step, usual):
     """The same where pairs are closed and slide as at the start of the step."""
     target = (AS_BEFORE * usual) ** 2
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            known, before = work.slip, work.geometry[TRIAL, row, GAP]
+            known, before = work.slip, work.geometry[at.TRIAL, row, at.GAP]
             if before < 0.0:
-                known[OVERLAP, row], known[LEFT, row] = -before, -target / before
+                known[at.OVERLAP, row], known[at.LEFT, row] = -before, -target / before
             else:
-                known[LEFT, row] = max(work.geometry[NOW, row, GAP], FOUND * usual)
-                known[OVERLAP, row] = target / known[LEFT, row]
+                known[at.LEFT, row] = max(work.geometry[at.NOW, row, at.GAP], FOUND * usual)
+                known[at.OVERLAP, row] = target / known[at.LEFT, row]
             press(scene, work, row, step)
-            limit, side = known[LIMIT, row], work.candidates[row, SLIDING]
+            limit, side = known[at.LIMIT, row], work.candidates[row, at.SLIDING]
             if limit > 0.0:
-                share = float(side) if side != 0 else known[STUCK, row] / limit
+                share = float(side) if side != 0 else known[at.STUCK, row] / limit
                 share = min(max(share, FOUND - 1.0), 1.0 - FOUND)
-                slides = side * (known[STUCK, row] - share * limit)
-                known[RUBBING, row] = share
-                known[AHEAD, row] = target / (limit * (1.0 - share))
-                known[BEHIND, row] = target / (limit * (1.0 + share))
-                moves = AHEAD if side > 0 else BEHIND
+                slides = side * (known[at.STUCK, row] - share * limit)
+                known[at.RUBBING, row] = share
+                known[at.AHEAD, row] = target / (limit * (1.0 - share))
+                known[at.BEHIND, row] = target / (limit * (1.0 + share))
+                moves = at.AHEAD if side > 0 else at.BEHIND
                 if side != 0:
                     known[moves, row] = max(known[moves, row], slides)
 
 
 def advance_gaps(work, share, step):
     """Gaps after a share of the change of velocities, in the directions that they had."""
-    for row in range(work.tally[CANDIDATES]):
-        opening = rate_along(work, row, CHANGE, normal_rows(work, row))
-        work.geometry[NOW, row, GAP] += share * step * opening
+    for row in range(work.tally[at.CANDIDATES]):
+        opening = rate_along(work, row, at.CHANGE, normal_rows(work, row))
+        work.geometry[at.NOW, row, at.GAP] += share * step * opening
 
 
 @apart
@@ -171,11 +152,11 @@ def iterate(scene, work, clock, step, target, turns):
     share = change_pairs(work, step, target)
     go_along(work, share)
     if turns:
-        evaluate_others(scene, work, clock[TIME], step)
+        evaluate_others(scene, work, clock[at.TIME], step)
     else:
         advance_gaps(work, share, step)
         place_ends(work, step)
-        sum_other_forces(scene, work, clock[TIME] + step, NOW)
+        sum_other_forces(scene, work, clock[at.TIME] + step, at.NOW)
     return share, change
 
 
@@ -207,7 +188,7 @@ def come_from_afar(scene, work, clock, step, usual, way, standing):
         if share < 0.0:
             return False
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
-            evaluate_others(scene, work, clock[TIME], step)
+            evaluate_others(scene, work, clock[at.TIME], step)
             return arrive(scene, work, clock, step, usual, MOST_TURNING, 0.0)
     return False
 
@@ -215,24 +196,24 @@ def come_from_afar(scene, work, clock, step, usual, way, standing):
 def start_anew(scene, work, clock, step):
     """Go back to the velocities at the start of the step."""
     put_back(work)
-    evaluate_others(scene, work, clock[TIME], step)
+    evaluate_others(scene, work, clock[at.TIME], step)
 
 
 @apart
 def find_closed(scene, work, clock, step):
     """Bring the velocities near those of the step's end; False where that fails."""
-    evaluate_others(scene, work, clock[TIME], step)
+    evaluate_others(scene, work, clock[at.TIME], step)
     flag_close(scene, work)
     gather_clusters(scene, work)
     usual, way = usual_sizes(scene, work, step)
     if usual == 0.0:
         return True
-    if clock[BUSY] == 0.0:
+    if clock[at.BUSY] == 0.0:
         begin_as_before(scene, work, step, usual)
         if arrive(scene, work, clock, step, usual, MOST_KNOWN, CUT_OFF):
             return True
         start_anew(scene, work, clock, step)
-    clock[BUSY] = 1.0
+    clock[at.BUSY] = 1.0
     if come_from_afar(scene, work, clock, step, usual, way, STANDING):
         return True
     start_anew(scene, work, clock, step)

@@ -6,32 +6,7 @@ do not resolve they damp: bodies come to rest at the first touch, as they do by 
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    BEARABLE_STEP,
-    BUSY,
-    CANDIDATES,
-    EDGE_BODY,
-    GAP,
-    LOOKED_AT,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    PREVIOUS_STEP,
-    RATES_KNOWN,
-    SETTLED_STEP,
-    SETTLING,
-    SLIDING,
-    STAGED_STEP,
-    START,
-    STEP,
-    SWITCHES,
-    TOLERANCE,
-    TRIAL,
-    VERTEX_BODY,
-    VX,
-    VY,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.integrators.backward_euler.contact_mean import takes_part
 from flocsim.integrators.backward_euler.estimate import estimate_step, write_rates
@@ -61,7 +36,7 @@ def next_across(clock, step, ratio):
         return step * max(LEAST_SHARE, SAFETY / ratio)
     longer = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
     # A step cut short by the end of the window says nothing against a longer one.
-    return max(clock[STEP], longer) if step < clock[STEP] and ratio <= 0.5 else longer
+    return max(clock[at.STEP], longer) if step < clock[at.STEP] and ratio <= 0.5 else longer
 
 
 def solve_step(scene, work, clock, step):
@@ -73,10 +48,10 @@ def solve_step(scene, work, clock, step):
 
 def speed_along(work, row, state):
     """How fast the bodies of a pair came at each other in a state [m/s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g, motion = work.geometry, work.motion
-    speed = g[NOW, row, NORMAL_X] * (motion[state, b, VX] - motion[state, a, VX])
-    return speed + g[NOW, row, NORMAL_Y] * (motion[state, b, VY] - motion[state, a, VY])
+    speed = g[at.NOW, row, at.NORMAL_X] * (motion[state, b, at.VX] - motion[state, a, at.VX])
+    return speed + g[at.NOW, row, at.NORMAL_Y] * (motion[state, b, at.VY] - motion[state, a, at.VY])
 
 
 @apart
@@ -84,15 +59,15 @@ def fastest_bounce(scene, work, clock, lasting):
     """ω0 [1/s] of the stiffest contact of the step from which bodies would fly apart again, by
     more than is allowed; of those alone that have closed in it unless ``lasting``."""
     fastest = 0.0
-    for row in range(work.tally[CANDIDATES]):
-        closed = work.geometry[TRIAL, row, GAP] >= 0.0 > work.geometry[NOW, row, GAP]
+    for row in range(work.tally[at.CANDIDATES]):
+        closed = work.geometry[at.TRIAL, row, at.GAP] >= 0.0 > work.geometry[at.NOW, row, at.GAP]
         if closed or (lasting and takes_part(work, row)):
-            speed = speed_along(work, row, START)
+            speed = speed_along(work, row, at.START)
             if lasting:
-                speed = max(abs(speed), abs(speed_along(work, row, NOW)))
-            if speed * memory_of(work, row) > clock[TOLERANCE]:
-                view = contact_view(scene, work, NOW, row)
-                stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+                speed = max(abs(speed), abs(speed_along(work, row, at.NOW)))
+            if speed * memory_of(work, row) > clock[at.TOLERANCE]:
+                view = contact_view(scene, work, at.NOW, row)
+                stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
                 if stiffness > 0.0:
                     frequency = math.sqrt(stiffness / view.effective_mass)
                     if bounces(scene, view, speed, frequency):
@@ -115,29 +90,33 @@ def euler_step(scene, work, clock, step, lasting):
 def note_rates(scene, work, clock, step):
     """Write down what a step that has been accepted says of the next one."""
     write_rates(work, step)
-    clock[RATES_KNOWN] = 1.0
+    clock[at.RATES_KNOWN] = 1.0
     switches = 0
-    for row in range(work.tally[CANDIDATES]):
-        before, after = work.geometry[TRIAL, row, GAP], work.geometry[NOW, row, GAP]
+    for row in range(work.tally[at.CANDIDATES]):
+        before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
         switches += 1 if (before < 0.0) != (after < 0.0) else 0
-    clock[SWITCHES] += switches
+    clock[at.SWITCHES] += switches
     if switches <= FEW:
-        clock[BUSY] = 0.0
+        clock[at.BUSY] = 0.0
 
 
 def go_across(clock, step):
     """From now on, steps go on across switches; the size of the first one."""
-    clock[ACROSS], clock[STEP] = 1.0, step
-    clock[RATES_KNOWN] = clock[BUSY] = clock[STAGED_STEP] = 0.0
-    clock[BEARABLE_STEP] = math.inf
+    clock[at.ACROSS], clock[at.STEP] = 1.0, step
+    clock[at.RATES_KNOWN] = clock[at.BUSY] = clock[at.STAGED_STEP] = 0.0
+    clock[at.BEARABLE_STEP] = math.inf
 
 
 @apart
 def end_at_switches(scene, work, clock):
     """From now on, steps end at switches, as pairs are flagged by gaps and displacements now."""
-    clock[ACROSS], clock[STEP], clock[LOOKED_AT] = 0.0, FIRST_SHARE * clock[STEP], math.inf
-    clock[PREVIOUS_STEP] = clock[BEARABLE_STEP] = clock[SETTLED_STEP] = math.inf
-    clock[SETTLING] = 0.0
-    for row in range(work.tally[CANDIDATES]):
-        work.candidates[row, SLIDING] = 0
+    clock[at.ACROSS], clock[at.STEP], clock[at.LOOKED_AT] = (
+        0.0,
+        FIRST_SHARE * clock[at.STEP],
+        math.inf,
+    )
+    clock[at.PREVIOUS_STEP] = clock[at.BEARABLE_STEP] = clock[at.SETTLED_STEP] = math.inf
+    clock[at.SETTLING] = 0.0
+    for row in range(work.tally[at.CANDIDATES]):
+        work.candidates[row, at.SLIDING] = 0
     set_modes(scene, work)

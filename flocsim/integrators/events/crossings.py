@@ -5,18 +5,7 @@ The motion in the step is interpolated; the integrator then takes a shorter step
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    EDGE_BODY,
-    GAP,
-    GRAZES,
-    NEW,
-    NOW,
-    TRIAL,
-    VELOCITY,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import hook
 from flocsim.integrators.events.resolution import release_resolution, touch_resolution
@@ -36,50 +25,52 @@ def interpolate(work, step, share, body):
     motion = work.motion
     rest = 1.0 - share
     for axis in range(3):
-        change = motion[NEW, body, axis] - motion[NOW, body, axis]
-        start = step * motion[NOW, body, VELOCITY + axis] - change
-        end = change - step * motion[NEW, body, VELOCITY + axis]
+        change = motion[at.NEW, body, axis] - motion[at.NOW, body, axis]
+        start = step * motion[at.NOW, body, at.VELOCITY + axis] - change
+        end = change - step * motion[at.NEW, body, at.VELOCITY + axis]
         bend = rest * start + share * end
-        motion[TRIAL, body, axis] = motion[NOW, body, axis] + share * change + share * rest * bend
+        motion[at.TRIAL, body, axis] = (
+            motion[at.NOW, body, axis] + share * change + share * rest * bend
+        )
         slope = change + (rest - share) * bend + share * rest * (end - start)
-        motion[TRIAL, body, VELOCITY + axis] = slope / step
+        motion[at.TRIAL, body, at.VELOCITY + axis] = slope / step
 
 
 def margin(work, state, row):
     """What must not become negative while the flags hold [m]: the gap of a pair that is open now,
     the overlap of a closed one; nothing of one that grazes."""
-    gap = work.geometry[state, row, GAP]
-    if work.candidates[row, CLOSED] == GRAZES:
+    gap = work.geometry[state, row, at.GAP]
+    if work.candidates[row, at.CLOSED] == at.GRAZES:
         return math.inf
-    return -gap if work.geometry[NOW, row, GAP] < 0.0 else gap
+    return -gap if work.geometry[at.NOW, row, at.GAP] < 0.0 else gap
 
 
 def margin_rate(work, state, row):
     """Rate of change of the margin [m/s]."""
     rate = normal_rate(work, state, row)
-    if work.candidates[row, CLOSED] == GRAZES:
+    if work.candidates[row, at.CLOSED] == at.GRAZES:
         return 0.0
-    return -rate if work.geometry[NOW, row, GAP] < 0.0 else rate
+    return -rate if work.geometry[at.NOW, row, at.GAP] < 0.0 else rate
 
 
 def look_at(scene, work, step, share, row):
     """Locate a pair at a share of the step; the margin."""
-    for column in (VERTEX_BODY, EDGE_BODY):
+    for column in (at.VERTEX_BODY, at.EDGE_BODY):
         body = work.candidates[row, column]
         interpolate(work, step, share, body)
-        turn_body(work, TRIAL, body)
-    locate_polygons(scene, work, TRIAL, row)
-    return margin(work, TRIAL, row)
+        turn_body(work, at.TRIAL, body)
+    locate_polygons(scene, work, at.TRIAL, row)
+    return margin(work, at.TRIAL, row)
 
 
 def may_dip(work, step, row):
     """Whether the margin may be negative inside the step though it is not at its ends."""
-    rate_low = step * margin_rate(work, NOW, row)
-    rate_high = step * margin_rate(work, NEW, row)
+    rate_low = step * margin_rate(work, at.NOW, row)
+    rate_high = step * margin_rate(work, at.NEW, row)
     if not rate_low < 0.0 < rate_high:
         return False
     # Straight lines from both ends bound what a convex margin can fall to.
-    at_start, at_end = margin(work, NOW, row), margin(work, NEW, row)
+    at_start, at_end = margin(work, at.NOW, row), margin(work, at.NEW, row)
     return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
 
 
@@ -88,14 +79,14 @@ def lowest_share(scene, work, step, row):
     if not may_dip(work, step, row):
         return NEVER
     low, high = 0.0, 1.0
-    rate_low = step * margin_rate(work, NOW, row)
-    rate_high = step * margin_rate(work, NEW, row)
+    rate_low = step * margin_rate(work, at.NOW, row)
+    rate_high = step * margin_rate(work, at.NEW, row)
     share = 0.5
     for _ in range(8):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
         share = min(max(share, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
         look_at(scene, work, step, share, row)
-        rate = step * margin_rate(work, TRIAL, row)
+        rate = step * margin_rate(work, at.TRIAL, row)
         if rate < 0.0:
             low, rate_low = share, rate
         else:
@@ -109,7 +100,7 @@ def crossing(scene, work, step, row, high, at_high, resolution):
     """The share at which the margin, ``at_high`` at ``high`` and too low there, is just below
     zero."""
     low, target = 0.0, 0.5 * resolution
-    at_low = margin(work, NOW, row) + target
+    at_low = margin(work, at.NOW, row) + target
     at_high += target
     side = 0
     share = high
@@ -133,21 +124,21 @@ def crossing(scene, work, step, row, high, at_high, resolution):
 def collides(work, step, row, depth):
     """Whether an open pair that overlaps at the end of the step goes on approaching: a graze turns
     around by itself, speed²/(2 slowing) deeper."""
-    speed = -normal_rate(work, NEW, row)
+    speed = -normal_rate(work, at.NEW, row)
     if speed * step > depth:
         return True
-    slowing = (-normal_rate(work, NOW, row) - speed) / step
+    slowing = (-normal_rate(work, at.NOW, row) - speed) / step
     lasting = speed * memory_of(work, row) > depth
     return lasting and speed * speed > 2.0 * slowing * depth
 
 
 def unnoticed(scene, work, step, row, resolution, depth):
     """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
-    before, after = work.geometry[NOW, row, GAP], work.geometry[NEW, row, GAP]
+    before, after = work.geometry[at.NOW, row, at.GAP], work.geometry[at.NEW, row, at.GAP]
     if before < 0.0 <= after:
-        return release_resolution(scene, work, NEW, row, resolution)
+        return release_resolution(scene, work, at.NEW, row, resolution)
     if before >= 0.0 > after and collides(work, step, row, depth):
-        return touch_resolution(scene, work, NEW, row, resolution)
+        return touch_resolution(scene, work, at.NEW, row, resolution)
     return depth
 
 
@@ -155,7 +146,7 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
     high, limit = min(earliest, 1.0), unnoticed(scene, work, step, row, resolution, depth)
     resolution = min(resolution, limit)
-    if margin(work, NEW, row) >= -limit:
+    if margin(work, at.NEW, row) >= -limit:
         lowest = lowest_share(scene, work, step, row)
         if lowest > high:
             return earliest
@@ -168,9 +159,9 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
 
 def may_switch(scene, work, step, resolution, depth):
     """Whether a pair may switch in a step before its end, as seen from both ends of it."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         limit = unnoticed(scene, work, step, row, resolution, depth)
-        if margin(work, NEW, row) < -limit or may_dip(work, step, row):
+        if margin(work, at.NEW, row) < -limit or may_dip(work, step, row):
             return True
     return False
 
@@ -182,6 +173,6 @@ def first_switch(scene, work, step, resolution, depth):
     one that counts is located to ``resolution`` [m].
     """
     earliest = NEVER
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         earliest = switch_of(scene, work, step, row, earliest, resolution, depth)
     return earliest

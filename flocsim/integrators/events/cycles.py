@@ -15,50 +15,7 @@ second.
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    CARRIED,
-    CLOSED,
-    CYCLE_AT,
-    CYCLE_AT_BEFORE,
-    CYCLE_BEFORE,
-    CYCLE_CODE,
-    CYCLE_CODE_BEFORE,
-    CYCLE_ERROR,
-    CYCLE_GAP,
-    CYCLE_GAP_BEFORE,
-    CYCLE_LAST,
-    CYCLE_MODES,
-    CYCLE_RETURNS,
-    CYCLE_SLIP,
-    CYCLE_SLIP_BEFORE,
-    CYCLE_SWITCHES,
-    CYCLES_SEEN,
-    DOUBT_PLACE,
-    ERROR,
-    ERROR_PLACE,
-    FLIGHTS,
-    FREE,
-    GAP,
-    GAP_OFFSET,
-    MASS,
-    MOTION_COLUMNS,
-    NOW,
-    OPEN,
-    SLIDING,
-    SPIN,
-    STATED,
-    SWITCH_PLACE,
-    TIME,
-    TOLERANCE,
-    TRIAL,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.grazes import hums
 from flocsim.integrators.events.modes import set_modes
@@ -101,73 +58,73 @@ TINY = 1e-300
 
 def share_of_second(scene):
     """Where the point that stands for the pair lies between its bodies: their centre of mass."""
-    if scene.bodies[0, FREE] == 0.0:
+    if scene.bodies[0, at.FREE] == 0.0:
         return 0.0
-    if scene.bodies[1, FREE] == 0.0:
+    if scene.bodies[1, at.FREE] == 0.0:
         return 1.0
-    return scene.bodies[1, MASS] / (scene.bodies[0, MASS] + scene.bodies[1, MASS])
+    return scene.bodies[1, at.MASS] / (scene.bodies[0, at.MASS] + scene.bodies[1, at.MASS])
 
 
 def coordinate(scene, work, state, which):
     """A coordinate of the pair: place (x, y) and angle of the second body as seen from the first,
     velocities (x, y, spin) of both along its axes, then its angle, and the place of the pair."""
     m = work.motion
-    turn = m[state, 0, ANGLE]
+    turn = m[state, 0, at.ANGLE]
     c, s = math.cos(turn), math.sin(turn)
-    dx, dy = m[state, 1, X] - m[state, 0, X], m[state, 1, Y] - m[state, 0, Y]
+    dx, dy = m[state, 1, at.X] - m[state, 0, at.X], m[state, 1, at.Y] - m[state, 0, at.Y]
     if which == 0:
         return c * dx + s * dy
     if which == 1:
         return c * dy - s * dx
     if which == 2:
-        return m[state, 1, ANGLE] - turn
+        return m[state, 1, at.ANGLE] - turn
     if which < WHOLE:
         body, axis = (which - 3) // 3, (which - 3) % 3
         if axis == 0:
-            return c * m[state, body, VX] + s * m[state, body, VY]
+            return c * m[state, body, at.VX] + s * m[state, body, at.VY]
         if axis == 1:
-            return c * m[state, body, VY] - s * m[state, body, VX]
-        return m[state, body, SPIN]
+            return c * m[state, body, at.VY] - s * m[state, body, at.VX]
+        return m[state, body, at.SPIN]
     if which == WHOLE:
         return turn
     share = share_of_second(scene)
     if which == WHOLE + 1:
-        return m[state, 0, X] + share * dx
-    return m[state, 0, Y] + share * dy
+        return m[state, 0, at.X] + share * dx
+    return m[state, 0, at.Y] + share * dy
 
 
 def place_by(scene, work):
     """Make the coordinates that lie in TRIAL the motion of NOW."""
-    m, q = work.motion, work.motion[TRIAL]
+    m, q = work.motion, work.motion[at.TRIAL]
     turn, share = q[1, 3], share_of_second(scene)
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = c * q[0, 0] - s * q[0, 1], s * q[0, 0] + c * q[0, 1]
-    m[NOW, 0, X], m[NOW, 0, Y] = q[1, 4] - share * dx, q[1, 5] - share * dy
-    m[NOW, 1, X], m[NOW, 1, Y] = m[NOW, 0, X] + dx, m[NOW, 0, Y] + dy
-    m[NOW, 0, ANGLE], m[NOW, 1, ANGLE] = turn, turn + q[0, 2]
-    m[NOW, 0, VX], m[NOW, 0, VY] = c * q[0, 3] - s * q[0, 4], s * q[0, 3] + c * q[0, 4]
-    m[NOW, 0, SPIN], m[NOW, 1, SPIN] = q[0, 5], q[1, 2]
-    m[NOW, 1, VX], m[NOW, 1, VY] = c * q[1, 0] - s * q[1, 1], s * q[1, 0] + c * q[1, 1]
+    m[at.NOW, 0, at.X], m[at.NOW, 0, at.Y] = q[1, 4] - share * dx, q[1, 5] - share * dy
+    m[at.NOW, 1, at.X], m[at.NOW, 1, at.Y] = m[at.NOW, 0, at.X] + dx, m[at.NOW, 0, at.Y] + dy
+    m[at.NOW, 0, at.ANGLE], m[at.NOW, 1, at.ANGLE] = turn, turn + q[0, 2]
+    m[at.NOW, 0, at.VX], m[at.NOW, 0, at.VY] = c * q[0, 3] - s * q[0, 4], s * q[0, 3] + c * q[0, 4]
+    m[at.NOW, 0, at.SPIN], m[at.NOW, 1, at.SPIN] = q[0, 5], q[1, 2]
+    m[at.NOW, 1, at.VX], m[at.NOW, 1, at.VY] = c * q[1, 0] - s * q[1, 1], s * q[1, 0] + c * q[1, 1]
 
 
 def modes_of(work):
     """A number for how all listed pairs touch."""
     code = 1
-    for row in range(work.tally[CANDIDATES]):
-        mode = 3 * work.candidates[row, CLOSED] + work.candidates[row, SLIDING] + 1
+    for row in range(work.tally[at.CANDIDATES]):
+        mode = 3 * work.candidates[row, at.CLOSED] + work.candidates[row, at.SLIDING] + 1
         code = (code * BASE + mode + 1) % MODULUS
     return code
 
 
 def takes_part(work, row):
     """Whether a pair touches, or has done so a moment ago."""
-    return work.candidates[row, CLOSED] != OPEN or work.slip[FLIGHTS, row] > 0.0
+    return work.candidates[row, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, row] > 0.0
 
 
 def any_hums(work):
     """Whether a pair hums: where none does, the cycles are bounces, which somebody may want to
     see."""
-    for row in range(work.tally[CANDIDATES]):  # noqa: SIM110
+    for row in range(work.tally[at.CANDIDATES]):  # noqa: SIM110
         if hums(work, row):
             return True
     return False
@@ -175,26 +132,26 @@ def any_hums(work):
 
 def begin_at(counts, modes):
     """Let cycles be counted from these modes on."""
-    counts[CYCLE_MODES], counts[CYCLES_SEEN], counts[CYCLE_SWITCHES] = modes, 0, 0
-    counts[CYCLE_CODE] = counts[CYCLE_CODE_BEFORE] = 0
+    counts[at.CYCLE_MODES], counts[at.CYCLES_SEEN], counts[at.CYCLE_SWITCHES] = modes, 0, 0
+    counts[at.CYCLE_CODE] = counts[at.CYCLE_CODE_BEFORE] = 0
 
 
 def end_cycle(work, clock, counts):
     """Keep the state at the end of a cycle beside that of the end before."""
     for body in range(2):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[CYCLE_BEFORE, body, axis] = work.motion[CYCLE_LAST, body, axis]
-            work.motion[CYCLE_LAST, body, axis] = work.motion[NOW, body, axis]
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[CYCLE_SLIP_BEFORE, row] = work.slip[CYCLE_SLIP, row]
-        work.slip[CYCLE_SLIP, row] = work.slip[NOW, row]
-        work.slip[CYCLE_GAP_BEFORE, row] = work.slip[CYCLE_GAP, row]
-        work.slip[CYCLE_GAP, row] = work.geometry[NOW, row, GAP]
-    clock[CYCLE_AT_BEFORE], clock[CYCLE_AT] = clock[CYCLE_AT], clock[TIME]
-    clock[CYCLE_ERROR] = clock[ERROR]
-    counts[CYCLE_CODE_BEFORE], counts[CYCLE_CODE] = counts[CYCLE_CODE], 0
-    counts[CYCLE_SWITCHES] = counts[CYCLE_RETURNS] = 0
-    counts[CYCLES_SEEN] += 1
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.CYCLE_BEFORE, body, axis] = work.motion[at.CYCLE_LAST, body, axis]
+            work.motion[at.CYCLE_LAST, body, axis] = work.motion[at.NOW, body, axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.CYCLE_SLIP_BEFORE, row] = work.slip[at.CYCLE_SLIP, row]
+        work.slip[at.CYCLE_SLIP, row] = work.slip[at.NOW, row]
+        work.slip[at.CYCLE_GAP_BEFORE, row] = work.slip[at.CYCLE_GAP, row]
+        work.slip[at.CYCLE_GAP, row] = work.geometry[at.NOW, row, at.GAP]
+    clock[at.CYCLE_AT_BEFORE], clock[at.CYCLE_AT] = clock[at.CYCLE_AT], clock[at.TIME]
+    clock[at.CYCLE_ERROR] = clock[at.ERROR]
+    counts[at.CYCLE_CODE_BEFORE], counts[at.CYCLE_CODE] = counts[at.CYCLE_CODE], 0
+    counts[at.CYCLE_SWITCHES] = counts[at.CYCLE_RETURNS] = 0
+    counts[at.CYCLES_SEEN] += 1
 
 
 def known(change, least):
@@ -215,33 +172,36 @@ def allowed(most, now, last, before, size, least):
 
 def cycles_of_form(work):
     """How many cycles leave gaps and displacements about as they are."""
-    gaps, slips, least = 0.0, 0.0, above_rounding(work, NOW, 0.0)
-    for row in range(work.tally[CANDIDATES]):
+    gaps, slips, least = 0.0, 0.0, above_rounding(work, at.NOW, 0.0)
+    for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
-            gaps = max(gaps, abs(work.geometry[NOW, row, GAP]))
-            slips = max(slips, abs(work.slip[NOW, row]))
+            gaps = max(gaps, abs(work.geometry[at.NOW, row, at.GAP]))
+            slips = max(slips, abs(work.slip[at.NOW, row]))
     most = MOST_AT_ONCE
-    for row in range(work.tally[CANDIDATES]):
-        now, last = work.geometry[NOW, row, GAP], work.slip[CYCLE_GAP, row]
+    for row in range(work.tally[at.CANDIDATES]):
+        now, last = work.geometry[at.NOW, row, at.GAP], work.slip[at.CYCLE_GAP, row]
         size = gaps if takes_part(work, row) else now
-        most = allowed(most, now, last, work.slip[CYCLE_GAP_BEFORE, row], size, least)
+        most = allowed(most, now, last, work.slip[at.CYCLE_GAP_BEFORE, row], size, least)
         if takes_part(work, row):
-            now, last = work.slip[NOW, row], work.slip[CYCLE_SLIP, row]
-            most = allowed(most, now, last, work.slip[CYCLE_SLIP_BEFORE, row], slips, least)
+            now, last = work.slip[at.NOW, row], work.slip[at.CYCLE_SLIP, row]
+            most = allowed(most, now, last, work.slip[at.CYCLE_SLIP_BEFORE, row], slips, least)
     return most
 
 
 def change_of(scene, work, which):
     """(What the last cycle has changed of a coordinate, by how much more than the one before)."""
-    now, last = coordinate(scene, work, NOW, which), coordinate(scene, work, CYCLE_LAST, which)
-    before = coordinate(scene, work, CYCLE_BEFORE, which)
+    now, last = (
+        coordinate(scene, work, at.NOW, which),
+        coordinate(scene, work, at.CYCLE_LAST, which),
+    )
+    before = coordinate(scene, work, at.CYCLE_BEFORE, which)
     return now - last, now - 2.0 * last + before
 
 
 def way_of(scene, work, first):
     """(Largest change over the last cycle in three coordinates from ``first`` on, of which the
     angle counts in the place of an outline, by how much it differed from the one before) [m]."""
-    size = scene.bodies[0, BOUNDING_RADIUS] + scene.bodies[1, BOUNDING_RADIUS]
+    size = scene.bodies[0, at.BOUNDING_RADIUS] + scene.bodies[1, at.BOUNDING_RADIUS]
     way = bend = 0.0
     for which in range(first, first + 3):
         lever = size if which in (TURNED, WHOLE) else 1.0
@@ -270,15 +230,15 @@ def cycles_of_motion(scene, work, clock, until):
         most = PACE * way / bend
     if abs(turn) * most > MOST_TURN:
         most = MOST_TURN / abs(turn)
-    period = clock[TIME] - clock[CYCLE_AT]
-    longer = period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE]
+    period = clock[at.TIME] - clock[at.CYCLE_AT]
+    longer = period - clock[at.CYCLE_AT] + clock[at.CYCLE_AT_BEFORE]
     if abs(longer) * most > PACE * period:
         most = PACE * period / abs(longer)
     error = error_of(scene, work, most)
-    if error > clock[TOLERANCE]:
+    if error > clock[at.TOLERANCE]:
         # It goes with the square of their number at least.
-        most *= math.sqrt(clock[TOLERANCE] / error)
-    return min(most, 0.5 * (until - clock[TIME]) / period)
+        most *= math.sqrt(clock[at.TOLERANCE] / error)
+    return min(most, 0.5 * (until - clock[at.TIME]) / period)
 
 
 def leave_out(scene, work, clock, many):
@@ -287,65 +247,69 @@ def leave_out(scene, work, clock, many):
     for which in range(COORDINATES):
         change, bend = change_of(scene, work, which)
         more = half * bend if which >= WHOLE else 0.0
-        now = coordinate(scene, work, NOW, which)
-        work.motion[TRIAL, which // MOTION_COLUMNS, which % MOTION_COLUMNS] = (
+        now = coordinate(scene, work, at.NOW, which)
+        work.motion[at.TRIAL, which // at.MOTION_COLUMNS, which % at.MOTION_COLUMNS] = (
             now + many * change + more
         )
     place_by(scene, work)
-    least = above_rounding(work, NOW, 0.0)
-    for row in range(work.tally[CANDIDATES]):
+    least = above_rounding(work, at.NOW, 0.0)
+    for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
-            slip, gap = work.slip[NOW, row], work.geometry[NOW, row, GAP]
-            work.slip[NOW, row] += many * known(slip - work.slip[CYCLE_SLIP, row], least)
-            change = known(gap - work.slip[CYCLE_GAP, row], least)
-            work.slip[CYCLE_GAP, row] = gap + many * change
-    period = clock[TIME] - clock[CYCLE_AT]
-    clock[TIME] += many * period + half * (period - clock[CYCLE_AT] + clock[CYCLE_AT_BEFORE])
-    locate_contacts(scene, work, NOW)
+            slip, gap = work.slip[at.NOW, row], work.geometry[at.NOW, row, at.GAP]
+            work.slip[at.NOW, row] += many * known(slip - work.slip[at.CYCLE_SLIP, row], least)
+            change = known(gap - work.slip[at.CYCLE_GAP, row], least)
+            work.slip[at.CYCLE_GAP, row] = gap + many * change
+    period = clock[at.TIME] - clock[at.CYCLE_AT]
+    clock[at.TIME] += many * period + half * (
+        period - clock[at.CYCLE_AT] + clock[at.CYCLE_AT_BEFORE]
+    )
+    locate_contacts(scene, work, at.NOW)
 
 
 def restore_gaps(work):
     """Count the gaps of pairs that take part as what a cycle makes of them: what a turn bends them
     by is far below them."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
-            work.slip[GAP_OFFSET, row] += work.geometry[NOW, row, GAP] - work.slip[CYCLE_GAP, row]
-            work.geometry[NOW, row, GAP] = work.slip[CYCLE_GAP, row]
+            work.slip[at.GAP_OFFSET, row] += (
+                work.geometry[at.NOW, row, at.GAP] - work.slip[at.CYCLE_GAP, row]
+            )
+            work.geometry[at.NOW, row, at.GAP] = work.slip[at.CYCLE_GAP, row]
 
 
 def carry_on_errors(work, clock, many, more):
     """Let what is stated of errors grow on as it has in the last cycle, and by ``more`` [m]."""
-    grown = many * max(clock[ERROR] - clock[CYCLE_ERROR], 0.0) + more
+    grown = many * max(clock[at.ERROR] - clock[at.CYCLE_ERROR], 0.0) + more
     if grown > 0.0:
-        factor = 1.0 + grown / max(clock[ERROR], TINY)
+        factor = 1.0 + grown / max(clock[at.ERROR], TINY)
         for body in range(2):
-            for column in (ERROR_PLACE, SWITCH_PLACE, DOUBT_PLACE, STATED):
+            for column in (at.ERROR_PLACE, at.SWITCH_PLACE, at.DOUBT_PLACE, at.STATED):
                 work.bodies[body, column] *= factor
-            for axis in range(MOTION_COLUMNS):
-                work.motion[CARRIED, body, axis] *= factor
-        clock[ERROR] *= factor
+            for axis in range(at.MOTION_COLUMNS):
+                work.motion[at.CARRIED, body, axis] *= factor
+        clock[at.ERROR] *= factor
 
 
 def leave_out_cycles(scene, work, clock, counts, until):
     """Look at a switch of two bodies that has just been, and leave out the cycles that it ends, if
     they have been alike."""
     if work.bodies.shape[0] != 2 or not any_hums(work):
-        counts[CYCLE_MODES] = 0
+        counts[at.CYCLE_MODES] = 0
         return
     modes = modes_of(work)
-    counts[CYCLE_CODE] = (counts[CYCLE_CODE] * BASE + modes) % MODULUS
-    counts[CYCLE_SWITCHES] += 1
-    if counts[CYCLE_SWITCHES] > MOST_SWITCHES or counts[CYCLE_MODES] == 0:
+    counts[at.CYCLE_CODE] = (counts[at.CYCLE_CODE] * BASE + modes) % MODULUS
+    counts[at.CYCLE_SWITCHES] += 1
+    if counts[at.CYCLE_SWITCHES] > MOST_SWITCHES or counts[at.CYCLE_MODES] == 0:
         begin_at(counts, modes)
-    if modes != counts[CYCLE_MODES]:
+    if modes != counts[at.CYCLE_MODES]:
         return
-    counts[CYCLE_RETURNS] += 1
-    if counts[CYCLES_SEEN] > 0 and counts[CYCLE_RETURNS] < RETURNS:
+    counts[at.CYCLE_RETURNS] += 1
+    if counts[at.CYCLES_SEEN] > 0 and counts[at.CYCLE_RETURNS] < RETURNS:
         return
     many = 0.0
-    if counts[CYCLES_SEEN] >= 2:
-        if counts[CYCLE_CODE] != counts[CYCLE_CODE_BEFORE]:
-            counts[CYCLE_MODES] = 0
+    if counts[at.CYCLES_SEEN] >= 2:
+        if counts[at.CYCLE_CODE] != counts[at.CYCLE_CODE_BEFORE]:
+            counts[at.CYCLE_MODES] = 0
             return
         many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
     if many >= FEWEST:

@@ -8,7 +8,7 @@ kink errs by the square of that little alone.
 
 import math
 
-from flocsim.arrays import ACROSS, CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE
+import flocsim.arrays as at
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.hooks import awaits_touch
 from flocsim.integrators.events.crossings import NEVER, first_switch
@@ -39,30 +39,32 @@ its sign may be rounding, and steps would end there for ever, and no time would 
 def deepest_overlap(work):
     """The largest overlap of a listed pair now [m], at least 0."""
     deepest = 0.0
-    for row in range(work.tally[CANDIDATES]):
-        deepest = max(deepest, -work.geometry[NOW, row, GAP])
+    for row in range(work.tally[at.CANDIDATES]):
+        deepest = max(deepest, -work.geometry[at.NOW, row, at.GAP])
     return deepest
 
 
 def resolutions_of(work, clock):
     """How far a pair may go behind its switch unnoticed, and how far it may be there without being
     told from one before it [m]."""
-    resolution = RESOLUTION * step_tolerance(work, clock) if clock[TOLERANCE] < math.inf else 1e-13
+    resolution = (
+        RESOLUTION * step_tolerance(work, clock) if clock[at.TOLERANCE] < math.inf else 1e-13
+    )
     deepest = deepest_overlap(work)
     if deepest > 0.0:
         resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
-    resolution = max(resolution, ROUNDING * furthest_place(work, NEW))
+    resolution = max(resolution, ROUNDING * furthest_place(work, at.NEW))
     if deepest > 0.0:
         return resolution, resolution
-    return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock[TOLERANCE]))
+    return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock[at.TOLERANCE]))
 
 
 def event_share(scene, work, row, which):
     """The share of the step at which one contact passes one of its kinks, by linear interpolation;
     2.0 where it does not, or is as good as there at either end."""
-    view = contact_view(scene, work, NOW, row)
+    view = contact_view(scene, work, at.NOW, row)
     before = contact_event(scene, view, which)
-    after = contact_event(scene, contact_view(scene, work, NEW, row), which)
+    after = contact_event(scene, contact_view(scene, work, at.NEW, row), which)
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, pressed_view(view, view.overlap, 0.0), which)
     as_good_as_there = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
@@ -74,8 +76,8 @@ def event_share(scene, work, row, which):
 
 def law_event_share(scene, work, share):
     """The share of the step at which the first contact passes a kink, or the given one before."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == 1:
             for which in range(scene.events):
                 share = min(share, event_share(scene, work, row, which))
     return share
@@ -84,8 +86,8 @@ def law_event_share(scene, work, share):
 def friction_share(scene, work, share, step, resolution):
     """The share of the step at which the first contact begins or ends to slide, or the given one
     before; what is beyond that by less than the resolution [m] at the end of the step is left."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == 1:
             distance, share_there = beyond(scene, work, row, step)
             if distance > resolution:
                 share = min(share, share_there)
@@ -107,7 +109,7 @@ def switch_share(scene, work, observed, clock, step):
 
     Expects the geometry of all pairs in NEW.
     """
-    ends = clock[TOLERANCE] < math.inf and clock[ACROSS] == 0.0
+    ends = clock[at.TOLERANCE] < math.inf and clock[at.ACROSS] == 0.0
     if ends or awaits_touch(observed):
         resolution, depth = resolutions_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)

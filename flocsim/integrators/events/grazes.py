@@ -10,28 +10,7 @@ followed, and left out (cycles.py). Where the tolerance resolves these, the law 
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    FLIGHT,
-    FLIGHTS,
-    FLOWN_AT,
-    FRESH,
-    GAP,
-    GAP_OFFSET,
-    GRAZES,
-    GRAZING_FORCE,
-    GRAZING_RESISTANCE,
-    NEW,
-    NOW,
-    OPEN,
-    PAIR,
-    SLIDING,
-    TIME,
-    TOLERANCE,
-    TOUCHES,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding
@@ -97,13 +76,13 @@ def pull_of(scene, work, row):
 
 def begins(scene, work, clock, row):
     """Whether a pair that has just parted grazes from now on."""
-    if work.candidates[row, SLIDING] != 0 or rattles(work, row):
+    if work.candidates[row, at.SLIDING] != 0 or rattles(work, row):
         return False
-    view = contact_view(scene, work, NOW, row)
+    view = contact_view(scene, work, at.NOW, row)
     _, force = contact_force(scene, view)
-    speed, pull = normal_rate(work, NOW, row), abs(force) * pull_of(scene, work, row)
+    speed, pull = normal_rate(work, at.NOW, row), abs(force) * pull_of(scene, work, row)
     share = SHARE_OF_FLIGHT if hums(work, row) else SHARE_OF_FIRST
-    if speed * speed > 2.0 * pull * share * clock[TOLERANCE]:
+    if speed * speed > 2.0 * pull * share * clock[at.TOLERANCE]:
         return False
     pull, _ = contact_force(scene, pressed_view(view, 0.0, 0.0))
     if abs(pull) > LEAST_PULL * abs(force):
@@ -113,9 +92,9 @@ def begins(scene, work, clock, row):
         return True
     if not hums(work, row):
         kick = abs(force) / math.sqrt(spring * view.effective_mass)
-        if kick * memory_of(work, row) > FIRST_KICK * clock[TOLERANCE]:
+        if kick * memory_of(work, row) > FIRST_KICK * clock[at.TOLERANCE]:
             return False
-    return abs(force) <= SHARE_OF_SLIP * clock[TOLERANCE] * spring
+    return abs(force) <= SHARE_OF_SLIP * clock[at.TOLERANCE] * spring
 
 
 def spring_of(scene, view):
@@ -125,7 +104,7 @@ def spring_of(scene, view):
 
 def near(work, row, other):
     """Whether two rows have one contact point."""
-    body = work.candidates[row, VERTEX_BODY]
+    body = work.candidates[row, at.VERTEX_BODY]
     x, y = contact_point(work, row, body)
     other_x, other_y = contact_point(work, other, body)
     return math.hypot(other_x - x, other_y - y) < SAME_PLACE
@@ -134,102 +113,104 @@ def near(work, row, other):
 def shares_point(work, row, other):
     """Whether two rows of the same two bodies have one contact point and gap: two corners that
     touch are up to four rows, of both bodies' edges."""
-    if work.candidates[row, PAIR] != work.candidates[other, PAIR]:
+    if work.candidates[row, at.PAIR] != work.candidates[other, at.PAIR]:
         return False
-    if abs(work.geometry[NOW, row, GAP] - work.geometry[NOW, other, GAP]) > above_rounding(
-        work, NOW, 0.0
-    ):
+    if abs(
+        work.geometry[at.NOW, row, at.GAP] - work.geometry[at.NOW, other, at.GAP]
+    ) > above_rounding(work, at.NOW, 0.0):
         return False
     return near(work, row, other)
 
 
 def enter(scene, work, row):
     """Let a pair graze."""
-    _, force = contact_force(scene, contact_view(scene, work, NOW, row))
-    work.candidates[row, CLOSED] = GRAZES
-    work.slip[GRAZING_FORCE, row] = force
-    work.slip[FRESH, row] = 1.0
+    _, force = contact_force(scene, contact_view(scene, work, at.NOW, row))
+    work.candidates[row, at.CLOSED] = at.GRAZES
+    work.slip[at.GRAZING_FORCE, row] = force
+    work.slip[at.FRESH, row] = 1.0
 
 
 def share_forces(work):
     """Rows of one contact point bear the same force."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             total, count = 0.0, 0
-            for other in range(work.tally[CANDIDATES]):
-                if work.candidates[other, CLOSED] == GRAZES and shares_point(work, row, other):
-                    total, count = total + work.slip[GRAZING_FORCE, other], count + 1
-            work.slip[GRAZING_RESISTANCE, row] = total / max(count, 1)
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
-            work.slip[GRAZING_FORCE, row] = work.slip[GRAZING_RESISTANCE, row]
+            for other in range(work.tally[at.CANDIDATES]):
+                if work.candidates[other, at.CLOSED] == at.GRAZES and shares_point(
+                    work, row, other
+                ):
+                    total, count = total + work.slip[at.GRAZING_FORCE, other], count + 1
+            work.slip[at.GRAZING_RESISTANCE, row] = total / max(count, 1)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
+            work.slip[at.GRAZING_FORCE, row] = work.slip[at.GRAZING_RESISTANCE, row]
 
 
 def hold_gap(work, row, gap):
     """Count the gap that a pair has now as another one."""
-    work.slip[GAP_OFFSET, row] += work.geometry[NOW, row, GAP] - gap
-    work.geometry[NOW, row, GAP] = gap
+    work.slip[at.GAP_OFFSET, row] += work.geometry[at.NOW, row, at.GAP] - gap
+    work.geometry[at.NOW, row, at.GAP] = gap
 
 
 def sliding_speed(work, row):
     """How fast the bodies of a pair that grazes slide against its force [m/s]."""
-    speed = tangential_rate(work, NOW, row)
-    return -speed if work.slip[GRAZING_FORCE, row] > 0.0 else speed
+    speed = tangential_rate(work, at.NOW, row)
+    return -speed if work.slip[at.GRAZING_FORCE, row] > 0.0 else speed
 
 
 def sticks(scene, work, row):
     """Whether a pair that grazes has ceased to slide; its spring takes the force over then, as far
     as it held that before. Without a spring the law's whole force is what it needs then."""
-    view = contact_view(scene, work, NOW, row)
-    force, spring = work.slip[GRAZING_FORCE, row], spring_of(scene, view)
+    view = contact_view(scene, work, at.NOW, row)
+    force, spring = work.slip[at.GRAZING_FORCE, row], spring_of(scene, view)
     if spring == 0.0:
         _, whole = contact_force(scene, view)
         return whole * force <= force * force
     if sliding_speed(work, row) >= 0.0:
         return False
-    needed, held = -force / spring, work.slip[NOW, row]
+    needed, held = -force / spring, work.slip[at.NOW, row]
     if needed * held <= 0.0:
-        work.slip[NOW, row] = 0.0
+        work.slip[at.NOW, row] = 0.0
     elif abs(needed) < abs(held):
-        work.slip[NOW, row] = needed
+        work.slip[at.NOW, row] = needed
     return True
 
 
 def leave(work, row, mode, gap):
     """Let a pair cease to graze."""
-    work.candidates[row, CLOSED] = mode
+    work.candidates[row, at.CLOSED] = mode
     hold_gap(work, row, gap)
 
 
 def go_on(scene, work, row):
     """Whether a pair goes on grazing behind a step."""
-    if work.slip[FRESH, row] != 0.0:
+    if work.slip[at.FRESH, row] != 0.0:
         # Its first step takes what is left of the gap's rate away, of which no load tells.
-        work.slip[FRESH, row] = 0.0
+        work.slip[at.FRESH, row] = 0.0
         return True
-    before, rate = work.slip[GRAZING_FORCE, row], normal_rate(work, NOW, row)
-    after = before - work.slip[GRAZING_RESISTANCE, row] * rate
-    work.slip[GRAZING_FORCE, row] = after
+    before, rate = work.slip[at.GRAZING_FORCE, row], normal_rate(work, at.NOW, row)
+    after = before - work.slip[at.GRAZING_RESISTANCE, row] * rate
+    work.slip[at.GRAZING_FORCE, row] = after
     if after * before <= 0.0:
-        leave(work, row, OPEN, 0.0)
+        leave(work, row, at.OPEN, 0.0)
         return False
     if sticks(scene, work, row):
-        leave(work, row, TOUCHES, TOUCHING_GAP)
+        leave(work, row, at.TOUCHES, TOUCHING_GAP)
         return False
     return True
 
 
 def forget_gap(work, row):
     """The gap of a pair that has gone far from where it grazed counts as it is."""
-    offset = work.slip[GAP_OFFSET, row]
-    if offset != 0.0 and work.geometry[NOW, row, GAP] > FAR * abs(offset):
-        work.geometry[NOW, row, GAP] += offset
-        work.slip[GAP_OFFSET, row] = 0.0
+    offset = work.slip[at.GAP_OFFSET, row]
+    if offset != 0.0 and work.geometry[at.NOW, row, at.GAP] > FAR * abs(offset):
+        work.geometry[at.NOW, row, at.GAP] += offset
+        work.slip[at.GAP_OFFSET, row] = 0.0
 
 
 def hums(work, row):
     """Whether a pair has parted and touched again and again, by far less than the tolerance."""
-    return work.slip[FLIGHTS, row] >= MANY
+    return work.slip[at.FLIGHTS, row] >= MANY
 
 
 def rattles(work, row):
@@ -237,9 +218,9 @@ def rattles(work, row):
     they throw each other open in turn."""
     if not hums(work, row):
         return False
-    for other in range(work.tally[CANDIDATES]):
-        same = work.candidates[other, PAIR] == work.candidates[row, PAIR]
-        later = work.slip[FLOWN_AT, other] > work.slip[FLOWN_AT, row]
+    for other in range(work.tally[at.CANDIDATES]):
+        same = work.candidates[other, at.PAIR] == work.candidates[row, at.PAIR]
+        later = work.slip[at.FLOWN_AT, other] > work.slip[at.FLOWN_AT, row]
         if same and later and hums(work, other) and not near(work, row, other):
             return True
     return False
@@ -247,27 +228,27 @@ def rattles(work, row):
 
 def count_flight(work, clock, row):
     """Count how often a pair, which has touched, was apart by far less than the tolerance."""
-    flight = work.slip[FLIGHT, row]
-    if flight > SHARE_OF_FLIGHT * clock[TOLERANCE]:
-        work.slip[FLIGHTS, row] = 0.0
+    flight = work.slip[at.FLIGHT, row]
+    if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
+        work.slip[at.FLIGHTS, row] = 0.0
     elif flight > 0.0:
-        work.slip[FLIGHTS, row] += 1.0
-        work.slip[FLOWN_AT, row] = clock[TIME]
-    work.slip[FLIGHT, row] = 0.0
+        work.slip[at.FLIGHTS, row] += 1.0
+        work.slip[at.FLOWN_AT, row] = clock[at.TIME]
+    work.slip[at.FLIGHT, row] = 0.0
 
 
 def note_flight(work, row):
     """Keep how far a pair that is apart has been since it parted."""
-    gap = work.geometry[NOW, row, GAP]
-    work.slip[FLIGHT, row] = max(work.slip[FLIGHT, row], gap)
+    gap = work.geometry[at.NOW, row, at.GAP]
+    work.slip[at.FLIGHT, row] = max(work.slip[at.FLIGHT, row], gap)
 
 
 def part(scene, work, clock, row):
     """What becomes of a closed pair that has parted; whether it begins to graze."""
     if not begins(scene, work, clock, row):
         return False
-    for other in range(work.tally[CANDIDATES]):
-        if work.candidates[other, CLOSED] == TOUCHES and shares_point(work, row, other):
+    for other in range(work.tally[at.CANDIDATES]):
+        if work.candidates[other, at.CLOSED] == at.TOUCHES and shares_point(work, row, other):
             enter(scene, work, other)
     return True
 
@@ -275,22 +256,25 @@ def part(scene, work, clock, row):
 def settle(scene, work, clock):
     """Let pairs begin and cease to graze at the end of a step; whether any has."""
     changed, entered = False, False
-    for row in range(work.tally[CANDIDATES]):
-        mode = work.candidates[row, CLOSED]
-        if mode == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        mode = work.candidates[row, at.CLOSED]
+        if mode == at.GRAZES:
             changed = not go_on(scene, work, row) or changed
-        elif mode == OPEN:
+        elif mode == at.OPEN:
             forget_gap(work, row)
             note_flight(work, row)
-            if work.geometry[NOW, row, GAP] < 0.0:
+            if work.geometry[at.NOW, row, at.GAP] < 0.0:
                 count_flight(work, clock, row)
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES and work.geometry[NOW, row, GAP] >= 0.0:
+    for row in range(work.tally[at.CANDIDATES]):
+        if (
+            work.candidates[row, at.CLOSED] == at.TOUCHES
+            and work.geometry[at.NOW, row, at.GAP] >= 0.0
+        ):
             entered = part(scene, work, clock, row) or entered
     if entered:
         share_forces(work)
-        for row in range(work.tally[CANDIDATES]):
-            if work.candidates[row, CLOSED] == GRAZES:
+        for row in range(work.tally[at.CANDIDATES]):
+            if work.candidates[row, at.CLOSED] == at.GRAZES:
                 hold_gap(work, row, 0.0)
     return changed or entered
 
@@ -301,18 +285,18 @@ def share_left(scene, work, clock, step, row):
 
     T and the speed of sliding go along lines.
     """
-    resistance = abs(work.slip[GRAZING_RESISTANCE, row])
-    if work.slip[FRESH, row] != 0.0 or resistance == 0.0:
+    resistance = abs(work.slip[at.GRAZING_RESISTANCE, row])
+    if work.slip[at.FRESH, row] != 0.0 or resistance == 0.0:
         return NEVER
-    before, after = work.slip[GRAZING_FORCE, row], grazing_force(work, NEW, row)
+    before, after = work.slip[at.GRAZING_FORCE, row], grazing_force(work, at.NEW, row)
     # What a newton does to the gap in a step, and later.
     lever = STIFFER / resistance * (step + memory_of(work, row))
-    if abs(after) * lever < LATE * clock[TOLERANCE]:
+    if abs(after) * lever < LATE * clock[at.TOLERANCE]:
         return NEVER
     share = before / (before - after) if before * after < 0.0 else NEVER
     side = 1.0 if before > 0.0 else -1.0
-    slow = -side * tangential_rate(work, NOW, row)
-    slower = -side * tangential_rate(work, NEW, row)
+    slow = -side * tangential_rate(work, at.NOW, row)
+    slower = -side * tangential_rate(work, at.NEW, row)
     if slow > 0.0 > slower:
         share = min(share, slow / (slow - slower))
     return share
@@ -321,22 +305,22 @@ def share_left(scene, work, clock, step, row):
 def leave_early(scene, work, clock, step):
     """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
     changed = False
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if (
-            work.candidates[row, CLOSED] == GRAZES
+            work.candidates[row, at.CLOSED] == at.GRAZES
             and share_left(scene, work, clock, step, row) < AT_ONCE
         ):
-            if work.slip[GRAZING_FORCE, row] * grazing_force(work, NEW, row) < 0.0:
-                leave(work, row, OPEN, 0.0)
+            if work.slip[at.GRAZING_FORCE, row] * grazing_force(work, at.NEW, row) < 0.0:
+                leave(work, row, at.OPEN, 0.0)
             else:
-                leave(work, row, TOUCHES, TOUCHING_GAP)
+                leave(work, row, at.TOUCHES, TOUCHING_GAP)
             changed = True
     return changed
 
 
 def grazing_share(scene, work, clock, step, share):
     """The share of the step at which the first pair ceases to graze, or the given one before."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             share = min(share, BEHIND * share_left(scene, work, clock, step, row))
     return share

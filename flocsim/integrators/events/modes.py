@@ -4,7 +4,7 @@ Inside a step the flags stay as they are, so that the forces are smooth function
 driver ends the step where a flag would change (see crossings.py).
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, GAP, GRAZES, NOW, OPEN, TOUCHES
+import flocsim.arrays as at
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.friction import set_sliding
 
@@ -13,16 +13,16 @@ SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
 which pairs touch."""
 
 
-def set_closed(work, state=NOW):
+def set_closed(work, state=at.NOW):
     """Flag every listed pair by its gap in a state, but for those that graze; whether
     any has changed."""
     changed = False
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             continue
-        closed = TOUCHES if work.geometry[state, row, GAP] < 0.0 else OPEN
-        changed = changed or work.candidates[row, CLOSED] != closed
-        work.candidates[row, CLOSED] = closed
+        closed = at.TOUCHES if work.geometry[state, row, at.GAP] < 0.0 else at.OPEN
+        changed = changed or work.candidates[row, at.CLOSED] != closed
+        work.candidates[row, at.CLOSED] = closed
     return changed
 
 

@@ -9,7 +9,7 @@ what both are apart, may be below the tolerance: the bodies then roll on the wro
 is taken anew, until it is short against the vibrations, or the contacts change by little.
 """
 
-from flocsim.arrays import ACROSS, CANDIDATES, CLOSED, GAP, NEW, NOW, TOLERANCE, TOUCHES
+import flocsim.arrays as at
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.surface_gap import run_end
 from flocsim.integrators.rhs.views import contact_view
@@ -26,9 +26,12 @@ def deepest_of(work, state, row, end, closed):
     """The row of the least gap in a state, of those that touch if only they count; −1 without."""
     deepest = -1
     for each in range(row, end):
-        if closed and work.candidates[each, CLOSED] != TOUCHES:
+        if closed and work.candidates[each, at.CLOSED] != at.TOUCHES:
             continue
-        if deepest < 0 or work.geometry[state, each, GAP] < work.geometry[state, deepest, GAP]:
+        if (
+            deepest < 0
+            or work.geometry[state, each, at.GAP] < work.geometry[state, deepest, at.GAP]
+        ):
             deepest = each
     return deepest
 
@@ -36,28 +39,28 @@ def deepest_of(work, state, row, end, closed):
 def overtaken(work, row, end, closed):
     """The row of the two bodies that has been the deepest before and is overtaken by much; −1
     without."""
-    old = deepest_of(work, NOW, row, end, closed)
-    new = deepest_of(work, NEW, row, end, closed)
+    old = deepest_of(work, at.NOW, row, end, closed)
+    new = deepest_of(work, at.NEW, row, end, closed)
     if old < 0 or old == new:
         return -1
     g = work.geometry
-    deep, deeper = -g[NOW, old, GAP], -g[NEW, new, GAP]
+    deep, deeper = -g[at.NOW, old, at.GAP], -g[at.NEW, new, at.GAP]
     if not (deep > 0.0 and deeper > 0.0):
         return -1
-    way = min(g[NOW, new, GAP], 0.0) + deep + min(g[NEW, old, GAP], 0.0) + deeper
+    way = min(g[at.NOW, new, at.GAP], 0.0) + deep + min(g[at.NEW, old, at.GAP], 0.0) + deeper
     return old if way > LARGE * (deep + deeper) else -1
 
 
 def overtakes(scene, work, clock, step):
     """Whether a contact has overtaken another one of the same bodies from NOW to NEW, and the step
     is too long to tell. Only pairs that are closed count where steps end at switches."""
-    row, closed = 0, clock[ACROSS] == 0.0
-    while row < work.tally[CANDIDATES]:
+    row, closed = 0, clock[at.ACROSS] == 0.0
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
         old = overtaken(work, row, end, closed)
         if old >= 0:
-            view = contact_view(scene, work, NOW, old)
-            stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+            view = contact_view(scene, work, at.NOW, old)
+            stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
             if step * step * stiffness > RESOLVED * RESOLVED * view.effective_mass:
                 return True
         row = end

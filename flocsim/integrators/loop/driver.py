@@ -2,35 +2,7 @@
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    CANDIDATES,
-    CLOSED,
-    CODE,
-    CYCLE_MODES,
-    FULL,
-    GAP,
-    GEOMETRY_COLUMNS,
-    LOCATED,
-    MAX_STEPS,
-    MOTION_COLUMNS,
-    NEW,
-    NOTHING_FULL,
-    NOW,
-    PAUSE_AT,
-    RECORD_MOTION,
-    RECORD_TIME,
-    RECORDED,
-    REJECTED,
-    STAGED_STEP,
-    STEP,
-    STEPS,
-    STILL,
-    TIME,
-    TOLERANCE,
-    TOUCHES,
-    UNTIL,
-)
+import flocsim.arrays as at
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
@@ -85,9 +57,9 @@ MOST_STILL = 100
 
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         radius_a, radius_b = row_radii(scene, work, row)
-        if -work.geometry[NOW, row, GAP] > DEEPEST_OVERLAP * (radius_a + radius_b):
+        if -work.geometry[at.NOW, row, at.GAP] > DEEPEST_OVERLAP * (radius_a + radius_b):
             return True
     return False
 
@@ -95,22 +67,22 @@ def too_deep(scene, work):
 def take_new_state(work):
     """Make the new state the current one."""
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NOW, body, axis] = work.motion[NEW, body, axis]
-    for row in range(work.tally[CANDIDATES]):
-        for column in range(GEOMETRY_COLUMNS):
-            work.geometry[NOW, row, column] = work.geometry[NEW, row, column]
-        if work.candidates[row, CLOSED] == 1:
-            work.slip[NOW, row] = work.slip[NEW, row]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NOW, body, axis] = work.motion[at.NEW, body, axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        for column in range(at.GEOMETRY_COLUMNS):
+            work.geometry[at.NOW, row, column] = work.geometry[at.NEW, row, column]
+        if work.candidates[row, at.CLOSED] == 1:
+            work.slip[at.NOW, row] = work.slip[at.NEW, row]
 
 
 def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
-    clock[TIME] += step
+    clock[at.TIME] += step
     meet_kick(scene, work, clock)
-    counts[STEPS] += 1
-    controlled, across = clock[TOLERANCE] < math.inf, clock[ACROSS] == 1.0
+    counts[at.STEPS] += 1
+    controlled, across = clock[at.TOLERANCE] < math.inf, clock[at.ACROSS] == 1.0
     if controlled:
         carry_errors(scene, work, clock, step)
     if across:
@@ -132,27 +104,29 @@ def accept(scene, work, clock, counts, step, lists):
 
 def stands_still(clock, counts, step):
     """Count the accepted steps in a row that are as good as none; whether they are too many."""
-    counts[STILL] = 0 if moves(clock, step) else counts[STILL] + 1
-    return counts[STILL] > MOST_STILL
+    counts[at.STILL] = 0 if moves(clock, step) else counts[at.STILL] + 1
+    return counts[at.STILL] > MOST_STILL
 
 
 def record_row(work, clock, counts, record):
     """Write the current state to the record (rows of time, then six numbers for each body)."""
-    row = counts[RECORDED]
-    record[row, RECORD_TIME] = clock[TIME]
+    row = counts[at.RECORDED]
+    record[row, at.RECORD_TIME] = clock[at.TIME]
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            record[row, RECORD_MOTION + MOTION_COLUMNS * body + axis] = work.motion[NOW, body, axis]
-    counts[RECORDED] = row + 1
+        for axis in range(at.MOTION_COLUMNS):
+            record[row, at.RECORD_MOTION + at.MOTION_COLUMNS * body + axis] = work.motion[
+                at.NOW, body, axis
+            ]
+    counts[at.RECORDED] = row + 1
 
 
 def pause_reason(clock, counts, record):
     """The Status that ends the loop before the next step; 0 to go on."""
-    if counts[STEPS] + counts[REJECTED] + counts[LOCATED] >= counts[MAX_STEPS]:
+    if counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED] >= counts[at.MAX_STEPS]:
         return STEP_BUDGET
-    if counts[STEPS] >= counts[PAUSE_AT]:
+    if counts[at.STEPS] >= counts[at.PAUSE_AT]:
         return PAUSED
-    if record.shape[0] > 0 and counts[RECORDED] == record.shape[0]:
+    if record.shape[0] > 0 and counts[at.RECORDED] == record.shape[0]:
         return RECORD_FULL
     return 0
 
@@ -160,33 +134,33 @@ def pause_reason(clock, counts, record):
 def keep_lists(scene, work, counts, ahead):
     """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
     or they are too wide; False without room."""
-    if spent(scene, work, NOW) > 0.5 or too_wide(scene, work, ahead):
+    if spent(scene, work, at.NOW) > 0.5 or too_wide(scene, work, ahead):
         if not list_ahead(scene, work, ahead):
             return False
-        locate_contacts(scene, work, NOW)
+        locate_contacts(scene, work, at.NOW)
         set_modes(scene, work)
-        counts[CYCLE_MODES] = 0
+        counts[at.CYCLE_MODES] = 0
     return True
 
 
 def went_too_far(scene, work, clock, step):
     """Locate all pairs at the end of the step; whether what was listed or flagged is not enough, or
     it is not known where surface forces act."""
-    if spent(scene, work, NEW) > 1.0:
+    if spent(scene, work, at.NEW) > 1.0:
         return True
-    locate_contacts(scene, work, NEW)
-    if scene.surface_reach <= 0.0 or clock[TOLERANCE] == math.inf:
+    locate_contacts(scene, work, at.NEW)
+    if scene.surface_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
         return False
     return overlooked(scene, work) or overtakes(scene, work, clock, step)
 
 
 def roll_slips(scene, work, step):
     """Tangential displacements of the closed pairs in NEW, which is located, after a step."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
-            besides = 0.5 * step * rolled_besides(scene, work, NEW, row)
-            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row) + besides
-            work.slip[NEW, row] = slip_in(scene, work, NEW, row, stuck)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+            besides = 0.5 * step * rolled_besides(scene, work, at.NEW, row)
+            stuck = work.slip[at.NOW, row] + rolled(scene, work, at.NEW, row) + besides
+            work.slip[at.NEW, row] = slip_in(scene, work, at.NEW, row, stuck)
 
 
 def ends_early(scene, work, clock, step, ratio, share):
@@ -196,7 +170,7 @@ def ends_early(scene, work, clock, step, ratio, share):
         return False
     if not end_within(scene, work, step, ratio, share):
         return False
-    locate_contacts(scene, work, NEW)
+    locate_contacts(scene, work, at.NEW)
     roll_slips(scene, work, share * step)
     # A long step may have run through a body: what came first is seen from a nearer end alone.
     resolution, depth = resolutions_of(work, clock)
@@ -209,8 +183,8 @@ def look(scene, work, observed, clock, counts, record, lists):
         record_row(work, clock, counts, record)
     if lists and too_deep(scene, work):
         return TOO_DEEP
-    counts[CODE] = observe(scene, work, observed, clock[TIME])
-    return STOPPED if counts[CODE] != 0 else 0
+    counts[at.CODE] = observe(scene, work, observed, clock[at.TIME])
+    return STOPPED if counts[at.CODE] != 0 else 0
 
 
 def advance(scene, work, observed, clock, counts, record):
@@ -221,21 +195,21 @@ def advance(scene, work, observed, clock, counts, record):
     lists = has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0
     lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
     limit, trials = math.inf, 0
-    while clock[TIME] < clock[UNTIL]:
+    while clock[at.TIME] < clock[at.UNTIL]:
         status = pause_reason(clock, counts, record)
         if status != 0:
             return status
-        if lists and trials == 0 and not keep_lists(scene, work, counts, clock[STEP]):
+        if lists and trials == 0 and not keep_lists(scene, work, counts, clock[at.STEP]):
             return NO_ROOM
         choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
         step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
         if scene.surface_reach > 0.0:
-            flag_near(scene, work, NOW, step)
+            flag_near(scene, work, at.NOW, step)
         ratio = attempt(scene, work, clock, step)
-        if work.tally[FULL] != NOTHING_FULL:
+        if work.tally[at.FULL] != at.NOTHING_FULL:
             return NO_ROOM
-        if ratio < 0.0 and clock[TOLERANCE] == math.inf:
+        if ratio < 0.0 and clock[at.TOLERANCE] == math.inf:
             return NOT_FINITE
         too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
         if ratio < 0.0 or ratio > 1.0 or too_far:
@@ -244,26 +218,26 @@ def advance(scene, work, observed, clock, counts, record):
                 return STALLED
             continue
         if lists and trials < MOST_TRIALS and leave_at_once(scene, work, clock, step):
-            counts[LOCATED] += 1
+            counts[at.LOCATED] += 1
             trials += 1
-            clock[STAGED_STEP] = 0.0
+            clock[at.STAGED_STEP] = 0.0
             continue
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
                 limit = share * step
-                counts[LOCATED] += 1
+                counts[at.LOCATED] += 1
                 continue
             step *= share
         switched = accept(scene, work, clock, counts, step, lists)
         if switched == OTHER_CONTACTS:
-            until = min(clock[UNTIL], kick_end(scene, work))
+            until = min(clock[at.UNTIL], kick_end(scene, work))
             leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
         if switched != SAME:
-            clock[STEP] = min(clock[STEP], step_behind_touch(scene, work, clock))
-            clock[STEP] = max(clock[STEP], shortest_needed(scene, work))
+            clock[at.STEP] = min(clock[at.STEP], step_behind_touch(scene, work, clock))
+            clock[at.STEP] = max(clock[at.STEP], shortest_needed(scene, work))
         limit, trials = math.inf, 0
         status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:

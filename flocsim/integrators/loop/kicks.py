@@ -14,22 +14,7 @@ is decided where it begins, by where the bodies are then, so that no later chanc
 
 import math
 
-from flocsim.arrays import (
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    EARLIER,
-    GAP,
-    IDENTITY,
-    KICK_AT,
-    KICK_SPAN,
-    KICK_X,
-    LATER,
-    NOW,
-    PAIR,
-    PAIRS,
-    STAGED_STEP,
-    TIME,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.integrators.loop.philox import three_normals
 
@@ -59,36 +44,36 @@ def kick_end(scene, work):
     """When the present kick ends [s]; inf where there are none."""
     if not has_kicks(scene):
         return math.inf
-    return (work.bodies[0, KICK_AT] + work.bodies[0, KICK_SPAN]) * finest_kick(scene)
+    return (work.bodies[0, at.KICK_AT] + work.bodies[0, at.KICK_SPAN]) * finest_kick(scene)
 
 
 def meet_kick(scene, work, clock):
     """Let a step that has ended with the kick, but for rounding, end just there."""
     if has_kicks(scene):
         end = kick_end(scene, work)
-        near = SAME_TIME * work.bodies[0, KICK_SPAN] * finest_kick(scene)
-        if abs(clock[TIME] - end) <= max(near, ROUNDED * clock[TIME]):
-            clock[TIME] = end
+        near = SAME_TIME * work.bodies[0, at.KICK_SPAN] * finest_kick(scene)
+        if abs(clock[at.TIME] - end) <= max(near, ROUNDED * clock[at.TIME]):
+            clock[at.TIME] = end
 
 
 def listed_gap(work, pair):
     """The least gap of the listed features of two bodies [m]; half of what is left until they must
     be listed anew where none is."""
     least = math.inf
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, PAIR] == pair:
-            least = min(least, work.geometry[NOW, row, GAP])
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.PAIR] == pair:
+            least = min(least, work.geometry[at.NOW, row, at.GAP])
     return least if least < math.inf else max(0.5 * work.budget[pair], 0.0)
 
 
 def nearest(scene, work):
     """How near any two bodies that are watched are, at least [m]."""
     least = math.inf
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-        x, y = separation(scene, work, NOW, a, b)
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        x, y = separation(scene, work, at.NOW, a, b)
         gap = length_of(x, y)
-        gap -= scene.bodies[a, BOUNDING_RADIUS] + scene.bodies[b, BOUNDING_RADIUS]
+        gap -= scene.bodies[a, at.BOUNDING_RADIUS] + scene.bodies[b, at.BOUNDING_RADIUS]
         if gap <= 0.0:
             gap = listed_gap(work, pair)
         least = min(least, gap)
@@ -132,21 +117,21 @@ def renew_kicks(scene, work, clock):
     if not has_kicks(scene):
         return
     finest, bodies = finest_kick(scene), work.bodies
-    begun = bodies[0, KICK_AT] * finest <= clock[TIME]
-    if bodies[0, KICK_SPAN] > 0.0 and begun and clock[TIME] < kick_end(scene, work):
+    begun = bodies[0, at.KICK_AT] * finest <= clock[at.TIME]
+    if bodies[0, at.KICK_SPAN] > 0.0 and begun and clock[at.TIME] < kick_end(scene, work):
         return
-    place = int(clock[TIME] / finest)
-    while (place + 1) * finest <= clock[TIME]:
+    place = int(clock[at.TIME] / finest)
+    while (place + 1) * finest <= clock[at.TIME]:
         place += 1
-    while place * finest > clock[TIME]:
+    while place * finest > clock[at.TIME]:
         place -= 1
     span = span_from(scene, work, place)
-    bodies[0, KICK_AT], bodies[0, KICK_SPAN] = float(place), float(span)
+    bodies[0, at.KICK_AT], bodies[0, at.KICK_SPAN] = float(place), float(span)
     kick, halvings = scene.kicks[KICK], int(scene.kicks[HALVINGS])
     for body in range(bodies.shape[0]):
-        who = int(scene.bodies[body, IDENTITY])
+        who = int(scene.bodies[body, at.IDENTITY])
         noise = mean_noise(kick, halvings, place, span, who, scene.key)
         for axis in range(3):
-            bodies[body, KICK_X + axis] = noise[axis]
+            bodies[body, at.KICK_X + axis] = noise[axis]
     # What was extrapolated from the last kick would only mislead.
-    clock[STAGED_STEP] = 0.0
+    clock[at.STAGED_STEP] = 0.0

@@ -2,30 +2,7 @@
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    BEARABLE_STEP,
-    CANDIDATES,
-    CLOSED,
-    FREE,
-    GAP,
-    LARGEST_STEP,
-    NOW,
-    PREVIOUS_RATIO,
-    PREVIOUS_STEP,
-    REJECTED,
-    REJECTED_RATIO,
-    REJECTED_STEP,
-    SETTLED_STEP,
-    SETTLING,
-    STAGED_STEP,
-    STEP,
-    STIFFNESS,
-    TIME,
-    TOLERANCE,
-    TOUCHES,
-    UNTIL,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import time_within
 from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolutions_of
@@ -55,9 +32,9 @@ def seen_order(clock, step, ratio, order):
     Behind a switch stiff forces settle, and the error falls far more slowly than the order says
     (Gustafsson 1994).
     """
-    if clock[REJECTED_STEP] <= step:
+    if clock[at.REJECTED_STEP] <= step:
         return order
-    decay = math.log(clock[REJECTED_RATIO] / ratio) / math.log(clock[REJECTED_STEP] / step)
+    decay = math.log(clock[at.REJECTED_RATIO] / ratio) / math.log(clock[at.REJECTED_STEP] / step)
     return min(max(decay, LOWEST_ORDER), order)
 
 
@@ -71,11 +48,11 @@ def adaptive_factor(clock, step, ratio, order):
     if ratio > 1.0:
         order = seen_order(clock, step, ratio, order)
     factor = SAFETY * ratio ** (-1.0 / order)
-    before = clock[PREVIOUS_STEP]
+    before = clock[at.PREVIOUS_STEP]
     if ratio <= 1.0 and before == 0.0:
         factor = min(factor, 1.0)
     elif ratio <= 1.0 and before < math.inf:
-        trend = max(clock[PREVIOUS_RATIO], 1e-2) / (ratio * ratio)
+        trend = max(clock[at.PREVIOUS_RATIO], 1e-2) / (ratio * ratio)
         factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
     return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
 
@@ -109,12 +86,12 @@ MOST_SWITCHING = 4.0
 def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
     resolution, _ = resolutions_of(work, clock)
-    for row in range(work.tally[CANDIDATES]):
-        gap = work.geometry[NOW, row, GAP]
-        if 0.0 <= gap < clock[TOLERANCE]:
-            rate = normal_rate(work, NOW, row)
+    for row in range(work.tally[at.CANDIDATES]):
+        gap = work.geometry[at.NOW, row, at.GAP]
+        if 0.0 <= gap < clock[at.TOLERANCE]:
+            rate = normal_rate(work, at.NOW, row)
             if gap * rate < 0.0:
-                behind = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
+                behind = 0.5 * touch_resolution(scene, work, at.NOW, row, resolution)
                 ahead = (abs(gap) + behind) / abs(rate)
                 if ahead < IMMINENT * step:
                     step = ahead
@@ -122,44 +99,44 @@ def imminent_switch(scene, work, clock, step):
 
 
 def choose_step(scene, work, clock, lists):
-    step = min(clock[STEP], clock[LARGEST_STEP])
+    step = min(clock[at.STEP], clock[at.LARGEST_STEP])
     if lists:
         step = min(step, time_within(scene, work, 0.5))
-        if clock[TOLERANCE] < math.inf and clock[ACROSS] == 0.0:
+        if clock[at.TOLERANCE] < math.inf and clock[at.ACROSS] == 0.0:
             step = imminent_switch(scene, work, clock, step)
-    left = min(clock[UNTIL], kick_end(scene, work)) - clock[TIME]
+    left = min(clock[at.UNTIL], kick_end(scene, work)) - clock[at.TIME]
     # Two even steps at the end instead of a long one and a sliver.
-    if step < left < 2.0 * step and clock[TOLERANCE] < math.inf:
+    if step < left < 2.0 * step and clock[at.TOLERANCE] < math.inf:
         return 0.5 * left
     return min(step, left)
 
 
 def room_for_time(clock, step):
     """The step, or the least one behind which the time is another number."""
-    if clock[TOLERANCE] == math.inf:
+    if clock[at.TOLERANCE] == math.inf:
         return step
-    return max(step, min(LEAST_ADVANCE * clock[TIME], clock[UNTIL] - clock[TIME]))
+    return max(step, min(LEAST_ADVANCE * clock[at.TIME], clock[at.UNTIL] - clock[at.TIME]))
 
 
 def moves(clock, step):
     """Whether anything can have moved in a step, which ended at the time now."""
-    if clock[TOLERANCE] == math.inf:
-        return clock[TIME] - step < clock[TIME]
-    return step >= SMALLEST_STEP * max(clock[TIME], 1e-3)
+    if clock[at.TOLERANCE] == math.inf:
+        return clock[at.TIME] - step < clock[at.TIME]
+    return step >= SMALLEST_STEP * max(clock[at.TIME], 1e-3)
 
 
 def reject(clock, counts, step, ratio, too_far):
     """Choose a smaller step; False where there is none."""
-    counts[REJECTED] += 1
-    clock[PREVIOUS_STEP] = 0.0
-    clock[STAGED_STEP] = 0.0
+    counts[at.REJECTED] += 1
+    clock[at.PREVIOUS_STEP] = 0.0
+    clock[at.STAGED_STEP] = 0.0
     failed = ratio < 0.0 or too_far
-    clock[STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
-    clock[REJECTED_STEP] = 0.0 if failed else step
-    clock[REJECTED_RATIO] = ratio
+    clock[at.STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
+    clock[at.REJECTED_STEP] = 0.0 if failed else step
+    clock[at.REJECTED_RATIO] = ratio
     # Steps across switches fail by chance, at any size: they find more ends where they grow.
-    if ratio < 0.0 and clock[ACROSS] == 0.0:
-        clock[BEARABLE_STEP] = SHARE_OF_FAILED * step
+    if ratio < 0.0 and clock[at.ACROSS] == 0.0:
+        clock[at.BEARABLE_STEP] = SHARE_OF_FAILED * step
     return moves(clock, step)
 
 
@@ -167,10 +144,10 @@ def shortest_needed(scene, work):
     """The step behind a switch that resolves the fastest vibration there is; 0 without any [s]."""
     stiffest = 0.0
     for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             for axis in range(3):
                 mass = max(inertia(scene, body, axis), TINY)
-                stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
+                stiffest = max(stiffest, work.jacobian[at.STIFFNESS, body, axis, axis] / mass)
     return RESOLVED / math.sqrt(stiffest) if stiffest > 0.0 else 0.0
 
 
@@ -178,46 +155,46 @@ def step_behind_touch(scene, work, clock):
     """The step that resolves how contacts take up the speed at which they have just touched, as far
     as that displaces bodies by the tolerance [s]."""
     pace, later = 0.0, 0.0
-    for row in range(work.tally[CANDIDATES]):
-        speed = -normal_rate(work, NOW, row)
-        if work.candidates[row, CLOSED] == TOUCHES and speed > 0.0:
-            view = contact_view(scene, work, NOW, row)
-            stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+    for row in range(work.tally[at.CANDIDATES]):
+        speed = -normal_rate(work, at.NOW, row)
+        if work.candidates[row, at.CLOSED] == at.TOUCHES and speed > 0.0:
+            view = contact_view(scene, work, at.NOW, row)
+            stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
             pace += stiffness / view.effective_mass
             later = max(later, speed * memory_of(work, row))
     if not (pace > 0.0 and later > 0.0):
         return math.inf
-    share = SHARE_OF_TOUCH * clock[TOLERANCE] / later
+    share = SHARE_OF_TOUCH * clock[at.TOLERANCE] / later
     return share ** (1.0 / ORDER_OF_TOUCH) / math.sqrt(pace)
 
 
 def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
-    clock[REJECTED_STEP] = 0.0
+    clock[at.REJECTED_STEP] = 0.0
     if switched == OTHER_CONTACTS:
         # The forces are new, and settle about as fast as behind the last switch.
-        clock[PREVIOUS_STEP] = math.inf
-        clock[STAGED_STEP] = 0.0
-        clock[SETTLING] += 1.0
-        if clock[SETTLING] > MOST_SWITCHING and not was_cut:
+        clock[at.PREVIOUS_STEP] = math.inf
+        clock[at.STAGED_STEP] = 0.0
+        clock[at.SETTLING] += 1.0
+        if clock[at.SETTLING] > MOST_SWITCHING and not was_cut:
             # A pair on the verge of touching switches step after step: they have to grow, too.
-            clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
-            clock[SETTLED_STEP] = max(clock[SETTLED_STEP], step)
-        clock[STEP] = min(clock[STEP], SETTLED_GROWTH * clock[SETTLED_STEP])
+            clock[at.STEP] = min(next_step(clock, step, ratio), clock[at.BEARABLE_STEP])
+            clock[at.SETTLED_STEP] = max(clock[at.SETTLED_STEP], step)
+        clock[at.STEP] = min(clock[at.STEP], SETTLED_GROWTH * clock[at.SETTLED_STEP])
     elif switched == OTHER_FRICTION:
-        clock[PREVIOUS_STEP] = math.inf
-        clock[STAGED_STEP] = 0.0
+        clock[at.PREVIOUS_STEP] = math.inf
+        clock[at.STAGED_STEP] = 0.0
     elif was_cut:
         # The switch did not come: the step was too long to tell.
-        clock[PREVIOUS_STEP] = math.inf
-        clock[BEARABLE_STEP] = SHARE_OF_FAILED * clock[STEP]
-        clock[STEP] = min(clock[BEARABLE_STEP], LARGEST_FACTOR * step)
+        clock[at.PREVIOUS_STEP] = math.inf
+        clock[at.BEARABLE_STEP] = SHARE_OF_FAILED * clock[at.STEP]
+        clock[at.STEP] = min(clock[at.BEARABLE_STEP], LARGEST_FACTOR * step)
     else:
-        if clock[SETTLING] > 0.0:
-            clock[SETTLED_STEP] = step
-            clock[SETTLING] = 0.0
-        cut = step < 0.5 * clock[STEP]
-        clock[STEP] = min(next_step(clock, step, ratio), clock[BEARABLE_STEP])
-        clock[BEARABLE_STEP] *= RECOVERY
-        clock[PREVIOUS_STEP] = math.inf if cut else step
-        clock[PREVIOUS_RATIO] = ratio
+        if clock[at.SETTLING] > 0.0:
+            clock[at.SETTLED_STEP] = step
+            clock[at.SETTLING] = 0.0
+        cut = step < 0.5 * clock[at.STEP]
+        clock[at.STEP] = min(next_step(clock, step, ratio), clock[at.BEARABLE_STEP])
+        clock[at.BEARABLE_STEP] *= RECOVERY
+        clock[at.PREVIOUS_STEP] = math.inf if cut else step
+        clock[at.PREVIOUS_RATIO] = ratio

@@ -18,16 +18,7 @@ opposite signs cancel. Behind each step its own estimated error is added; what s
 by rhs/stated_error.py.
 """
 
-from flocsim.arrays import (
-    CARRIED,
-    CHANGE,
-    DEVIATION,
-    FORCING,
-    MOTION_COLUMNS,
-    STAGED_STEP,
-    STIFFNESS,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, REAL
 from flocsim.integrators.rhs.blocks import subtract_product
@@ -42,40 +33,40 @@ def divide(scene, work, full, weight):
     part = full / EIGENVALUES[REAL].real
     for body in range(motion.shape[1]):
         for axis in range(3):
-            load = inertia(scene, body, axis) / part * motion[CHANGE, body, VELOCITY + axis]
-            load += weight * motion[FORCING, body, VELOCITY + axis]
+            load = inertia(scene, body, axis) / part * motion[at.CHANGE, body, at.VELOCITY + axis]
+            load += weight * motion[at.FORCING, body, at.VELOCITY + axis]
             work.loads[REAL, 3 * body + axis] = load
-    subtract_product(work, STIFFNESS, 1.0)
+    subtract_product(work, at.STIFFNESS, 1.0)
     solve_for_free(scene, work)
     for body in range(motion.shape[1]):
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            motion[CHANGE, body, VELOCITY + axis] = speed
-            motion[CHANGE, body, axis] += part * speed
+            motion[at.CHANGE, body, at.VELOCITY + axis] = speed
+            motion[at.CHANGE, body, axis] += part * speed
 
 
 def mix(work, of_change, of_carried):
     """Make CHANGE a sum of itself and what is carried."""
     motion = work.motion
     for body in range(motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            change = of_change * motion[CHANGE, body, axis]
-            motion[CHANGE, body, axis] = change + of_carried * motion[CARRIED, body, axis]
+        for axis in range(at.MOTION_COLUMNS):
+            change = of_change * motion[at.CHANGE, body, axis]
+            motion[at.CHANGE, body, axis] = change + of_carried * motion[at.CARRIED, body, axis]
 
 
 def add_step(work):
     """Take what has been carried, and the error that the step itself is likely to have made."""
     motion = work.motion
     for body in range(motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            own = motion[DEVIATION, body, axis]
-            motion[CARRIED, body, axis] = motion[CHANGE, body, axis] + own
+        for axis in range(at.MOTION_COLUMNS):
+            own = motion[at.DEVIATION, body, axis]
+            motion[at.CARRIED, body, axis] = motion[at.CHANGE, body, axis] + own
 
 
 def carry_error(scene, work, clock, step):
     """Carry the error over an accepted step; the largest one of a body's outline [m]."""
     bound_carried(scene, work)
-    full = clock[STAGED_STEP]
+    full = clock[at.STAGED_STEP]
     gamma = full / (EIGENVALUES[REAL].real * step)
     first = (1.0 - 3.0 * gamma) / gamma
     second = (0.5 - 3.0 * gamma + 3.0 * gamma * gamma) / (gamma * gamma)

@@ -3,25 +3,7 @@ switches, the guess for the next."""
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    DAMPING,
-    FIRST_STAGE,
-    FORCE,
-    FREE,
-    NEAR,
-    NEW,
-    NOW,
-    RELAXATION,
-    STAGED_AT,
-    STAGED_STEP,
-    START,
-    STIFFNESS,
-    TIME,
-    TRIAL,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.views import inertia
@@ -71,7 +53,7 @@ def weighted(work, body, axis, weights):
     """The cubic through START and the stages."""
     motion = work.motion
     return cubic(
-        weights, motion[START, body, axis], motion[FIRST_STAGE, body, axis],
+        weights, motion[at.START, body, axis], motion[at.FIRST_STAGE, body, axis],
         motion[SECOND_STAGE, body, axis], motion[THIRD_STAGE, body, axis],
     )  # fmt: skip
 
@@ -84,18 +66,18 @@ def write_cubic(work, weights, state, body):
 
 def collocate(work, step, share, body):
     """Write a body's motion at a share of the step into TRIAL: the cubic through the stages."""
-    write_cubic(work, stage_weights(share), TRIAL, body)
+    write_cubic(work, stage_weights(share), at.TRIAL, body)
 
 
 def stiffness_of(scene, work, step):
     """How stiff a step is: the largest h² K/M + h D/M of a coordinate."""
     stiffest = 0.0
     for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             for axis in range(3):
                 mass = inertia(scene, body, axis)
-                spring = abs(work.jacobian[STIFFNESS, body, axis, axis])
-                damping = abs(work.jacobian[DAMPING, body, axis, axis])
+                spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
+                damping = abs(work.jacobian[at.DAMPING, body, axis, axis])
                 stiffest = max(stiffest, step * (step * spring + damping) / max(mass, TINY))
     return stiffest
 
@@ -112,16 +94,16 @@ def end_on_the_cubic(scene, work, step, ratio, share):
         return False
     weights = stage_weights(share)
     for body in range(work.motion.shape[1]):
-        write_cubic(work, weights, NEW, body)
+        write_cubic(work, weights, at.NEW, body)
     return True
 
 
 def keep_velocities(work):
     """First guess: the velocities stay as they are."""
     for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
             for stage in range(3):
-                work.motion[FIRST_STAGE + stage, body, axis] = work.motion[NOW, body, axis]
+                work.motion[at.FIRST_STAGE + stage, body, axis] = work.motion[at.NOW, body, axis]
 
 
 def keep_accelerations(scene, work, step):
@@ -129,21 +111,21 @@ def keep_accelerations(scene, work, step):
     for body in range(work.motion.shape[1]):
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            gain = scene.bodies[body, FREE] * step * work.rates[NOW, body, FORCE + axis]
+            gain = scene.bodies[body, at.FREE] * step * work.rates[at.NOW, body, at.FORCE + axis]
             for stage in range(3):
-                speed = work.motion[NOW, body, VELOCITY + axis]
+                speed = work.motion[at.NOW, body, at.VELOCITY + axis]
                 speed += NODES[stage] * gain / max(mass, TINY)
-                work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] = speed
+                work.motion[at.FIRST_STAGE + stage, body, at.VELOCITY + axis] = speed
 
 
 def is_soft(work, step):
     """Whether no pair of features acts, and drag takes little of a velocity in a step."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0:
             return False
     shortest = math.inf
     for body in range(work.bodies.shape[0]):
-        shortest = min(shortest, work.bodies[body, RELAXATION])
+        shortest = min(shortest, work.bodies[body, at.RELAXATION])
     return shortest >= SOFT * step
 
 
@@ -154,26 +136,26 @@ def carry_on(work, begin, scale):
     second = stage_weights(begin + two * scale)
     third = stage_weights(begin + three * scale)
     for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
             guesses = (
                 weighted(work, body, axis, first),
                 weighted(work, body, axis, second),
                 weighted(work, body, axis, third),
             )
             for stage in range(3):
-                work.motion[FIRST_STAGE + stage, body, axis] = guesses[stage]
+                work.motion[at.FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
 def guess_stages(scene, work, clock, step):
     """The stages' velocities to start from, and where this step starts."""
-    staged = clock[STAGED_STEP]
+    staged = clock[at.STAGED_STEP]
     if staged > 0.0 and step <= LONGEST_GUESS * staged:
-        carry_on(work, (clock[TIME] - clock[STAGED_AT]) / staged, step / staged)
+        carry_on(work, (clock[at.TIME] - clock[at.STAGED_AT]) / staged, step / staged)
     elif is_soft(work, step):
         keep_accelerations(scene, work, step)
     else:
         keep_velocities(work)
     for body in range(work.motion.shape[1]):
         for axis in range(6):
-            work.motion[START, body, axis] = work.motion[NOW, body, axis]
-    clock[STAGED_STEP], clock[STAGED_AT] = step, clock[TIME]
+            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    clock[at.STAGED_STEP], clock[at.STAGED_AT] = step, clock[at.TIME]

@@ -12,43 +12,7 @@ and the mean, weighted by the masses, are those of all bodies that act on one an
 Newton's method adds keeps their momentum however far it has come.
 """
 
-from flocsim.arrays import (
-    ACTING,
-    BODY_COLUMNS,
-    CANDIDATES,
-    CHANGE,
-    CLOSED,
-    EARLIER,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    FIRST_STAGE,
-    FRAME_COLUMNS,
-    FRAMES,
-    FREE,
-    LATER,
-    MASS,
-    MASS_SUM,
-    MOST_FRAMES,
-    NEAR,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    OPEN,
-    PAIR,
-    PAIRS,
-    SHARE,
-    SHIFT_SUM,
-    SHIFT_X,
-    SHIFT_Y,
-    SPIN,
-    TURN_COSINE,
-    TURN_SINE,
-    VELOCITY,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.separation import length_of
 from flocsim.laws import CENTRE_FORCE, has
 
@@ -57,13 +21,13 @@ LEADING_SHARE = 0.2
 
 
 def acts(work, row):
-    return work.candidates[row, CLOSED] + work.candidates[row, NEAR] > 0
+    return work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0
 
 
 def leads(work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
-    return work.candidates[row, CLOSED] != OPEN or (
-        work.candidates[row, NEAR] == 1 and work.geometry[NOW, row, SHARE] > LEADING_SHARE
+    return work.candidates[row, at.CLOSED] != at.OPEN or (
+        work.candidates[row, at.NEAR] == 1 and work.geometry[at.NOW, row, at.SHARE] > LEADING_SHARE
     )
 
 
@@ -77,9 +41,9 @@ def first_of(work, body):
 
 def join(scene, work, pair):
     """Make one cluster of those of the bodies of a pair, if both are free."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-    work.pairs[pair, ACTING] = 1
-    if scene.bodies[a, FREE] * scene.bodies[b, FREE] == 1.0:
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    work.pairs[pair, at.ACTING] = 1
+    if scene.bodies[a, at.FREE] * scene.bodies[b, at.FREE] == 1.0:
         one, other = first_of(work, a), first_of(work, b)
         work.cluster[max(one, other)] = min(one, other)
 
@@ -89,76 +53,76 @@ def gather_clusters(scene, work):
     pairs that act."""
     for body in range(work.bodies.shape[0]):
         work.cluster[body] = body
-    for pair in range(work.tally[PAIRS]):
-        work.pairs[pair, ACTING] = 0
+    for pair in range(work.tally[at.PAIRS]):
+        work.pairs[pair, at.ACTING] = 0
         if has(scene, CENTRE_FORCE):
             join(scene, work, pair)
-    for row in range(work.tally[CANDIDATES]):
-        if acts(work, row) and work.pairs[work.candidates[row, PAIR], ACTING] == 0:
-            join(scene, work, work.candidates[row, PAIR])
+    for row in range(work.tally[at.CANDIDATES]):
+        if acts(work, row) and work.pairs[work.candidates[row, at.PAIR], at.ACTING] == 0:
+            join(scene, work, work.candidates[row, at.PAIR])
     for body in range(work.bodies.shape[0]):
         work.cluster[body] = work.cluster[work.cluster[body]]
 
 
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
-    g, state = work.geometry, FIRST_STAGE + stage
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    across = g[NOW, row, VERTEX_ARM_N] - g[state, row, VERTEX_ARM_N]
-    along = g[NOW, row, VERTEX_ARM_T] - g[state, row, VERTEX_ARM_T]
+    g, state = work.geometry, at.FIRST_STAGE + stage
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    across = g[at.NOW, row, at.VERTEX_ARM_N] - g[state, row, at.VERTEX_ARM_N]
+    along = g[at.NOW, row, at.VERTEX_ARM_T] - g[state, row, at.VERTEX_ARM_T]
     add_to_body(work, row, stage, a, across, along)
-    across = g[NOW, row, EDGE_ARM_N] - g[state, row, EDGE_ARM_N]
-    along = g[NOW, row, EDGE_ARM_T] - g[state, row, EDGE_ARM_T]
+    across = g[at.NOW, row, at.EDGE_ARM_N] - g[state, row, at.EDGE_ARM_N]
+    along = g[at.NOW, row, at.EDGE_ARM_T] - g[state, row, at.EDGE_ARM_T]
     add_to_body(work, row, stage, b, across, along)
 
 
 def add_to_body(work, row, stage, body, across, along):
     """Add the turn of a pair's normal to a body's frame, and what its arms have changed by."""
-    g, state = work.geometry, FIRST_STAGE + stage
-    ox, oy = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
-    nx, ny = g[state, row, NORMAL_X], g[state, row, NORMAL_Y]
-    frame = FRAMES + FRAME_COLUMNS * stage
-    work.bodies[body, frame + TURN_COSINE] += ox * nx + oy * ny
-    work.bodies[body, frame + TURN_SINE] += ox * ny - oy * nx
-    work.bodies[body, frame + SHIFT_X] += across * nx - along * ny
-    work.bodies[body, frame + SHIFT_Y] += across * ny + along * nx
+    g, state = work.geometry, at.FIRST_STAGE + stage
+    ox, oy = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
+    nx, ny = g[state, row, at.NORMAL_X], g[state, row, at.NORMAL_Y]
+    frame = at.FRAMES + at.FRAME_COLUMNS * stage
+    work.bodies[body, frame + at.TURN_COSINE] += ox * nx + oy * ny
+    work.bodies[body, frame + at.TURN_SINE] += ox * ny - oy * nx
+    work.bodies[body, frame + at.SHIFT_X] += across * nx - along * ny
+    work.bodies[body, frame + at.SHIFT_Y] += across * ny + along * nx
 
 
 def average_shifts(work):
     """Make means of the sums of s, and add each body's turns to its cluster's."""
     for body in range(work.bodies.shape[0]):
         leader = work.cluster[body]
-        for frame in range(FRAMES, BODY_COLUMNS, FRAME_COLUMNS):
-            cosine = work.bodies[body, frame + TURN_COSINE]
-            sine = work.bodies[body, frame + TURN_SINE]
+        for frame in range(at.FRAMES, at.BODY_COLUMNS, at.FRAME_COLUMNS):
+            cosine = work.bodies[body, frame + at.TURN_COSINE]
+            sine = work.bodies[body, frame + at.TURN_SINE]
             size = length_of(cosine, sine)
             if size > 0.0:
-                work.bodies[body, frame + SHIFT_X] /= size
-                work.bodies[body, frame + SHIFT_Y] /= size
+                work.bodies[body, frame + at.SHIFT_X] /= size
+                work.bodies[body, frame + at.SHIFT_Y] /= size
             if leader != body:
-                work.bodies[leader, frame + TURN_COSINE] += cosine
-                work.bodies[leader, frame + TURN_SINE] += sine
+                work.bodies[leader, frame + at.TURN_COSINE] += cosine
+                work.bodies[leader, frame + at.TURN_SINE] += sine
 
 
 def share_turns(work):
     """Give each body its cluster's turns; none where nothing touches."""
     for body in range(work.bodies.shape[0]):
         leader = work.cluster[body]
-        for frame in range(FRAMES, BODY_COLUMNS, FRAME_COLUMNS):
+        for frame in range(at.FRAMES, at.BODY_COLUMNS, at.FRAME_COLUMNS):
             # Leaders come first, and have the cosine and sine of their sums by then.
-            cosine = work.bodies[leader, frame + TURN_COSINE]
-            sine = work.bodies[leader, frame + TURN_SINE]
+            cosine = work.bodies[leader, frame + at.TURN_COSINE]
+            sine = work.bodies[leader, frame + at.TURN_SINE]
             size = length_of(cosine, sine)
-            work.bodies[body, frame + TURN_COSINE] = cosine / size if size > 0.0 else 1.0
-            work.bodies[body, frame + TURN_SINE] = sine / size if size > 0.0 else 0.0
+            work.bodies[body, frame + at.TURN_COSINE] = cosine / size if size > 0.0 else 1.0
+            work.bodies[body, frame + at.TURN_SINE] = sine / size if size > 0.0 else 0.0
 
 
 def follow_contacts(work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
     for body in range(work.bodies.shape[0]):
-        for column in range(FRAMES, FRAMES + MOST_FRAMES * FRAME_COLUMNS):
+        for column in range(at.FRAMES, at.FRAMES + at.MOST_FRAMES * at.FRAME_COLUMNS):
             work.bodies[body, column] = 0.0
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         if leads(work, row):
             for stage in range(3):
                 add_frame(work, row, stage)
@@ -168,14 +132,14 @@ def follow_contacts(work):
 
 def turn_at(work, body, stage):
     """Cosine and sine of the turn of a body's frame at a stage."""
-    frame = FRAMES + FRAME_COLUMNS * stage
-    return work.bodies[body, frame + TURN_COSINE], work.bodies[body, frame + TURN_SINE]
+    frame = at.FRAMES + at.FRAME_COLUMNS * stage
+    return work.bodies[body, frame + at.TURN_COSINE], work.bodies[body, frame + at.TURN_SINE]
 
 
 def shift_at(work, body, stage):
     """s of a body's frame at a stage [m]."""
-    frame = FRAMES + FRAME_COLUMNS * stage
-    return work.bodies[body, frame + SHIFT_X], work.bodies[body, frame + SHIFT_Y]
+    frame = at.FRAMES + at.FRAME_COLUMNS * stage
+    return work.bodies[body, frame + at.SHIFT_X], work.bodies[body, frame + at.SHIFT_Y]
 
 
 def velocity_on(work, body, stage, x, y):
@@ -196,20 +160,20 @@ def add_shifts(scene, work, stage):
     """Add s ω less its mean over the cluster, for the changes of velocity that CHANGE holds."""
     change, bodies = work.motion, work.bodies
     for body in range(bodies.shape[0]):
-        bodies[body, MASS_SUM] = 0.0
+        bodies[body, at.MASS_SUM] = 0.0
         for axis in range(2):
-            bodies[body, SHIFT_SUM + axis] = 0.0
+            bodies[body, at.SHIFT_SUM + axis] = 0.0
     for body in range(bodies.shape[0]):
         leader = work.cluster[body]
-        mass, spin = scene.bodies[body, MASS], change[CHANGE, body, SPIN]
-        bodies[leader, MASS_SUM] += mass
+        mass, spin = scene.bodies[body, at.MASS], change[at.CHANGE, body, at.SPIN]
+        bodies[leader, at.MASS_SUM] += mass
         for axis in range(2):
-            shift = spin * bodies[body, FRAMES + FRAME_COLUMNS * stage + SHIFT_X + axis]
-            bodies[leader, SHIFT_SUM + axis] += mass * shift
-            change[CHANGE, body, VELOCITY + axis] += shift
+            shift = spin * bodies[body, at.FRAMES + at.FRAME_COLUMNS * stage + at.SHIFT_X + axis]
+            bodies[leader, at.SHIFT_SUM + axis] += mass * shift
+            change[at.CHANGE, body, at.VELOCITY + axis] += shift
     for body in range(bodies.shape[0]):
         leader = work.cluster[body]
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             for axis in range(2):
-                mean = bodies[leader, SHIFT_SUM + axis] / bodies[leader, MASS_SUM]
-                change[CHANGE, body, VELOCITY + axis] -= mean
+                mean = bodies[leader, at.SHIFT_SUM + axis] / bodies[leader, at.MASS_SUM]
+                change[at.CHANGE, body, at.VELOCITY + axis] -= mean

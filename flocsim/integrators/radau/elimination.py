@@ -10,7 +10,7 @@ The rows of x and y of a cluster's first body are the sums of all its bodies'. W
 each other cancels in these, so that they are written without it, and momentum is exact.
 """
 
-from flocsim.arrays import DAMPING, EARLIER, LATER, PAIRS, STIFFNESS
+import flocsim.arrays as at
 from flocsim.hooks import hook
 from flocsim.integrators.radau.ordering import NONE, find_pattern, is_leader
 from flocsim.integrators.radau.tableau import EIGENVALUES, PAIR, REAL
@@ -46,8 +46,8 @@ def write_into(target, slot, work, block, first_row, last_row, weights):
     of_real, re, im = weights
     for i in range(first_row, last_row):
         for j in range(3):
-            damping = work.jacobian[DAMPING, block, i, j]
-            stiffness = work.jacobian[STIFFNESS, block, i, j]
+            damping = work.jacobian[at.DAMPING, block, i, j]
+            stiffness = work.jacobian[at.STIFFNESS, block, i, j]
             target[slot, REAL_PART, i, j] = damping + of_real * stiffness
             target[slot, PAIR_RE, i, j] = damping + re * stiffness
             target[slot, PAIR_IM, i, j] = im * stiffness
@@ -101,9 +101,9 @@ def write_systems(scene, work, step):
             write_into(e.pivot, place, work, body, first, 3, weights)
             add_inertia(scene, e.pivot, place, body, first, 3, step)
             write_momentum(scene, work, body, weights, step)
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         if e.pairs[pair] == 1:
-            a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+            a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
             write_coupling(work, a, b, lower_block(work, pair), weights)
             write_coupling(work, b, a, upper_block(work, pair), weights)
 

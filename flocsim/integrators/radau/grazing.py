@@ -5,19 +5,7 @@ own system, without what holds the gap. Where the force that a pair had as it pa
 shut instead of open, the load drives it open, and the pair is apart.
 """
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    EDGE_BODY,
-    FRESH,
-    GRAZES,
-    GRAZING_FORCE,
-    GRAZING_RESISTANCE,
-    NOW,
-    OPEN,
-    TOLERANCE,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.grazing import STIFFER
@@ -36,22 +24,22 @@ be this share of the tolerance, or it does not begin to graze."""
 
 def any_grazes(work):
     """Whether a pair grazes."""
-    for row in range(work.tally[CANDIDATES]):  # noqa: SIM110
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             return True
     return False
 
 
 def release_gaps(work):
     """Hold no gap."""
-    for row in range(work.tally[CANDIDATES]):
-        work.slip[GRAZING_RESISTANCE, row] = 0.0
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.GRAZING_RESISTANCE, row] = 0.0
 
 
 def response(scene, work, row):
     """The rates of the gap, and along the tangent, for every newton along the tangent of a pair, by
     the factorised system [m/(N s)]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     across, along = tangent_rows(work, row), normal_rows(work, row)
     for each in range(work.loads.shape[1]):
         work.loads[REAL, each] = 0.0
@@ -70,24 +58,24 @@ def response(scene, work, row):
 def can_begin(work, clock, row, found, sliding):
     """Whether the force of a pair that has just parted, with those responses to a newton, lifts it,
     and can take its speed away without moving the bodies much."""
-    if found * work.slip[GRAZING_FORCE, row] <= 0.0:
+    if found * work.slip[at.GRAZING_FORCE, row] <= 0.0:
         return False
-    way = abs(sliding * normal_rate(work, NOW, row)) * memory_of(work, row)
-    return way <= SHARE_OF_START * clock[TOLERANCE] * abs(found)
+    way = abs(sliding * normal_rate(work, at.NOW, row)) * memory_of(work, row)
+    return way <= SHARE_OF_START * clock[at.TOLERANCE] * abs(found)
 
 
 def hold_gaps(scene, work, clock):
     """Say how stiffly the gaps of pairs that graze are held, by the system without that; let those
     go that their own force does not lift. Whether any has been let go."""
     opened = False
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             found, sliding = response(scene, work, row)
             weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
-            fresh = work.slip[FRESH, row] != 0.0
+            fresh = work.slip[at.FRESH, row] != 0.0
             if weak or (fresh and not can_begin(work, clock, row, found, sliding)):
-                work.candidates[row, CLOSED], opened = OPEN, True
-                work.slip[NOW, row] = 0.0
+                work.candidates[row, at.CLOSED], opened = at.OPEN, True
+                work.slip[at.NOW, row] = 0.0
             else:
-                work.slip[GRAZING_RESISTANCE, row] = STIFFER / found
+                work.slip[at.GRAZING_RESISTANCE, row] = STIFFER / found
     return opened

@@ -7,7 +7,7 @@ of it, because its row holds the momentum of all (systems.py) and would otherwis
 The order and the pattern are kept until other pairs act, or clusters are others.
 """
 
-from flocsim.arrays import ACTING, BLOCKS_FULL, EARLIER, FREE, FULL, LATER, PAIRS, REBUILDS
+import flocsim.arrays as at
 
 (
     HEAD, NEXT, PREVIOUS, DEGREE, BEGIN, ROOM, MARK, CLUSTER, NODE_ROWS,
@@ -32,20 +32,20 @@ WIDEST, FEW = 1.5, 8
 
 def ties(scene, work, pair):
     """Whether a pair ties two bodies of the systems to each other."""
-    a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-    acts = work.pairs[pair, ACTING] == 1
-    return acts and scene.bodies[a, FREE] * scene.bodies[b, FREE] == 1.0
+    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    acts = work.pairs[pair, at.ACTING] == 1
+    return acts and scene.bodies[a, at.FREE] * scene.bodies[b, at.FREE] == 1.0
 
 
 def holds(scene, work):
     """Whether the pattern still serves the pairs that act now."""
     e, count = work.elimination, 0
-    if e.found[PATTERN] == 0 or e.found[LISTING] != work.tally[REBUILDS]:
+    if e.found[PATTERN] == 0 or e.found[LISTING] != work.tally[at.REBUILDS]:
         return False
     for body in range(work.bodies.shape[0]):
         if e.nodes[CLUSTER, body] != work.cluster[body]:
             return False
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         if ties(scene, work, pair):
             if e.pairs[pair] == 0:
                 return False
@@ -61,11 +61,11 @@ def count_ties(scene, work):
         e.nodes[MARK, body] = NONE
         e.nodes[CLUSTER, body] = work.cluster[body]
     count = 0
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         e.pairs[pair] = 1 if ties(scene, work, pair) else 0
         if e.pairs[pair] == 1:
-            e.nodes[DEGREE, work.pairs[pair, LATER]] += 1
-            e.nodes[DEGREE, work.pairs[pair, EARLIER]] += 1
+            e.nodes[DEGREE, work.pairs[pair, at.LATER]] += 1
+            e.nodes[DEGREE, work.pairs[pair, at.EARLIER]] += 1
             count += 1
     end = 0
     for body in range(n):
@@ -73,7 +73,7 @@ def count_ties(scene, work):
         e.nodes[ROOM, body] = e.nodes[DEGREE, body] + SLACK
         end += e.nodes[ROOM, body]
         e.nodes[DEGREE, body] = 0
-    e.found[END], e.found[PATTERN], e.found[LISTING] = end, 1 + count, work.tally[REBUILDS]
+    e.found[END], e.found[PATTERN], e.found[LISTING] = end, 1 + count, work.tally[at.REBUILDS]
     return end <= e.graph.shape[0]
 
 
@@ -84,9 +84,9 @@ def add_tie(e, body, other):
 
 def write_ties(work):
     """The graph of the pairs that act."""
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         if work.elimination.pairs[pair] == 1:
-            a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+            a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
             add_tie(work.elimination, a, b)
             add_tie(work.elimination, b, a)
 
@@ -184,7 +184,7 @@ def order_bodies(scene, work):
     free = 0
     for body in range(n):
         e.place[body] = NONE
-        if scene.bodies[body, FREE] == 1.0:
+        if scene.bodies[body, at.FREE] == 1.0:
             free += 1
             if not is_leader(work, body):
                 enter(e, body)
@@ -200,7 +200,7 @@ def order_bodies(scene, work):
             return NONE
         place, degree = place + 1, max(degree - 1, 0)
     for body in range(n):
-        if scene.bodies[body, FREE] == 1.0 and is_leader(work, body):
+        if scene.bodies[body, at.FREE] == 1.0 and is_leader(work, body):
             end = eliminate(work, place, body, end)
             place += 1
     for rest in range(place, n):
@@ -290,5 +290,5 @@ def find_pattern(scene, work):
         if end != NONE and lay_out(work, end):
             return True
     work.elimination.found[PATTERN] = 0
-    work.tally[FULL] = BLOCKS_FULL
+    work.tally[at.FULL] = at.BLOCKS_FULL
     return False

@@ -7,25 +7,7 @@ real and one complex system of 3n equations.
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CHANGE,
-    CLOSED,
-    FIRST_STAGE,
-    GAP,
-    GRAZES,
-    GRAZING_RESISTANCE,
-    MEMORY,
-    NOW,
-    PACE,
-    SEEN_PACE,
-    SEEN_STEP,
-    SLIP_RATES,
-    SOLVES,
-    TIME,
-    TOUCHES,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
@@ -73,28 +55,30 @@ def place_stages(work, step):
         for axis in range(3):
             for stage in range(3):
                 first, second, third = MATRIX[stage]
-                mean = first * motion[FIRST_STAGE, body, VELOCITY + axis]
-                mean += second * motion[SECOND_STAGE, body, VELOCITY + axis]
-                mean += third * motion[THIRD_STAGE, body, VELOCITY + axis]
-                motion[FIRST_STAGE + stage, body, axis] = motion[NOW, body, axis] + step * mean
+                mean = first * motion[at.FIRST_STAGE, body, at.VELOCITY + axis]
+                mean += second * motion[SECOND_STAGE, body, at.VELOCITY + axis]
+                mean += third * motion[THIRD_STAGE, body, at.VELOCITY + axis]
+                motion[at.FIRST_STAGE + stage, body, axis] = (
+                    motion[at.NOW, body, axis] + step * mean
+                )
 
 
 def slip_stages(scene, work, step, first):
     """Tangential displacements of the closed pairs in the stages from ``first`` on, which are
     located."""
     slip = work.slip
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
             for stage in range(first, 3):
-                besides = rolled_besides(scene, work, FIRST_STAGE + stage, row)
-                slip[SLIP_RATES + FIRST_STAGE + stage, row] = besides
+                besides = rolled_besides(scene, work, at.FIRST_STAGE + stage, row)
+                slip[at.SLIP_RATES + at.FIRST_STAGE + stage, row] = besides
             for stage in range(first, 3):
                 one, two, three = MATRIX[stage]
-                mean = one * slip[SLIP_RATES + FIRST_STAGE, row]
-                mean += two * slip[SLIP_RATES + SECOND_STAGE, row]
-                mean += three * slip[SLIP_RATES + THIRD_STAGE, row]
-                state = FIRST_STAGE + stage
-                stuck = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
+                mean = one * slip[at.SLIP_RATES + at.FIRST_STAGE, row]
+                mean += two * slip[at.SLIP_RATES + SECOND_STAGE, row]
+                mean += three * slip[at.SLIP_RATES + THIRD_STAGE, row]
+                state = at.FIRST_STAGE + stage
+                stuck = slip[at.NOW, row] + rolled(scene, work, state, row) + step * mean
                 slip[state, row] = slip_in(scene, work, state, row, stuck)
 
 
@@ -102,10 +86,10 @@ def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
         locate_touching(scene, work, state)
-    if first == FIRST_STAGE:
+    if first == at.FIRST_STAGE:
         slip_stages(scene, work, step, 0)
     for state in range(first, last):
-        node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
+        node = 0.0 if state == at.NOW else NODES[state - at.FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
 
 
@@ -113,17 +97,17 @@ def change_of_forces(scene, work, step, stage, goal):
     """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
-    largest, least = 0.0, above_rounding(work, NOW, 0.0)
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
-            change = step * abs(along_normal(work, row, CHANGE, VELOCITY))
-            overlap = abs(work.geometry[FIRST_STAGE + stage, row, GAP])
+    largest, least = 0.0, above_rounding(work, at.NOW, 0.0)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
+            overlap = abs(work.geometry[at.FIRST_STAGE + stage, row, at.GAP])
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
-        elif work.candidates[row, CLOSED] == GRAZES:
-            resistance, memory = work.slip[GRAZING_RESISTANCE, row], memory_of(work, row)
-            change = abs(resistance * along_normal(work, row, CHANGE, VELOCITY))
-            force = abs(grazing_force(work, FIRST_STAGE + stage, row))
+        elif work.candidates[row, at.CLOSED] == at.GRAZES:
+            resistance, memory = work.slip[at.GRAZING_RESISTANCE, row], memory_of(work, row)
+            change = abs(resistance * along_normal(work, row, at.CHANGE, at.VELOCITY))
+            force = abs(grazing_force(work, at.FIRST_STAGE + stage, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
@@ -137,12 +121,12 @@ def correct_stages(scene, work, step, goal):
     for stage in range(3):
         write_changes(scene, work, stage)
         for body in range(work.motion.shape[1]):
-            memory = step + work.bodies[body, MEMORY]
+            memory = step + work.bodies[body, at.MEMORY]
             for axis in range(3):
-                change = work.motion[CHANGE, body, VELOCITY + axis]
+                change = work.motion[at.CHANGE, body, at.VELOCITY + axis]
                 if not abs(change) < math.inf:
                     return math.inf
-                work.motion[FIRST_STAGE + stage, body, VELOCITY + axis] += change
+                work.motion[at.FIRST_STAGE + stage, body, at.VELOCITY + axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
         largest = max(largest, change_of_forces(scene, work, step, stage, goal))
     return largest
@@ -151,11 +135,11 @@ def correct_stages(scene, work, step, goal):
 def newton_step(scene, work, time, step, goal):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
-    evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
+    evaluate_states(scene, work, time, step, at.FIRST_STAGE, at.FIRST_STAGE + 3)
     follow_contacts(work)
     write_loads(scene, work, step)
     solve_both(work)
-    work.tally[SOLVES] += 1
+    work.tally[at.SOLVES] += 1
     return correct_stages(scene, work, step, goal)
 
 
@@ -169,10 +153,10 @@ def finish_stages(scene, work, step):
 
 def expected_pace(clock, step):
     """What to expect of the second iteration before it is made."""
-    if clock[SEEN_PACE] == 0.0:
+    if clock[at.SEEN_PACE] == 0.0:
         return FIRST_PACE
-    longer = max(step / clock[SEEN_STEP], 1.0)
-    return min(max(DOUBTED_PACE * clock[SEEN_PACE] * longer * longer, LEAST_PACE), FIRST_PACE)
+    longer = max(step / clock[at.SEEN_STEP], 1.0)
+    return min(max(DOUBTED_PACE * clock[at.SEEN_PACE] * longer * longer, LEAST_PACE), FIRST_PACE)
 
 
 def solve_stages(scene, work, clock, step):
@@ -183,7 +167,7 @@ def solve_stages(scene, work, clock, step):
     # Turning makes every other iteration worse, so that the pace is taken over two of them.
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
-        change = newton_step(scene, work, clock[TIME], step, NEWTON_SHARE * allowed)
+        change = newton_step(scene, work, clock[at.TIME], step, NEWTON_SHARE * allowed)
         goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         first = before == math.inf
@@ -191,12 +175,12 @@ def solve_stages(scene, work, clock, step):
             pace = expected
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
             finish_stages(scene, work, step)
-            clock[PACE] = 0.0 if first else pace
+            clock[at.PACE] = 0.0 if first else pace
             if not first:
-                clock[SEEN_PACE], clock[SEEN_STEP] = pace, step
+                clock[at.SEEN_PACE], clock[at.SEEN_STEP] = pace, step
             return True
         if not change < math.inf or (earlier < math.inf and pace > 1.0):
             break
         before, earlier = change, before
-    clock[SEEN_PACE] = 0.0
+    clock[at.SEEN_PACE] = 0.0
     return False

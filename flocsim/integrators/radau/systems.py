@@ -5,25 +5,7 @@ contacts (contact_frames.py). The systems of few bodies are factorised as they s
 those of many in an order in which little fills in (elimination.py).
 """
 
-from flocsim.arrays import (
-    CHANGE,
-    DAMPING,
-    DENSE,
-    EARLIER,
-    FIRST_STAGE,
-    FORCE,
-    FREE,
-    LATER,
-    LEADER_FORCE,
-    LEADER_RATE,
-    NOW,
-    PAIRS,
-    SPIN,
-    STIFFNESS,
-    VELOCITY,
-    VX,
-    VY,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
 from flocsim.integrators.radau.dense import factorise, solve_dense
@@ -44,16 +26,16 @@ from flocsim.integrators.rhs.views import inertia
 
 def is_dense(work):
     """Whether the systems are small."""
-    return work.bodies.shape[0] <= DENSE
+    return work.bodies.shape[0] <= at.DENSE
 
 
 def write_block(scene, work, which, step, block, body, other):
     """Write a block of DAMPING + (h/µ) STIFFNESS to the dense system; fixed bodies stay."""
-    value, moves = EIGENVALUES[which], scene.bodies[body, FREE]
+    value, moves = EIGENVALUES[which], scene.bodies[body, at.FREE]
     for i in range(3):
         for j in range(3):
-            entry = work.jacobian[DAMPING, block, i, j]
-            entry = entry + step / value * work.jacobian[STIFFNESS, block, i, j]
+            entry = work.jacobian[at.DAMPING, block, i, j]
+            entry = entry + step / value * work.jacobian[at.STIFFNESS, block, i, j]
             work.system[which, 3 * body + i, 3 * other + j] = moves * entry
 
 
@@ -64,10 +46,10 @@ def write_matrix(scene, work, which, step):
         write_block(scene, work, which, step, body, body, body)
         for axis in range(3):
             row, mass = 3 * body + axis, inertia(scene, body, axis)
-            moves = scene.bodies[body, FREE]
+            moves = scene.bodies[body, at.FREE]
             work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         write_block(scene, work, which, step, lower_block(work, pair), a, b)
         write_block(scene, work, which, step, upper_block(work, pair), b, a)
     sum_matrix(work, which)
@@ -133,7 +115,7 @@ def balance_load(scene, work):
     ones."""
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
-            work.loads[REAL, 3 * body + axis] *= scene.bodies[body, FREE]
+            work.loads[REAL, 3 * body + axis] *= scene.bodies[body, at.FREE]
     sum_loads(work, REAL)
 
 
@@ -156,17 +138,17 @@ def momentum_rate(scene, work, body, axis, stage, step):
     """Mass times acceleration at a stage, from the stages' velocities."""
     v = work.motion
     first, second, third = INVERSE[stage]
-    now = v[NOW, body, VELOCITY + axis]
-    change = first * (v[FIRST_STAGE, body, VELOCITY + axis] - now)
-    change += second * (v[SECOND_STAGE, body, VELOCITY + axis] - now)
-    change += third * (v[THIRD_STAGE, body, VELOCITY + axis] - now)
+    now = v[at.NOW, body, at.VELOCITY + axis]
+    change = first * (v[at.FIRST_STAGE, body, at.VELOCITY + axis] - now)
+    change += second * (v[SECOND_STAGE, body, at.VELOCITY + axis] - now)
+    change += third * (v[THIRD_STAGE, body, at.VELOCITY + axis] - now)
     return inertia(scene, body, axis) * change / step
 
 
 def imbalance(scene, work, body, axis, stage, step):
     """Force less mass times acceleration at a stage."""
     rate = momentum_rate(scene, work, body, axis, stage, step)
-    return work.rates[FIRST_STAGE + stage, body, FORCE + axis] - rate
+    return work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis] - rate
 
 
 def sum_balances(scene, work, stage, step):
@@ -174,14 +156,16 @@ def sum_balances(scene, work, stage, step):
     LEADER_FORCE and LEADER_RATE; apart, so that what is mutual cancels."""
     for body in range(work.bodies.shape[0]):
         for axis in range(2):
-            work.bodies[body, LEADER_FORCE + axis] = work.bodies[body, LEADER_RATE + axis] = 0.0
+            work.bodies[body, at.LEADER_FORCE + axis] = work.bodies[body, at.LEADER_RATE + axis] = (
+                0.0
+            )
     for body in range(work.bodies.shape[0]):
         leader = work.cluster[body]
         for axis in range(2):
-            force = work.rates[FIRST_STAGE + stage, body, FORCE + axis]
-            work.bodies[leader, LEADER_FORCE + axis] += force
+            force = work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis]
+            work.bodies[leader, at.LEADER_FORCE + axis] += force
             rate = momentum_rate(scene, work, body, axis, stage, step)
-            work.bodies[leader, LEADER_RATE + axis] += rate
+            work.bodies[leader, at.LEADER_RATE + axis] += rate
 
 
 def stage_load(scene, work, body, stage, step):
@@ -191,8 +175,8 @@ def stage_load(scene, work, body, stage, step):
     torque = imbalance(scene, work, body, 2, stage, step)
     x, y, torque = force_back(work, body, stage, x, y, torque)
     if work.cluster[body] == body:
-        x = work.bodies[body, LEADER_FORCE] - work.bodies[body, LEADER_RATE]
-        y = work.bodies[body, LEADER_FORCE + 1] - work.bodies[body, LEADER_RATE + 1]
+        x = work.bodies[body, at.LEADER_FORCE] - work.bodies[body, at.LEADER_RATE]
+        y = work.bodies[body, at.LEADER_FORCE + 1] - work.bodies[body, at.LEADER_RATE + 1]
         x, y, _ = force_back(work, body, stage, x, y, 0.0)
     return x, y, torque
 
@@ -205,7 +189,7 @@ def write_loads(scene, work, step):
     for stage in range(3):
         sum_balances(scene, work, stage, step)
         for body in range(work.motion.shape[1]):
-            if scene.bodies[body, FREE] == 1.0:
+            if scene.bodies[body, at.FREE] == 1.0:
                 load = stage_load(scene, work, body, stage, step)
                 for axis in range(3):
                     for which in range(2):
@@ -226,7 +210,7 @@ def write_changes(scene, work, stage):
     for body in range(changes.shape[1]):
         x, y = stage_change(work, 3 * body, stage), stage_change(work, 3 * body + 1, stage)
         x, y = velocity_on(work, body, stage, x, y)
-        changes[CHANGE, body, VX] = x
-        changes[CHANGE, body, VY] = y
-        changes[CHANGE, body, SPIN] = stage_change(work, 3 * body + 2, stage)
+        changes[at.CHANGE, body, at.VX] = x
+        changes[at.CHANGE, body, at.VY] = y
+        changes[at.CHANGE, body, at.SPIN] = stage_change(work, 3 * body + 2, stage)
     add_shifts(scene, work, stage)

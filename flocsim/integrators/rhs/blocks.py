@@ -5,12 +5,12 @@ other free body has a share in (forces of the fluid, of walls), the only ones th
 momentum of bodies that act on each other; then two for each row of ``Work.pairs``.
 """
 
-from flocsim.arrays import CHANGE, EARLIER, LATER, PAIRS
+import flocsim.arrays as at
 
 
 def block_count(work):
     """How many blocks there are."""
-    return 2 * work.bodies.shape[0] + 2 * work.tally[PAIRS]
+    return 2 * work.bodies.shape[0] + 2 * work.tally[at.PAIRS]
 
 
 def own_block(work, body):
@@ -34,18 +34,18 @@ def subtract(work, which, weight, block, body, other):
     for i in range(3):
         load = work.loads[0, 3 * body + i]
         for j in range(3):
-            load -= weight * jacobian[which, block, i, j] * change[CHANGE, other, j]
+            load -= weight * jacobian[which, block, i, j] * change[at.CHANGE, other, j]
         work.loads[0, 3 * body + i] = load
 
 
 def subtract_product(work, which, weight):
     """Subtract a matrix, times a weight, times the places in CHANGE from the loads; every row in
     the order of its columns."""
-    for pair in range(work.tally[PAIRS]):
-        later, earlier = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         subtract(work, which, weight, lower_block(work, pair), later, earlier)
     for body in range(work.bodies.shape[0]):
         subtract(work, which, weight, body, body, body)
-    for pair in range(work.tally[PAIRS]):
-        later, earlier = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         subtract(work, which, weight, upper_block(work, pair), earlier, later)

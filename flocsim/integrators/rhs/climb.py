@@ -7,7 +7,7 @@ straight.
 
 import math
 
-from flocsim.arrays import EQUIVALENT_RADIUS
+import flocsim.arrays as at
 from flocsim.integrators.rhs.views import pair_view
 from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
 
@@ -23,7 +23,7 @@ def repulsion_at(scene, time, a, b, distance, gap):
     """What the pair forces push bodies a and b apart with [N] at rest, at a distance of the centres
     and a gap of the outlines."""
     force = 0.0
-    sizes = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
     if has(scene, CENTRE_FORCE):
         force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
     if scene.surface_reach > gap:
@@ -36,7 +36,7 @@ def can_climb(scene, time, a, b, distance, gap, load, needed):
     helping: its work over the way out, at the highest place of it."""
     if not load < math.inf:
         return True
-    sizes = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
     centres = has(scene, CENTRE_FORCE)
     climbed, way = 0.0, 0.0
     end = 2.0 * sizes + max(-gap, sizes - distance, 0.0)

@@ -6,28 +6,7 @@ A velocity error e displaces a body by e·T until drag, or the next encounter, h
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    DAMPING,
-    DEVIATION,
-    HORIZON,
-    MEMORY,
-    NEW,
-    NOW,
-    RELAXATION,
-    SPIN,
-    STEP_ERROR,
-    STEP_PLACE,
-    STEP_SPEED,
-    TOLERANCE,
-    UNTIL,
-    VELOCITY,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.geometry.contact.separation import length_of
 from flocsim.integrators.rhs.views import inertia, lever
@@ -47,68 +26,70 @@ def mean_velocity(work, axis):
     """Mean of one component over all bodies [m/s]."""
     total = 0.0
     for body in range(work.motion.shape[1]):
-        total += work.motion[NOW, body, axis]
+        total += work.motion[at.NOW, body, axis]
     return total / work.motion.shape[1]
 
 
 def turnover_rate(scene, work, body, mean_x, mean_y):
     """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
     motion = work.motion
-    vx = motion[NOW, body, VX] - mean_x
-    vy = motion[NOW, body, VY] - mean_y
-    return length_of(vx, vy) / scene.bodies[body, BOUNDING_RADIUS] + abs(motion[NOW, body, SPIN])
+    vx = motion[at.NOW, body, at.VX] - mean_x
+    vy = motion[at.NOW, body, at.VY] - mean_y
+    return length_of(vx, vy) / scene.bodies[body, at.BOUNDING_RADIUS] + abs(
+        motion[at.NOW, body, at.SPIN]
+    )
 
 
 def remember_velocities(scene, work, remaining):
     """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
-    mean_x, mean_y = mean_velocity(work, VX), mean_velocity(work, VY)
+    mean_x, mean_y = mean_velocity(work, at.VX), mean_velocity(work, at.VY)
     for body in range(scene.bodies.shape[0]):
         slowest, relaxation = math.inf, 0.0
         turnover = turnover_rate(scene, work, body, mean_x, mean_y)
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            damping = max(work.jacobian[DAMPING, body, axis, axis], 0.0)
+            damping = max(work.jacobian[at.DAMPING, body, axis, axis], 0.0)
             relaxation = max(relaxation, mass / max(damping, TINY))
             rate = mass * (turnover + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
-        work.bodies[body, MEMORY] = 1.0 / slowest
-        work.bodies[body, RELAXATION] = relaxation
+        work.bodies[body, at.MEMORY] = 1.0 / slowest
+        work.bodies[body, at.RELAXATION] = relaxation
 
 
 def end_of_run(clock):
     """When a run ends [s]."""
-    return max(clock[UNTIL], clock[HORIZON])
+    return max(clock[at.UNTIL], clock[at.HORIZON])
 
 
 def step_tolerance(work, clock):
     """What the error of the next step may be [m]."""
-    if least_listed_gap(work) > clock[TOLERANCE]:
-        return FREE_SHARE * clock[TOLERANCE]
-    return clock[TOLERANCE]
+    if least_listed_gap(work) > clock[at.TOLERANCE]:
+        return FREE_SHARE * clock[at.TOLERANCE]
+    return clock[at.TOLERANCE]
 
 
 def error_ratio(scene, work, clock, step):
     """The error of the step over what is allowed, −1 where it or the new state is no number."""
     error = error_size(scene, work)
-    clock[STEP_ERROR] = error
+    clock[at.STEP_ERROR] = error
     if not error < math.inf:
         return -1.0
-    return error / max(step_tolerance(work, clock), rounding_size(scene, work, NEW, step))
+    return error / max(step_tolerance(work, clock), rounding_size(scene, work, at.NEW, step))
 
 
 def body_error(scene, work, body):
     """The error of one body, from DEVIATION: displacement of its outline, now and later [m]; both
     parts of it are written down."""
     e = work.motion
-    size = scene.bodies[body, BOUNDING_RADIUS]
-    place = length_of(e[DEVIATION, body, X], e[DEVIATION, body, Y]) + size * abs(
-        e[DEVIATION, body, ANGLE]
+    size = scene.bodies[body, at.BOUNDING_RADIUS]
+    place = length_of(e[at.DEVIATION, body, at.X], e[at.DEVIATION, body, at.Y]) + size * abs(
+        e[at.DEVIATION, body, at.ANGLE]
     )
-    speed = length_of(e[DEVIATION, body, VX], e[DEVIATION, body, VY]) + size * abs(
-        e[DEVIATION, body, SPIN]
+    speed = length_of(e[at.DEVIATION, body, at.VX], e[at.DEVIATION, body, at.VY]) + size * abs(
+        e[at.DEVIATION, body, at.SPIN]
     )
-    work.bodies[body, STEP_PLACE], work.bodies[body, STEP_SPEED] = place, speed
-    return place + speed * work.bodies[body, MEMORY]
+    work.bodies[body, at.STEP_PLACE], work.bodies[body, at.STEP_SPEED] = place, speed
+    return place + speed * work.bodies[body, at.MEMORY]
 
 
 def error_size(scene, work):
@@ -126,10 +107,10 @@ def rounding_size(scene, work, state, step):
     """What rounding alone does to a step that ends in a state [m]."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
-        memory = work.bodies[body, MEMORY]
+        memory = work.bodies[body, at.MEMORY]
         for axis in range(3):
             place = abs(work.motion[state, body, axis])
-            speed = abs(work.motion[state, body, VELOCITY + axis])
+            speed = abs(work.motion[state, body, at.VELOCITY + axis])
             size = place * (1.0 + memory / step) + speed * (step + memory)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest

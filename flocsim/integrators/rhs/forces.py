@@ -4,24 +4,7 @@ Forces act through the listed pairs that are flagged as closed, or as near (surf
 An integrator that freezes these flags for a step has a smooth right-hand side in it.
 """
 
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    EARLIER,
-    EVALUATIONS,
-    FORCE,
-    GEOMETRY_COLUMNS,
-    GRAZES,
-    LATER,
-    MOTION_COLUMNS,
-    NEW,
-    OPEN,
-    PAIRS,
-    SHARE,
-    SLIP_RATES,
-    TOUCHES,
-    VELOCITY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.integrators.rhs.grazing import grazing_force
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
@@ -49,14 +32,14 @@ from flocsim.laws import (
 def take_stage(work, stage):
     """Make a stage the new state: its motion, and what closed pairs need."""
     for body in range(work.motion.shape[1]):
-        for axis in range(MOTION_COLUMNS):
-            work.motion[NEW, body, axis] = work.motion[stage, body, axis]
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
-            work.slip[NEW, row] = work.slip[stage, row]
-        if work.candidates[row, CLOSED] != OPEN:
-            for column in range(GEOMETRY_COLUMNS):
-                work.geometry[NEW, row, column] = work.geometry[stage, row, column]
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.NEW, body, axis] = work.motion[stage, body, axis]
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+            work.slip[at.NEW, row] = work.slip[stage, row]
+        if work.candidates[row, at.CLOSED] != at.OPEN:
+            for column in range(at.GEOMETRY_COLUMNS):
+                work.geometry[at.NEW, row, column] = work.geometry[stage, row, column]
 
 
 def add_body_forces(scene, work, time, state):
@@ -67,8 +50,8 @@ def add_body_forces(scene, work, time, state):
 
 
 def add_centre_forces(scene, work, time, state):
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         view = centre_view(scene, work, time, state, a, b)
         nx, ny, _ = soft_centre_line(scene, work, state, a, b)
         repulsion = centre_force(scene, view)
@@ -78,30 +61,30 @@ def add_centre_forces(scene, work, time, state):
 
 def add_surface_forces(scene, work, time, state):
     row = 0
-    while row < work.tally[CANDIDATES]:
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
         repulsion = surface_force(scene, surface_view(scene, work, time, state, row, end))
         for each in range(row, end):
-            share = work.geometry[state, each, SHARE]
+            share = work.geometry[state, each, at.SHARE]
             if share > 0.0:
                 push_pair(work, state, each, share * repulsion, 0.0)
         row = end
 
 
 def add_contact_forces(scene, work, state):
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
             view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(scene, view)
             push_pair(work, state, row, normal, tangential)
-        elif work.candidates[row, CLOSED] == GRAZES:
+        elif work.candidates[row, at.CLOSED] == at.GRAZES:
             push_pair(work, state, row, 0.0, grazing_force(work, state, row))
 
 
 def rate_slips(work, state):
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
-            work.slip[SLIP_RATES + state, row] = tangential_rate(work, state, row)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+            work.slip[at.SLIP_RATES + state, row] = tangential_rate(work, state, row)
 
 
 def locate_touching(scene, work, state):
@@ -119,11 +102,11 @@ def locate_and_rate(scene, work, state):
 def sum_other_forces(scene, work, time, state):
     """All forces and torques of a state but those of contacts into ``work.rates[state]``; its
     geometry is located."""
-    work.tally[EVALUATIONS] += 1
+    work.tally[at.EVALUATIONS] += 1
     for body in range(work.bodies.shape[0]):
         for axis in range(3):
-            work.rates[state, body, axis] = work.motion[state, body, VELOCITY + axis]
-            work.rates[state, body, FORCE + axis] = 0.0
+            work.rates[state, body, axis] = work.motion[state, body, at.VELOCITY + axis]
+            work.rates[state, body, at.FORCE + axis] = 0.0
     if has(scene, BODY_FORCE):
         add_body_forces(scene, work, time, state)
     if has(scene, CENTRE_FORCE):

@@ -10,7 +10,7 @@ change. ξ itself never jumps: it is the solution of dξ/dt = v_t under |ξ| ≤
 the ends of steps comes near to only as fast as steps get short.
 """
 
-from flocsim.arrays import CANDIDATES, CLOSED, NEW, NOW, SLIDING
+import flocsim.arrays as at
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
 from flocsim.laws import SLIP_LIMIT, has, slip_limit
 
@@ -40,7 +40,7 @@ def outgrowth(scene, work, state, row, side):
 
 def slip_in(scene, work, state, row, stuck):
     """The displacement of a closed pair in a state; ``stuck``: what it is if it sticks [m]."""
-    side = work.candidates[row, SLIDING]
+    side = work.candidates[row, at.SLIDING]
     if side == 0:
         return stuck
     return side * limit_in(scene, work, state, row)
@@ -49,25 +49,25 @@ def slip_in(scene, work, state, row, stuck):
 def side_of(scene, work, row):
     """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
     brought to its limit."""
-    limit, side = limit_in(scene, work, NOW, row), work.candidates[row, SLIDING]
+    limit, side = limit_in(scene, work, at.NOW, row), work.candidates[row, at.SLIDING]
     if side == 0:
-        slip = work.slip[NOW, row]
+        slip = work.slip[at.NOW, row]
         if abs(slip) < FULL * limit:
             return 0
-        rate = tangential_rate(work, NOW, row)
+        rate = tangential_rate(work, at.NOW, row)
         side = 1 if slip > 0.0 or (slip == 0.0 and rate > 0.0) else -1
-    work.slip[NOW, row] = side * limit
-    return side if outgrowth(scene, work, NOW, row, side) > 0.0 else 0
+    work.slip[at.NOW, row] = side * limit
+    return side if outgrowth(scene, work, at.NOW, row, side) > 0.0 else 0
 
 
 def set_sliding(scene, work):
     """Flag all closed pairs that slide, now; whether any flag has changed."""
     changed = False
     if has(scene, SLIP_LIMIT):
-        for row in range(work.tally[CANDIDATES]):
-            side = side_of(scene, work, row) if work.candidates[row, CLOSED] == 1 else 0
-            changed = changed or work.candidates[row, SLIDING] != side
-            work.candidates[row, SLIDING] = side
+        for row in range(work.tally[at.CANDIDATES]):
+            side = side_of(scene, work, row) if work.candidates[row, at.CLOSED] == 1 else 0
+            changed = changed or work.candidates[row, at.SLIDING] != side
+            work.candidates[row, at.SLIDING] = side
     return changed
 
 
@@ -76,24 +76,24 @@ def limit_slips(scene, work):
     whose steps do not end where a contact begins to slide."""
     if not has(scene, SLIP_LIMIT):
         return
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == 1:
-            limit = limit_in(scene, work, NEW, row)
-            work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == 1:
+            limit = limit_in(scene, work, at.NEW, row)
+            work.slip[at.NEW, row] = min(max(work.slip[at.NEW, row], -limit), limit)
 
 
 def beyond(scene, work, row, step):
     """(how far a pair is beyond where it ought to have begun or ceased to slide [m], the share of
     the step at which it should have); 0 at the first place where nothing is wrong."""
-    side = work.candidates[row, SLIDING]
+    side = work.candidates[row, at.SLIDING]
     if side == 0:
-        before = limit_in(scene, work, NOW, row) - abs(work.slip[NOW, row])
-        after = limit_in(scene, work, NEW, row) - abs(work.slip[NEW, row])
+        before = limit_in(scene, work, at.NOW, row) - abs(work.slip[at.NOW, row])
+        after = limit_in(scene, work, at.NEW, row) - abs(work.slip[at.NEW, row])
         if after >= 0.0:
             return 0.0, 1.0
         return -after, root(scene, work, row, step, before, after)
-    before = outgrowth(scene, work, NOW, row, side)
-    after = outgrowth(scene, work, NEW, row, side)
+    before = outgrowth(scene, work, at.NOW, row, side)
+    after = outgrowth(scene, work, at.NEW, row, side)
     if after >= 0.0:
         return 0.0, 1.0
     share = max(before, 0.0) / (max(before, 0.0) - after)
@@ -103,9 +103,9 @@ def beyond(scene, work, row, step):
 def root(scene, work, row, step, before, after):
     """Where in the step the room that a sticking pair has left, ``before`` and ``after``, is used
     up, by the cubic through its values and rates at both ends."""
-    side = 1.0 if work.slip[NEW, row] > 0.0 else -1.0
-    fall = step * outgrowth(scene, work, NOW, row, side)
-    end = step * outgrowth(scene, work, NEW, row, side)
+    side = 1.0 if work.slip[at.NEW, row] > 0.0 else -1.0
+    fall = step * outgrowth(scene, work, at.NOW, row, side)
+    end = step * outgrowth(scene, work, at.NEW, row, side)
     before = max(before, 0.0)
     low, high = 0.0, 1.0
     for _ in range(40):

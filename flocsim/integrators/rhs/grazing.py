@@ -13,20 +13,7 @@ bodies slide against each other meanwhile. Such a pair opens for good where T ha
 where it ceases to slide it sticks again, T being taken over by its spring.
 """
 
-from flocsim.arrays import (
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    FREE,
-    GRAZING_FORCE,
-    GRAZING_RESISTANCE,
-    INERTIA,
-    MASS,
-    NOW,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.integrators.rhs.views import normal_rate
 
 STIFFER = 1e5
@@ -36,33 +23,33 @@ contacts in a step."""
 
 def grazing_force(work, state, row):
     """T of a pair that grazes, in a state [N]."""
-    force = work.slip[GRAZING_FORCE, row]
-    if state == NOW:
+    force = work.slip[at.GRAZING_FORCE, row]
+    if state == at.NOW:
         return force
-    return force - work.slip[GRAZING_RESISTANCE, row] * normal_rate(work, state, row)
+    return force - work.slip[at.GRAZING_RESISTANCE, row] * normal_rate(work, state, row)
 
 
 def normal_mobility(scene, work, row):
     """Acceleration of the gap for every newton along the normal of a pair [1/kg]."""
     total, g = 0.0, work.geometry
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    if scene.bodies[a, FREE] == 1.0:
-        arm = g[NOW, row, VERTEX_ARM_N]
-        total += 1.0 / scene.bodies[a, MASS] + arm * arm / scene.bodies[a, INERTIA]
-    if scene.bodies[b, FREE] == 1.0:
-        arm = g[NOW, row, EDGE_ARM_N]
-        total += 1.0 / scene.bodies[b, MASS] + arm * arm / scene.bodies[b, INERTIA]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    if scene.bodies[a, at.FREE] == 1.0:
+        arm = g[at.NOW, row, at.VERTEX_ARM_N]
+        total += 1.0 / scene.bodies[a, at.MASS] + arm * arm / scene.bodies[a, at.INERTIA]
+    if scene.bodies[b, at.FREE] == 1.0:
+        arm = g[at.NOW, row, at.EDGE_ARM_N]
+        total += 1.0 / scene.bodies[b, at.MASS] + arm * arm / scene.bodies[b, at.INERTIA]
     return total
 
 
 def coupling(scene, work, row):
     """Acceleration of the gap for every newton along the tangent of a pair [1/kg]."""
     total, g = 0.0, work.geometry
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    if scene.bodies[a, FREE] == 1.0:
-        arms = g[NOW, row, VERTEX_ARM_N] * g[NOW, row, VERTEX_ARM_T]
-        total += arms / scene.bodies[a, INERTIA]
-    if scene.bodies[b, FREE] == 1.0:
-        arms = g[NOW, row, EDGE_ARM_N] * g[NOW, row, EDGE_ARM_T]
-        total += arms / scene.bodies[b, INERTIA]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    if scene.bodies[a, at.FREE] == 1.0:
+        arms = g[at.NOW, row, at.VERTEX_ARM_N] * g[at.NOW, row, at.VERTEX_ARM_T]
+        total += arms / scene.bodies[a, at.INERTIA]
+    if scene.bodies[b, at.FREE] == 1.0:
+        arms = g[at.NOW, row, at.EDGE_ARM_N] * g[at.NOW, row, at.EDGE_ARM_T]
+        total += arms / scene.bodies[b, at.INERTIA]
     return total

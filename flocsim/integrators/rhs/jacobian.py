@@ -11,39 +11,8 @@ edge's body, the same holds for an end of the edge; on its inside the foot slide
 the torque changes by N σ.
 """
 
-from flocsim.arrays import (
-    ANGLE,
-    CANDIDATES,
-    CLOSED,
-    DAMPING,
-    EARLIER,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    FORCING,
-    FREE,
-    GAP,
-    GRAZES,
-    GRAZING_FORCE,
-    GRAZING_RESISTANCE,
-    LATER,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    PAIR,
-    PAIRS,
-    SHARE,
-    SLIDING,
-    SLIP_OFFSET,
-    STIFFNESS,
-    TOUCHES,
-    TURNING,
-    VELOCITY,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-    ContactView,
-)
+import flocsim.arrays as at
+from flocsim.arrays import ContactView
 from flocsim.geometry.contact.points import row_radii
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
@@ -81,15 +50,15 @@ from flocsim.laws import (
 def normal_rows(work, row):
     """Entries of a pair's normal direction on its two bodies, now."""
     g = work.geometry
-    nx, ny = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
-    return (nx, ny, g[NOW, row, VERTEX_ARM_N]), (-nx, -ny, -g[NOW, row, EDGE_ARM_N])
+    nx, ny = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
+    return (nx, ny, g[at.NOW, row, at.VERTEX_ARM_N]), (-nx, -ny, -g[at.NOW, row, at.EDGE_ARM_N])
 
 
 def tangent_rows(work, row):
     """Entries of a pair's tangential direction on its two bodies, now."""
     g = work.geometry
-    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
-    return (tx, ty, g[NOW, row, VERTEX_ARM_T]), (-tx, -ty, -g[NOW, row, EDGE_ARM_T])
+    tx, ty = -g[at.NOW, row, at.NORMAL_Y], g[at.NOW, row, at.NORMAL_X]
+    return (tx, ty, g[at.NOW, row, at.VERTEX_ARM_T]), (-tx, -ty, -g[at.NOW, row, at.EDGE_ARM_T])
 
 
 def add_outer(work, which, block, out, by, weight):
@@ -107,15 +76,15 @@ def add_product(scene, work, which, pair, a, b, out, by, weight):
         return
     (out_a, out_b), (by_a, by_b) = out, by
     ab, ba = upper_block(work, pair), lower_block(work, pair)
-    if a == work.pairs[pair, LATER]:
+    if a == work.pairs[pair, at.LATER]:
         ab, ba = ba, ab
     add_outer(work, which, a, out_a, by_a, weight)
     add_outer(work, which, ab, out_a, by_b, weight)
     add_outer(work, which, ba, out_b, by_a, weight)
     add_outer(work, which, b, out_b, by_b, weight)
-    if scene.bodies[a, FREE] == 0.0:
+    if scene.bodies[a, at.FREE] == 0.0:
         add_outer(work, which, own_block(work, b), out_b, by_b, weight)
-    elif scene.bodies[b, FREE] == 0.0:
+    elif scene.bodies[b, at.FREE] == 0.0:
         add_outer(work, which, own_block(work, a), out_a, by_a, weight)
 
 
@@ -136,13 +105,13 @@ def sliding_row(scene, work, row):
     """
     radius_a, radius_b = row_radii(scene, work, row)
     g = work.geometry
-    tx, ty = -g[NOW, row, NORMAL_Y], g[NOW, row, NORMAL_X]
+    tx, ty = -g[at.NOW, row, at.NORMAL_Y], g[at.NOW, row, at.NORMAL_X]
     difference = radius_a - radius_b
-    distance = g[NOW, row, GAP] + radius_a + radius_b
-    arm_a = g[NOW, row, VERTEX_ARM_T] + 0.5 * (distance + difference)
-    arm_b = g[NOW, row, EDGE_ARM_T] - 0.5 * (distance - difference)
+    distance = g[at.NOW, row, at.GAP] + radius_a + radius_b
+    arm_a = g[at.NOW, row, at.VERTEX_ARM_T] + 0.5 * (distance + difference)
+    arm_b = g[at.NOW, row, at.EDGE_ARM_T] - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
-    beside = distance if g[NOW, row, TURNING] == 0.0 else 0.0
+    beside = distance if g[at.NOW, row, at.TURNING] == 0.0 else 0.0
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
@@ -153,31 +122,35 @@ def scaled(row, share):
 
 def add_turning(scene, work, row, normal, tangential):
     """Derivative by the places of a pair's force whose size stays the same."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    g, stiffness, pair = work.geometry, work.jacobian, work.candidates[row, PAIR]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    g, stiffness, pair = work.geometry, work.jacobian, work.candidates[row, at.PAIR]
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
-    nx, ny, turning = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y], g[NOW, row, TURNING]
+    nx, ny, turning = (
+        g[at.NOW, row, at.NORMAL_X],
+        g[at.NOW, row, at.NORMAL_Y],
+        g[at.NOW, row, at.TURNING],
+    )
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
-    torque_a = normal * arm_a - tangential * g[NOW, row, VERTEX_ARM_N]
-    torque_b = normal * arm_b - tangential * g[NOW, row, EDGE_ARM_N]
-    stiffness[STIFFNESS, a, ANGLE, ANGLE] += torque_a
+    torque_a = normal * arm_a - tangential * g[at.NOW, row, at.VERTEX_ARM_N]
+    torque_b = normal * arm_b - tangential * g[at.NOW, row, at.EDGE_ARM_N]
+    stiffness[at.STIFFNESS, a, at.ANGLE, at.ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
-        add_product(scene, work, STIFFNESS, pair, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
         on_b = NOTHING, (0.0, 0.0, 1.0)
-        add_product(scene, work, STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
     else:
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
         by = scaled(slide_a, turning), scaled(slide_b, turning)
-        add_product(scene, work, STIFFNESS, pair, a, b, out, by, -1.0)
-        stiffness[STIFFNESS, b, ANGLE, ANGLE] -= torque_b
+        add_product(scene, work, at.STIFFNESS, pair, a, b, out, by, -1.0)
+        stiffness[at.STIFFNESS, b, at.ANGLE, at.ANGLE] -= torque_b
 
 
 def sliding_slopes(scene, work, row, normal, tangential):
     """Derivatives of (normal, tangential) by the overlap of a contact that slides, ξ along."""
-    view = contact_view(scene, work, NOW, row)
+    view = contact_view(scene, work, at.NOW, row)
     by = 1e-3 * abs(view.overlap) + 1e-13
-    more = work.candidates[row, SLIDING] * limit_slope(scene, work, NOW, row) * by
+    more = work.candidates[row, at.SLIDING] * limit_slope(scene, work, at.NOW, row) * by
     deeper = ContactView(
         view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate,
         view.effective_mass, view.radius_i, view.radius_j,
@@ -187,38 +160,38 @@ def sliding_slopes(scene, work, row, normal, tangential):
 
 
 def add_contact(scene, work, row):
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    pair = work.candidates[row, PAIR]
-    found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    pair = work.candidates[row, at.PAIR]
+    found = contact_derivatives(scene, contact_view(scene, work, at.NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
     normal_slope, tangential_slope = found[2], found[3]
-    if work.candidates[row, SLIDING] != 0:
+    if work.candidates[row, at.SLIDING] != 0:
         normal_slope, tangential_slope = sliding_slopes(scene, work, row, found[0], found[1])
-    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal_slope)
-    add_product(scene, work, STIFFNESS, pair, a, b, across, along, tangential_slope)
+    add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal_slope)
+    add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, tangential_slope)
     for axis in range(1, 4):
         # Sliding, ξ goes with the overlap alone.
-        if axis == 2 and work.candidates[row, SLIDING] != 0:
+        if axis == 2 and work.candidates[row, at.SLIDING] != 0:
             continue
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
-        which = STIFFNESS if axis % 2 == 0 else DAMPING
+        which = at.STIFFNESS if axis % 2 == 0 else at.DAMPING
         add_product(scene, work, which, pair, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(scene, work, which, pair, a, b, across, by, sign * found[3 + 2 * axis])
     add_turning(scene, work, row, found[0], found[1])
-    if work.candidates[row, SLIDING] == 0:
-        offset = work.slip[SLIP_OFFSET, row]
+    if work.candidates[row, at.SLIDING] == 0:
+        offset = work.slip[at.SLIP_OFFSET, row]
         add_forcing(work, a, b, along, found[6] * offset)
         add_forcing(work, a, b, across, found[7] * offset)
 
 
 def add_grazing(scene, work, row):
     """Derivatives of the force of a pair that grazes, which falls with the rate of the gap."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    pair, resistance = work.candidates[row, PAIR], work.slip[GRAZING_RESISTANCE, row]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    pair, resistance = work.candidates[row, at.PAIR], work.slip[at.GRAZING_RESISTANCE, row]
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    force = work.slip[GRAZING_FORCE, row]
-    add_product(scene, work, DAMPING, pair, a, b, across, along, resistance)
+    force = work.slip[at.GRAZING_FORCE, row]
+    add_product(scene, work, at.DAMPING, pair, a, b, across, along, resistance)
     add_turning(scene, work, row, 0.0, force)
     pressed, tangential = doubted(scene, work, row, force)
     add_forcing(work, a, b, along, pressed)
@@ -229,18 +202,18 @@ def add_forcing(work, a, b, out, size):
     """Add a force of a size along a direction, by which the error is carried otherwise."""
     out_a, out_b = out
     for axis in range(3):
-        work.motion[FORCING, a, VELOCITY + axis] += size * out_a[axis]
-        work.motion[FORCING, b, VELOCITY + axis] += size * out_b[axis]
+        work.motion[at.FORCING, a, at.VELOCITY + axis] += size * out_a[axis]
+        work.motion[at.FORCING, b, at.VELOCITY + axis] += size * out_b[axis]
 
 
 def add_contacts(scene, work):
     for body in range(work.motion.shape[1]):
-        for axis in range(VELOCITY, VELOCITY + 3):
-            work.motion[FORCING, body, axis] = 0.0
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == TOUCHES:
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+            work.motion[at.FORCING, body, axis] = 0.0
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.TOUCHES:
             add_contact(scene, work, row)
-        elif work.candidates[row, CLOSED] == GRAZES:
+        elif work.candidates[row, at.CLOSED] == at.GRAZES:
             add_grazing(scene, work, row)
 
 
@@ -255,49 +228,49 @@ def add_body(work, which, body, derivatives):
 
 def add_bodies(scene, work, time):
     for body in range(scene.bodies.shape[0]):
-        view = body_view(scene, work, time, NOW, body)
+        view = body_view(scene, work, time, at.NOW, body)
         if has(scene, VELOCITY_DERIVATIVES):
-            add_body(work, DAMPING, body, velocity_derivatives(scene, view))
+            add_body(work, at.DAMPING, body, velocity_derivatives(scene, view))
         if has(scene, POSITION_DERIVATIVES):
-            add_body(work, STIFFNESS, body, position_derivatives(scene, view))
+            add_body(work, at.STIFFNESS, body, position_derivatives(scene, view))
 
 
 def add_centres(scene, work, time):
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
-        view = centre_view(scene, work, time, NOW, a, b)
-        nx, ny, distance = soft_centre_line(scene, work, NOW, a, b)
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        view = centre_view(scene, work, time, at.NOW, a, b)
+        nx, ny, distance = soft_centre_line(scene, work, at.NOW, a, b)
         along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
         slope, damping = centre_derivatives(scene, view)
         # The gradient (x, y)/d turns and, near d_c = 0, grows by (1 − n nᵀ)/d.
         turning = -centre_force(scene, view) / distance
-        add_product(scene, work, STIFFNESS, pair, a, b, along, along, -slope - turning)
-        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
-        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
-        add_product(scene, work, DAMPING, pair, a, b, along, along, damping)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, -slope - turning)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
+        add_product(scene, work, at.DAMPING, pair, a, b, along, along, damping)
 
 
 def add_surfaces(scene, work, time):
     """Derivatives of the surface forces: of the gap g̃, of the shares in it and of the normals."""
     row = 0
-    while row < work.tally[CANDIDATES]:
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-        pair = work.candidates[row, PAIR]
-        view = surface_view(scene, work, time, NOW, row, end)
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        pair = work.candidates[row, at.PAIR]
+        view = surface_view(scene, work, time, at.NOW, row, end)
         repulsion = surface_force(scene, view)
         slope, damping = surface_derivatives(scene, view)
         mean = mean_direction(work, row, end)
         spread = repulsion * sharpness(scene, view.gap)
-        add_product(scene, work, STIFFNESS, pair, a, b, mean, mean, -slope - spread)
-        add_product(scene, work, DAMPING, pair, a, b, mean, mean, damping)
+        add_product(scene, work, at.STIFFNESS, pair, a, b, mean, mean, -slope - spread)
+        add_product(scene, work, at.DAMPING, pair, a, b, mean, mean, damping)
         for each in range(row, end):
-            share = work.geometry[NOW, each, SHARE]
+            share = work.geometry[at.NOW, each, at.SHARE]
             if share > 0.0:
-                c, d = work.candidates[each, VERTEX_BODY], work.candidates[each, EDGE_BODY]
+                c, d = work.candidates[each, at.VERTEX_BODY], work.candidates[each, at.EDGE_BODY]
                 along = normal_rows(work, each)
-                spread = share * repulsion * sharpness(scene, work.geometry[NOW, each, GAP])
-                add_product(scene, work, STIFFNESS, pair, c, d, along, along, spread)
+                spread = share * repulsion * sharpness(scene, work.geometry[at.NOW, each, at.GAP])
+                add_product(scene, work, at.STIFFNESS, pair, c, d, along, along, spread)
                 add_turning(scene, work, each, share * repulsion, 0.0)
         row = end
 

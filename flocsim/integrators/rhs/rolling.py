@@ -15,19 +15,7 @@ summed over a step is next to nothing: D and r change with the gap, by its chang
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    EDGE_BODY,
-    FOOT,
-    GAP,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    SIDE,
-    SPIN,
-    TURNING,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.points import row_radii
 from flocsim.integrators.rhs.views import tangential_rate
 
@@ -35,22 +23,22 @@ from flocsim.integrators.rhs.views import tangential_rate
 def turn_of_normal(work, state, row):
     """The angle by which the normal of a pair has turned since now, within half a turn [rad]."""
     g = work.geometry
-    ox, oy = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
-    nx, ny = g[state, row, NORMAL_X], g[state, row, NORMAL_Y]
+    ox, oy = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
+    nx, ny = g[state, row, at.NORMAL_X], g[state, row, at.NORMAL_Y]
     return math.atan2(ox * ny - oy * nx, ox * nx + oy * ny)
 
 
 def rolled(scene, work, state, row):
     """How far the tangential displacement of a pair has grown from now to a state, at the gap of
     now [m]; both are located."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g = work.geometry
     radius_a, radius_b = row_radii(scene, work, row)
-    gap = g[NOW, row, GAP]
-    turn_a = work.motion[state, a, ANGLE] - work.motion[NOW, a, ANGLE]
-    turn_b = work.motion[state, b, ANGLE] - work.motion[NOW, b, ANGLE]
-    inside = NOW if g[NOW, row, TURNING] == 0.0 else state
-    along = g[inside, row, SIDE] * (g[state, row, FOOT] - g[NOW, row, FOOT])
+    gap = g[at.NOW, row, at.GAP]
+    turn_a = work.motion[state, a, at.ANGLE] - work.motion[at.NOW, a, at.ANGLE]
+    turn_b = work.motion[state, b, at.ANGLE] - work.motion[at.NOW, b, at.ANGLE]
+    inside = at.NOW if g[at.NOW, row, at.TURNING] == 0.0 else state
+    along = g[inside, row, at.SIDE] * (g[state, row, at.FOOT] - g[at.NOW, row, at.FOOT])
     about = turn_of_normal(work, state, row) - turn_b
     rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
     return along + (radius_a + radius_b + gap) * about + rolling
@@ -58,13 +46,13 @@ def rolled(scene, work, state, row):
 
 def rolled_besides(scene, work, state, row):
     """How fast it grows besides, in a state, as the gap is another one than now [m/s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    g, spin_b = work.geometry, work.motion[state, b, SPIN]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    g, spin_b = work.geometry, work.motion[state, b, at.SPIN]
     radius_a, radius_b = row_radii(scene, work, row)
-    gap, apart = g[state, row, GAP], g[state, row, GAP] - g[NOW, row, GAP]
-    relative = spin_b - work.motion[state, a, SPIN]
+    gap, apart = g[state, row, at.GAP], g[state, row, at.GAP] - g[at.NOW, row, at.GAP]
+    relative = spin_b - work.motion[state, a, at.SPIN]
     about = 0.0
-    if g[state, row, TURNING] != 0.0:
+    if g[state, row, at.TURNING] != 0.0:
         rolling = (radius_a + 0.5 * gap) * relative
         about = (tangential_rate(work, state, row) - rolling) / (radius_a + radius_b + gap)
     return apart * (about + 0.5 * relative)

@@ -21,57 +21,7 @@ or the other, is told by a nudged companion alone.
 
 import math
 
-from flocsim.arrays import (
-    ACROSS,
-    ANGLE,
-    BOUNDING_RADIUS,
-    CANDIDATES,
-    CARRIED,
-    CLOSED,
-    DEVIATION,
-    DOUBT_PLACE,
-    DOUBT_SPEED,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    ERROR,
-    ERROR_PLACE,
-    ERROR_SPEED,
-    ESTIMATE_SHARE,
-    FREE,
-    GAP,
-    GRAZES,
-    INERTIA,
-    MASS,
-    MOST_PLACE,
-    MOTION_COLUMNS,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    OPEN,
-    RELAXATION,
-    SHORTENED,
-    SLIDING,
-    SLIP_OFFSET,
-    SPIN,
-    STAGED_STEP,
-    STATED,
-    STEP_ERROR,
-    STEP_PLACE,
-    STEP_SPEED,
-    SWITCH_PLACE,
-    SWITCH_SPEED,
-    TOLERANCE,
-    TOUCHES,
-    VELOCITY,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.separation import length_of
 from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
@@ -113,7 +63,7 @@ LONG = 1e6
 
 def carried(work, body, place, speed, step):
     """Carry one kind of error of a body over a step."""
-    errors, lasting = work.bodies, work.bodies[body, RELAXATION]
+    errors, lasting = work.bodies, work.bodies[body, at.RELAXATION]
     left = math.exp(-step / lasting) if step < LONG * lasting else 0.0
     way = step if lasting > LONG * step else lasting * (1.0 - left)
     errors[body, place] += errors[body, speed] * way
@@ -132,35 +82,35 @@ def carry_errors(scene, work, clock, step):
     known, errors = False, work.bodies
     # All counts that is estimated where features come to share in a surface force inside of steps,
     # and of steps across switches, of which nothing is carried on with motion.
-    across = clock[ACROSS] == 1.0
-    share = 1.0 if scene.surface_reach > 0.0 else clock[ESTIMATE_SHARE]
+    across = clock[at.ACROSS] == 1.0
+    share = 1.0 if scene.surface_reach > 0.0 else clock[at.ESTIMATE_SHARE]
     weight = 1.0 / share if across else 1.0
     for body in range(work.bodies.shape[0]):
-        carried(work, body, ERROR_PLACE, ERROR_SPEED, step)
-        carried(work, body, SWITCH_PLACE, SWITCH_SPEED, step)
-        carried(work, body, DOUBT_PLACE, DOUBT_SPEED, step)
-        errors[body, ERROR_PLACE] += weight * errors[body, STEP_PLACE]
-        errors[body, ERROR_SPEED] += weight * errors[body, STEP_SPEED]
-        known = known or errors[body, STEP_PLACE] + errors[body, STEP_SPEED] > 0.0
+        carried(work, body, at.ERROR_PLACE, at.ERROR_SPEED, step)
+        carried(work, body, at.SWITCH_PLACE, at.SWITCH_SPEED, step)
+        carried(work, body, at.DOUBT_PLACE, at.DOUBT_SPEED, step)
+        errors[body, at.ERROR_PLACE] += weight * errors[body, at.STEP_PLACE]
+        errors[body, at.ERROR_SPEED] += weight * errors[body, at.STEP_SPEED]
+        known = known or errors[body, at.STEP_PLACE] + errors[body, at.STEP_SPEED] > 0.0
     largest = 0.0
     for body in range(work.bodies.shape[0]):
         if not known:
-            errors[body, ERROR_PLACE] += clock[STEP_ERROR]
-        stated = share * errors[body, ERROR_PLACE]
-        stated += OF_SWITCHES * (errors[body, SWITCH_PLACE] + errors[body, DOUBT_PLACE])
+            errors[body, at.ERROR_PLACE] += clock[at.STEP_ERROR]
+        stated = share * errors[body, at.ERROR_PLACE]
+        stated += OF_SWITCHES * (errors[body, at.SWITCH_PLACE] + errors[body, at.DOUBT_PLACE])
         largest = max(largest, stated)
         if across:
-            for axis in range(MOTION_COLUMNS):
-                work.motion[CARRIED, body, axis] += work.motion[DEVIATION, body, axis]
+            for axis in range(at.MOTION_COLUMNS):
+                work.motion[at.CARRIED, body, axis] += work.motion[at.DEVIATION, body, axis]
     vector = math.inf if across else carry_vector(scene, work, clock, step)
-    clock[ERROR] = 0.0
+    clock[at.ERROR] = 0.0
     for body in range(work.bodies.shape[0]):
         stated = largest
         if vector < math.inf:
-            own = max(carried_size(scene, work, body), LEAST * clock[TOLERANCE])
+            own = max(carried_size(scene, work, body), LEAST * clock[at.TOLERANCE])
             stated = min(stated, OF_VECTOR * own)
-        errors[body, STATED] = stated
-        clock[ERROR] = max(clock[ERROR], stated)
+        errors[body, at.STATED] = stated
+        clock[at.ERROR] = max(clock[at.ERROR], stated)
 
 
 @hook
@@ -172,19 +122,19 @@ def overlap_error(scene, work, clock, row):
 def carried_size(scene, work, body):
     """How large a body's carried error is in the place of its outline [m]."""
     e = work.motion
-    turn = scene.bodies[body, BOUNDING_RADIUS] * abs(e[CARRIED, body, ANGLE])
-    return length_of(e[CARRIED, body, X], e[CARRIED, body, Y]) + turn
+    turn = scene.bodies[body, at.BOUNDING_RADIUS] * abs(e[at.CARRIED, body, at.ANGLE])
+    return length_of(e[at.CARRIED, body, at.X], e[at.CARRIED, body, at.Y]) + turn
 
 
 def certain_sum(work, body):
     """By how much the place of a body may be wrong, by the sums of its errors, if no contact has
     opened that may have [m]."""
-    return work.bodies[body, ERROR_PLACE] + OF_SWITCHES * work.bodies[body, SWITCH_PLACE]
+    return work.bodies[body, at.ERROR_PLACE] + OF_SWITCHES * work.bodies[body, at.SWITCH_PLACE]
 
 
 def sum_of_place(work, body):
     """By how much the place of a body may be wrong, by the sums of its errors [m]."""
-    return certain_sum(work, body) + OF_SWITCHES * work.bodies[body, DOUBT_PLACE]
+    return certain_sum(work, body) + OF_SWITCHES * work.bodies[body, at.DOUBT_PLACE]
 
 
 def hand_on(work, body, size):
@@ -192,7 +142,7 @@ def hand_on(work, body, size):
     carried error."""
     more = size - sum_of_place(work, body)
     if more > 0.0:
-        work.bodies[body, ERROR_PLACE] += more
+        work.bodies[body, at.ERROR_PLACE] += more
 
 
 def shorten(scene, work):
@@ -204,25 +154,25 @@ def shorten(scene, work):
     has given it, and velocities too: those of vibrations are what their places make them.
     """
     for body in range(work.bodies.shape[0]):
-        work.bodies[body, SHORTENED], work.bodies[body, MOST_PLACE] = 1.0, 0.0
+        work.bodies[body, at.SHORTENED], work.bodies[body, at.MOST_PLACE] = 1.0, 0.0
     for body in range(work.bodies.shape[0]):
         leader = work.cluster[body]
-        most = max(work.bodies[leader, MOST_PLACE], certain_sum(work, body))
-        work.bodies[leader, MOST_PLACE] = most
+        most = max(work.bodies[leader, at.MOST_PLACE], certain_sum(work, body))
+        work.bodies[leader, at.MOST_PLACE] = most
     for body in range(work.bodies.shape[0]):
         leader, size = work.cluster[body], carried_size(scene, work, body)
-        most = max(work.bodies[leader, MOST_PLACE], sum_of_place(work, body))
+        most = max(work.bodies[leader, at.MOST_PLACE], sum_of_place(work, body))
         if size > most:
-            work.bodies[leader, SHORTENED] = min(work.bodies[leader, SHORTENED], most / size)
+            work.bodies[leader, at.SHORTENED] = min(work.bodies[leader, at.SHORTENED], most / size)
     for body in range(work.bodies.shape[0]):
-        share = work.bodies[work.cluster[body], SHORTENED]
+        share = work.bodies[work.cluster[body], at.SHORTENED]
         if share < 1.0:
-            for axis in range(MOTION_COLUMNS):
-                work.motion[CARRIED, body, axis] *= share
-    for row in range(work.tally[CANDIDATES]):
-        share = work.bodies[work.cluster[work.candidates[row, VERTEX_BODY]], SHORTENED]
+            for axis in range(at.MOTION_COLUMNS):
+                work.motion[at.CARRIED, body, axis] *= share
+    for row in range(work.tally[at.CANDIDATES]):
+        share = work.bodies[work.cluster[work.candidates[row, at.VERTEX_BODY]], at.SHORTENED]
         if share < 1.0:
-            work.slip[SLIP_OFFSET, row] *= share
+            work.slip[at.SLIP_OFFSET, row] *= share
 
 
 def bound_carried(scene, work):
@@ -240,41 +190,41 @@ def bound_carried(scene, work):
 def add_impulse(scene, work, body, impulse, kind):
     """Add what an impulse at its outline [N s] does to a body's velocity to SWITCH_SPEED or
     DOUBT_SPEED."""
-    if scene.bodies[body, FREE] == 1.0:
-        size = scene.bodies[body, BOUNDING_RADIUS]
-        share = 1.0 / scene.bodies[body, MASS] + size * size / scene.bodies[body, INERTIA]
+    if scene.bodies[body, at.FREE] == 1.0:
+        size = scene.bodies[body, at.BOUNDING_RADIUS]
+        share = 1.0 / scene.bodies[body, at.MASS] + size * size / scene.bodies[body, at.INERTIA]
         work.bodies[body, kind] += impulse * share
 
 
 def kick(scene, work, body, x, y, turn):
     """Add an impulse [N s, N s, N m s] to a body's carried error."""
-    if scene.bodies[body, FREE] == 1.0:
+    if scene.bodies[body, at.FREE] == 1.0:
         e, inertia = work.motion, scene.bodies
-        e[CARRIED, body, VX] += x / inertia[body, MASS]
-        e[CARRIED, body, VY] += y / inertia[body, MASS]
-        e[CARRIED, body, SPIN] += turn / inertia[body, INERTIA]
+        e[at.CARRIED, body, at.VX] += x / inertia[body, at.MASS]
+        e[at.CARRIED, body, at.VY] += y / inertia[body, at.MASS]
+        e[at.CARRIED, body, at.SPIN] += turn / inertia[body, at.INERTIA]
 
 
 def kick_pair(scene, work, row, normal, tangential):
     """Add the impulses of a contact [N s] to the carried errors of its bodies."""
     g = work.geometry
-    nx, ny = g[NOW, row, NORMAL_X], g[NOW, row, NORMAL_Y]
+    nx, ny = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
     x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
-    turn = g[NOW, row, VERTEX_ARM_N] * normal + g[NOW, row, VERTEX_ARM_T] * tangential
-    back = g[NOW, row, EDGE_ARM_N] * normal + g[NOW, row, EDGE_ARM_T] * tangential
-    kick(scene, work, work.candidates[row, VERTEX_BODY], x, y, turn)
-    kick(scene, work, work.candidates[row, EDGE_BODY], -x, -y, -back)
+    turn = g[at.NOW, row, at.VERTEX_ARM_N] * normal + g[at.NOW, row, at.VERTEX_ARM_T] * tangential
+    back = g[at.NOW, row, at.EDGE_ARM_N] * normal + g[at.NOW, row, at.EDGE_ARM_T] * tangential
+    kick(scene, work, work.candidates[row, at.VERTEX_BODY], x, y, turn)
+    kick(scene, work, work.candidates[row, at.EDGE_BODY], -x, -y, -back)
 
 
 def is_closed(work, row):
     """Whether a pair is flagged as one that touches."""
-    return work.candidates[row, CLOSED] == TOUCHES
+    return work.candidates[row, at.CLOSED] == at.TOUCHES
 
 
 def has_switched(work, row):
     """Whether a pair touches, or no longer does, other than it is flagged."""
-    closed = TOUCHES if work.geometry[NOW, row, GAP] < 0.0 else OPEN
-    return closed != work.candidates[row, CLOSED]
+    closed = at.TOUCHES if work.geometry[at.NOW, row, at.GAP] < 0.0 else at.OPEN
+    return closed != work.candidates[row, at.CLOSED]
 
 
 def doubtful_time(work, row, step, doubt, resolved):
@@ -283,11 +233,11 @@ def doubtful_time(work, row, step, doubt, resolved):
     How finely its touch was located says nothing of that later on: a contact that rests in a hair's
     breadth of overlap, as the second one of two that an attraction presses, bears what it bears.
     """
-    gap = work.geometry[NOW, row, GAP]
+    gap = work.geometry[at.NOW, row, at.GAP]
     if has_switched(work, row):
-        speed = abs(normal_rate(work, NOW, row))
+        speed = abs(normal_rate(work, at.NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, DEVIATION, X)) * resolved)
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, at.DEVIATION, at.X)) * resolved)
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -302,8 +252,8 @@ def pressed_stiffness(scene, view, overlap):
 def unresolved(scene, work, clock, step, row):
     """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
     its vibration out, so that the load decides whether it is there."""
-    view = contact_view(scene, work, NOW, row)
-    stiffness = pressed_stiffness(scene, view, clock[TOLERANCE])
+    view = contact_view(scene, work, at.NOW, row)
+    stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
     if not stiffness > 0.0:
         return 0.0
     turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
@@ -312,9 +262,9 @@ def unresolved(scene, work, clock, step, row):
 
 def signed_time(work, row, step, depth, doubt):
     """The same, above 0 where the force has acted for too long, as the carried error has it."""
-    gap, wrong = work.geometry[NOW, row, GAP], along_normal(work, row, CARRIED, X)
+    gap, wrong = work.geometry[at.NOW, row, at.GAP], along_normal(work, row, at.CARRIED, at.X)
     if has_switched(work, row):
-        rate = normal_rate(work, NOW, row)
+        rate = normal_rate(work, at.NOW, row)
         late = (gap - wrong) / rate if rate != 0.0 else 0.0
         if rate != 0.0:
             late += math.copysign(doubt / rate, late)
@@ -333,9 +283,9 @@ def doubted(scene, work, row, tangential):
     load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
     it enlarges the error. What different contacts and times have lost must not cancel."""
     normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
-    apart = along_normal(work, row, CARRIED, X)
-    apart += memory * along_normal(work, row, CARRIED, VELOCITY)
-    along = slip_error(work, row, X) + memory * slip_error(work, row, VELOCITY)
+    apart = along_normal(work, row, at.CARRIED, at.X)
+    apart += memory * along_normal(work, row, at.CARRIED, at.VELOCITY)
+    along = slip_error(work, row, at.X) + memory * slip_error(work, row, at.VELOCITY)
     share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
     return share * normal, share * tangential
 
@@ -343,38 +293,38 @@ def doubted(scene, work, row, tangential):
 def doubt_tangential(scene, work, row, step):
     """Count as an error all that the tangential force of a pair that grazes has done in a step: by
     the law the pair loses it whenever it parts, and is pressed by what it has lifted instead."""
-    force = grazing_force(work, NOW, row)
+    force = grazing_force(work, at.NOW, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
     impulse *= OF_LOST / OF_SWITCHES
-    add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, SWITCH_SPEED)
-    add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, SWITCH_SPEED)
+    add_impulse(scene, work, work.candidates[row, at.VERTEX_BODY], impulse, at.SWITCH_SPEED)
+    add_impulse(scene, work, work.candidates[row, at.EDGE_BODY], impulse, at.SWITCH_SPEED)
 
 
 def forget_offsets(work):
     """Of pairs that are open, or slide, no displacement knows of the error that there is already:
     ξ counts from where they will stick. By the law one that grazes has lost it."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, SLIDING] != 0 or not is_closed(work, row):
-            grazes = work.candidates[row, CLOSED] == GRAZES
-            lost = OF_BOUNDS * work.slip[NOW, row] if grazes else 0.0
-            work.slip[SLIP_OFFSET, row] = lost - slip_error(work, row, X)
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.SLIDING] != 0 or not is_closed(work, row):
+            grazes = work.candidates[row, at.CLOSED] == at.GRAZES
+            lost = OF_BOUNDS * work.slip[at.NOW, row] if grazes else 0.0
+            work.slip[at.SLIP_OFFSET, row] = lost - slip_error(work, row, at.X)
 
 
 def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
-    for row in range(work.tally[CANDIDATES]):
-        if work.candidates[row, CLOSED] == GRAZES:
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
             doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        resolved = 1.0 - unresolved(scene, work, clock, clock[STAGED_STEP], row)
+        resolved = 1.0 - unresolved(scene, work, clock, clock[at.STAGED_STEP], row)
         late = doubtful_time(work, row, step, doubt, resolved)
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
-            normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
+            normal, tangential = contact_force(scene, contact_view(scene, work, at.NOW, row))
             impulse = late * length_of(normal, tangential)
-            kind = SWITCH_SPEED if has_switched(work, row) else DOUBT_SPEED
-            add_impulse(scene, work, work.candidates[row, VERTEX_BODY], impulse, kind)
-            add_impulse(scene, work, work.candidates[row, EDGE_BODY], impulse, kind)
+            kind = at.SWITCH_SPEED if has_switched(work, row) else at.DOUBT_SPEED
+            add_impulse(scene, work, work.candidates[row, at.VERTEX_BODY], impulse, kind)
+            add_impulse(scene, work, work.candidates[row, at.EDGE_BODY], impulse, kind)
             kick_pair(scene, work, row, signed * normal, signed * tangential)

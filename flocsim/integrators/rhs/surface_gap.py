@@ -14,21 +14,7 @@ g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIA
 
 import math
 
-from flocsim.arrays import (
-    CANDIDATES,
-    EDGE_ARM_N,
-    EDGE_BODY,
-    GAP,
-    NEAR,
-    NEW,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    PAIR,
-    SHARE,
-    VERTEX_ARM_N,
-    VERTEX_BODY,
-)
+import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import relative_speed
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 
@@ -67,8 +53,8 @@ def gap_of(scene, measure):
 
 def run_end(work, row):
     """The end of the run of rows that belong to the same two bodies as this one."""
-    pair, end = work.candidates[row, PAIR], row + 1
-    while end < work.tally[CANDIDATES] and work.candidates[end, PAIR] == pair:
+    pair, end = work.candidates[row, at.PAIR], row + 1
+    while end < work.tally[at.CANDIDATES] and work.candidates[end, at.PAIR] == pair:
         end += 1
     return end
 
@@ -77,33 +63,33 @@ def least_gap(work, state, row, end):
     """The least gap of the rows of two bodies [m]."""
     least = math.inf
     for each in range(row, end):
-        least = min(least, work.geometry[state, each, GAP])
+        least = min(least, work.geometry[state, each, at.GAP])
     return least
 
 
 def flag_near(scene, work, state, step):
     """Flag the pairs that may have a share of a surface force within a step of this size [s]."""
     row = 0
-    while row < work.tally[CANDIDATES]:
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
-        a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
         way = LOOK_AHEAD * step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
         least = measure_of(scene, least_gap(work, state, row, end))
         reach = gap_of(scene, least + RANGE) + 2.0 * way
         for each in range(row, end):
-            near = work.geometry[state, each, GAP] <= reach
-            work.candidates[each, NEAR] = 1 if near else 0
+            near = work.geometry[state, each, at.GAP] <= reach
+            work.candidates[each, at.NEAR] = 1 if near else 0
         row = end
 
 
 def overlooked(scene, work):
     """Whether a pair that was not flagged has a share at the end of the step."""
     row = 0
-    while row < work.tally[CANDIDATES]:
+    while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
-        reach = gap_of(scene, measure_of(scene, least_gap(work, NEW, row, end)) + RANGE)
+        reach = gap_of(scene, measure_of(scene, least_gap(work, at.NEW, row, end)) + RANGE)
         for each in range(row, end):
-            if work.candidates[each, NEAR] == 0 and work.geometry[NEW, each, GAP] < reach:
+            if work.candidates[each, at.NEAR] == 0 and work.geometry[at.NEW, each, at.GAP] < reach:
                 return True
         row = end
     return False
@@ -114,23 +100,23 @@ def soften(scene, work, state, row, end):
     geometry = work.geometry
     least, total, rate = math.inf, 0.0, 0.0
     for each in range(row, end):
-        if work.candidates[each, NEAR] == 1:
-            least = min(least, geometry[state, each, GAP])
+        if work.candidates[each, at.NEAR] == 1:
+            least = min(least, geometry[state, each, at.GAP])
     least = measure_of(scene, least)
     reach = gap_of(scene, least + RANGE)
     for each in range(row, end):
         share = 0.0
-        if work.candidates[each, NEAR] == 1 and geometry[state, each, GAP] <= reach:
-            share = math.exp(least - measure_of(scene, geometry[state, each, GAP]))
-        geometry[state, each, SHARE] = share
+        if work.candidates[each, at.NEAR] == 1 and geometry[state, each, at.GAP] <= reach:
+            share = math.exp(least - measure_of(scene, geometry[state, each, at.GAP]))
+        geometry[state, each, at.SHARE] = share
         total += share
     gap = gap_of(scene, least - math.log(total))
     length = length_at(scene, gap)
     for each in range(row, end):
-        if geometry[state, each, SHARE] > 0.0:
-            own = length_at(scene, geometry[state, each, GAP])
-            geometry[state, each, SHARE] *= length / (own * total)
-            rate += geometry[state, each, SHARE] * normal_rate(work, state, each)
+        if geometry[state, each, at.SHARE] > 0.0:
+            own = length_at(scene, geometry[state, each, at.GAP])
+            geometry[state, each, at.SHARE] *= length / (own * total)
+            rate += geometry[state, each, at.SHARE] * normal_rate(work, state, each)
     return gap, rate
 
 
@@ -143,7 +129,7 @@ def sharpness(scene, gap):
 
 def surface_view(scene, work, time, state, row, end):
     """The PairView of the two bodies of a run of rows, their gap being g̃."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     gap, rate = soften(scene, work, state, row, end)
     _, _, distance = centre_line(scene, work, state, a, b)
     return pair_view(scene, time, a, b, gap, rate, distance)
@@ -151,15 +137,21 @@ def surface_view(scene, work, time, state, row, end):
 
 def mean_direction(work, row, end):
     """Derivatives of g̃ by the places of both bodies of the first row, now."""
-    g, first = work.geometry, work.candidates[row, VERTEX_BODY]
+    g, first = work.geometry, work.candidates[row, at.VERTEX_BODY]
     x, y, turn_a, turn_b = 0.0, 0.0, 0.0, 0.0
     for each in range(row, end):
-        share = g[NOW, each, SHARE]
-        arm_v, arm_e = g[NOW, each, VERTEX_ARM_N], g[NOW, each, EDGE_ARM_N]
-        if work.candidates[each, VERTEX_BODY] == first:
-            x, y = x + share * g[NOW, each, NORMAL_X], y + share * g[NOW, each, NORMAL_Y]
+        share = g[at.NOW, each, at.SHARE]
+        arm_v, arm_e = g[at.NOW, each, at.VERTEX_ARM_N], g[at.NOW, each, at.EDGE_ARM_N]
+        if work.candidates[each, at.VERTEX_BODY] == first:
+            x, y = (
+                x + share * g[at.NOW, each, at.NORMAL_X],
+                y + share * g[at.NOW, each, at.NORMAL_Y],
+            )
             turn_a, turn_b = turn_a + share * arm_v, turn_b - share * arm_e
         else:
-            x, y = x - share * g[NOW, each, NORMAL_X], y - share * g[NOW, each, NORMAL_Y]
+            x, y = (
+                x - share * g[at.NOW, each, at.NORMAL_X],
+                y - share * g[at.NOW, each, at.NORMAL_Y],
+            )
             turn_a, turn_b = turn_a - share * arm_e, turn_b + share * arm_v
     return (x, y, turn_a), (-x, -y, turn_b)

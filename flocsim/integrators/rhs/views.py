@@ -2,40 +2,8 @@
 
 import math
 
-from flocsim.arrays import (
-    ANGLE,
-    BOUNDING_RADIUS,
-    BUOYANT_MASS,
-    EDGE_ARM_N,
-    EDGE_ARM_T,
-    EDGE_BODY,
-    ELONGATION,
-    EQUIVALENT_RADIUS,
-    FREE,
-    FX,
-    FY,
-    GAP,
-    INERTIA,
-    KICK_X,
-    LONG_AXIS,
-    MASS,
-    MEMORY,
-    NORMAL_X,
-    NORMAL_Y,
-    NOW,
-    SPIN,
-    TORQUE,
-    VERTEX_ARM_N,
-    VERTEX_ARM_T,
-    VERTEX_BODY,
-    VX,
-    VY,
-    BodyView,
-    ContactView,
-    PairView,
-    X,
-    Y,
-)
+import flocsim.arrays as at
+from flocsim.arrays import BodyView, ContactView, PairView
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import row_radii
 from flocsim.geometry.contact.separation import length_of, separation
@@ -46,27 +14,28 @@ def body_view(scene, work, time, state, body):
     motion, known = work.motion, scene.bodies
     return BodyView(
         time,
-        motion[state, body, X], motion[state, body, Y], motion[state, body, ANGLE],
-        motion[state, body, VX], motion[state, body, VY], motion[state, body, SPIN],
-        known[body, MASS], known[body, BUOYANT_MASS], known[body, INERTIA],
-        known[body, EQUIVALENT_RADIUS], known[body, ELONGATION], known[body, LONG_AXIS],
-        work.bodies[body, KICK_X], work.bodies[body, KICK_X + 1], work.bodies[body, KICK_X + 2],
+        motion[state, body, at.X], motion[state, body, at.Y], motion[state, body, at.ANGLE],
+        motion[state, body, at.VX], motion[state, body, at.VY], motion[state, body, at.SPIN],
+        known[body, at.MASS], known[body, at.BUOYANT_MASS], known[body, at.INERTIA],
+        known[body, at.EQUIVALENT_RADIUS], known[body, at.ELONGATION], known[body, at.LONG_AXIS],
+        work.bodies[body, at.KICK_X], work.bodies[body, at.KICK_X + 1],
+        work.bodies[body, at.KICK_X + 2],
     )  # fmt: skip
 
 
 def effective_mass(scene, a, b):
     """M = m_a m_b/(m_a + m_b) [kg]; the mass of the free one where the other is fixed."""
-    if scene.bodies[a, FREE] == 0.0:
-        return scene.bodies[b, MASS]
-    if scene.bodies[b, FREE] == 0.0:
-        return scene.bodies[a, MASS]
-    mass_a, mass_b = scene.bodies[a, MASS], scene.bodies[b, MASS]
+    if scene.bodies[a, at.FREE] == 0.0:
+        return scene.bodies[b, at.MASS]
+    if scene.bodies[b, at.FREE] == 0.0:
+        return scene.bodies[a, at.MASS]
+    mass_a, mass_b = scene.bodies[a, at.MASS], scene.bodies[b, at.MASS]
     return mass_a * mass_b / (mass_a + mass_b)
 
 
 def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
-    radius_a = scene.bodies[a, EQUIVALENT_RADIUS]
-    radius_b = scene.bodies[b, EQUIVALENT_RADIUS]
+    radius_a = scene.bodies[a, at.EQUIVALENT_RADIUS]
+    radius_b = scene.bodies[b, at.EQUIVALENT_RADIUS]
     return PairView(
         time, gap, gap_rate, centre_distance, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
@@ -77,51 +46,51 @@ def along_normal(work, row, kind, first):
     """n · (what the vertex's body has − what the edge's has) at a pair's contact point, in the
     direction of now, of the three columns of a row of ``motion`` from ``first`` on: X, a change of
     the gap by one of places [m]; VELOCITY, its rate [m/s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g, v = work.geometry, work.motion
-    change = g[NOW, row, NORMAL_X] * (v[kind, a, first] - v[kind, b, first])
-    change += g[NOW, row, NORMAL_Y] * (v[kind, a, first + 1] - v[kind, b, first + 1])
-    change += g[NOW, row, VERTEX_ARM_N] * v[kind, a, first + 2]
-    return change - g[NOW, row, EDGE_ARM_N] * v[kind, b, first + 2]
+    change = g[at.NOW, row, at.NORMAL_X] * (v[kind, a, first] - v[kind, b, first])
+    change += g[at.NOW, row, at.NORMAL_Y] * (v[kind, a, first + 1] - v[kind, b, first + 1])
+    change += g[at.NOW, row, at.VERTEX_ARM_N] * v[kind, a, first + 2]
+    return change - g[at.NOW, row, at.EDGE_ARM_N] * v[kind, b, first + 2]
 
 
 def normal_rate(work, state, row):
     """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g, motion = work.geometry, work.motion
-    rate = g[state, row, NORMAL_X] * (motion[state, a, VX] - motion[state, b, VX])
-    rate += g[state, row, NORMAL_Y] * (motion[state, a, VY] - motion[state, b, VY])
+    rate = g[state, row, at.NORMAL_X] * (motion[state, a, at.VX] - motion[state, b, at.VX])
+    rate += g[state, row, at.NORMAL_Y] * (motion[state, a, at.VY] - motion[state, b, at.VY])
     return (
         rate
-        + motion[state, a, SPIN] * g[state, row, VERTEX_ARM_N]
-        - motion[state, b, SPIN] * g[state, row, EDGE_ARM_N]
+        + motion[state, a, at.SPIN] * g[state, row, at.VERTEX_ARM_N]
+        - motion[state, b, at.SPIN] * g[state, row, at.EDGE_ARM_N]
     )
 
 
 def tangential_rate(work, state, row):
     """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g, motion = work.geometry, work.motion
-    rate = g[state, row, NORMAL_X] * (motion[state, a, VY] - motion[state, b, VY])
-    rate -= g[state, row, NORMAL_Y] * (motion[state, a, VX] - motion[state, b, VX])
+    rate = g[state, row, at.NORMAL_X] * (motion[state, a, at.VY] - motion[state, b, at.VY])
+    rate -= g[state, row, at.NORMAL_Y] * (motion[state, a, at.VX] - motion[state, b, at.VX])
     return (
         rate
-        + motion[state, a, SPIN] * g[state, row, VERTEX_ARM_T]
-        - motion[state, b, SPIN] * g[state, row, EDGE_ARM_T]
+        + motion[state, a, at.SPIN] * g[state, row, at.VERTEX_ARM_T]
+        - motion[state, b, at.SPIN] * g[state, row, at.EDGE_ARM_T]
     )
 
 
 def memory_of(work, row):
     """How long a velocity of either body of a pair is remembered [s]."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
-    return max(work.bodies[a, MEMORY], work.bodies[b, MEMORY])
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    return max(work.bodies[a, at.MEMORY], work.bodies[b, at.MEMORY])
 
 
 def contact_view(scene, work, state, row):
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     radius_a, radius_b = row_radii(scene, work, row)
     return ContactView(
-        -work.geometry[state, row, GAP], -normal_rate(work, state, row),
+        -work.geometry[state, row, at.GAP], -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
         radius_a, radius_b,
     )  # fmt: skip
@@ -137,28 +106,28 @@ def pressed_view(view, overlap, overlap_rate):
 @hook
 def inertia(scene, body, axis):
     """Mass [kg], or moment of inertia [kg m²] for axis 2."""
-    return scene.bodies[body, INERTIA] if axis == 2 else scene.bodies[body, MASS]
+    return scene.bodies[body, at.INERTIA] if axis == 2 else scene.bodies[body, at.MASS]
 
 
 def lever(scene, body, axis):
     """How far the outline moves for a unit of a coordinate: 1, or the bounding radius [m/rad]."""
-    return scene.bodies[body, BOUNDING_RADIUS] if axis == 2 else 1.0
+    return scene.bodies[body, at.BOUNDING_RADIUS] if axis == 2 else 1.0
 
 
 def add_force(work, state, body, fx, fy, torque):
-    work.rates[state, body, FX] += fx
-    work.rates[state, body, FY] += fy
-    work.rates[state, body, TORQUE] += torque
+    work.rates[state, body, at.FX] += fx
+    work.rates[state, body, at.FY] += fy
+    work.rates[state, body, at.TORQUE] += torque
 
 
 def push_pair(work, state, row, normal, tangential):
     """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
-    a, b = work.candidates[row, VERTEX_BODY], work.candidates[row, EDGE_BODY]
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     g = work.geometry
-    fx = normal * g[state, row, NORMAL_X] - tangential * g[state, row, NORMAL_Y]
-    fy = normal * g[state, row, NORMAL_Y] + tangential * g[state, row, NORMAL_X]
-    torque_a = normal * g[state, row, VERTEX_ARM_N] + tangential * g[state, row, VERTEX_ARM_T]
-    torque_b = normal * g[state, row, EDGE_ARM_N] + tangential * g[state, row, EDGE_ARM_T]
+    fx = normal * g[state, row, at.NORMAL_X] - tangential * g[state, row, at.NORMAL_Y]
+    fy = normal * g[state, row, at.NORMAL_Y] + tangential * g[state, row, at.NORMAL_X]
+    torque_a = normal * g[state, row, at.VERTEX_ARM_N] + tangential * g[state, row, at.VERTEX_ARM_T]
+    torque_b = normal * g[state, row, at.EDGE_ARM_N] + tangential * g[state, row, at.EDGE_ARM_T]
     add_force(work, state, a, fx, fy, torque_a)
     add_force(work, state, b, -fx, -fy, -torque_b)
 
@@ -175,7 +144,7 @@ def centre_line(scene, work, state, a, b):
 def soft_centre_line(scene, work, state, a, b):
     """The same of d = √(d_c² + ε²), whose gradient (n_x, n_y) fades out towards d_c = 0."""
     dx, dy = separation(scene, work, state, a, b)
-    reach = scene.bodies[a, EQUIVALENT_RADIUS] + scene.bodies[b, EQUIVALENT_RADIUS]
+    reach = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
     softening = CENTRE_SOFTENING * reach
     distance = math.sqrt(dx * dx + dy * dy + softening * softening)
     return dx / distance, dy / distance, distance
@@ -185,7 +154,7 @@ def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
     nx, ny, distance = soft_centre_line(scene, work, state, a, b)
     motion = work.motion
-    rate = nx * (motion[state, a, VX] - motion[state, b, VX])
-    rate += ny * (motion[state, a, VY] - motion[state, b, VY])
-    gap = distance - scene.bodies[a, EQUIVALENT_RADIUS] - scene.bodies[b, EQUIVALENT_RADIUS]
+    rate = nx * (motion[state, a, at.VX] - motion[state, b, at.VX])
+    rate += ny * (motion[state, a, at.VY] - motion[state, b, at.VY])
+    gap = distance - scene.bodies[a, at.EQUIVALENT_RADIUS] - scene.bodies[b, at.EQUIVALENT_RADIUS]
     return pair_view(scene, time, a, b, gap, rate, distance)

@@ -18,16 +18,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    CANDIDATES,
-    EARLIER,
-    LATER,
-    NEW,
-    NOW,
-    PAIRS,
-    with_room,
-    work_of,
-)
+import flocsim.arrays as at
+from flocsim.arrays import with_room, work_of
 from flocsim.bonds.bond import (
     CERTIFICATE,
     NO_BOND,
@@ -61,16 +53,16 @@ any, and the gap of its outlines [m]."""
 def list_pair(scene, work, pair, gap):
     """List and locate the features of one pair, at a gap of the outlines [m], that any force knows;
     False without room."""
-    work.tally[CANDIDATES] = 0
+    work.tally[at.CANDIDATES] = 0
     cut = 0.0
     if scene.surface_reach > 0.0:
         cut = gap_of(scene, measure_of(scene, max(gap, 0.0)) + RANGE)
     if not list_polygons(scene, work, pair, cut):
         return False
-    turn_body(work, NOW, work.pairs[pair, LATER])
-    turn_body(work, NOW, work.pairs[pair, EARLIER])
-    for row in range(work.tally[CANDIDATES]):
-        locate_polygons(scene, work, NOW, row)
+    turn_body(work, at.NOW, work.pairs[pair, at.LATER])
+    turn_body(work, at.NOW, work.pairs[pair, at.EARLIER])
+    for row in range(work.tally[at.CANDIDATES]):
+        locate_polygons(scene, work, at.NOW, row)
     return True
 
 
@@ -82,7 +74,7 @@ def kind_of(scene, work, time, elapsed, bond, load):
     elif is_certain(scene, work, time, bond, load):
         return CERTIFICATE
     i, j = bond.i, bond.j
-    now, before = doublet_pose(scene, work, NOW, i, j), doublet_pose(scene, work, NEW, i, j)
+    now, before = doublet_pose(scene, work, at.NOW, i, j), doublet_pose(scene, work, at.NEW, i, j)
     moved = way_between(scene, i, j, now, before)
     if not moved < STILL * load.drift * elapsed or swings(scene, work, i, j, load):
         return NO_BOND
@@ -94,14 +86,16 @@ def judge_bonds(scene, work, time, elapsed, kicks, loads, kinds):
     """The ``kinds`` of the listed pairs under their ``loads``, see FORCE; False without room for
     their features. ``elapsed``: how long ago places were those in NEW [s], 0 where none is known;
     ``kicks``: k_B T [J]."""
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         if not list_pair(scene, work, pair, loads[pair, GAP]):
             return False
         load = Load(
             loads[pair, FORCE], loads[pair, DRIFT], loads[pair, DRIFT_X], loads[pair, DRIFT_Y],
             loads[pair, LEVER], loads[pair, ALONE], kicks,
         )  # fmt: skip
-        bond = bond_between(scene, work, time, work.pairs[pair, EARLIER], work.pairs[pair, LATER])
+        bond = bond_between(
+            scene, work, time, work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
+        )
         kinds[pair] = kind_of(scene, work, time, elapsed, bond, load)
     return True
 
@@ -163,9 +157,9 @@ class BondGauge:
         since, earlier = (time, motion) if before is None else before
         while True:
             work = self.work
-            work.motion[NOW], work.motion[NEW] = motion, earlier
-            work.pairs[: len(held.pairs), [LATER, EARLIER]] = held.pairs
-            work.tally[PAIRS] = len(held.pairs)
+            work.motion[at.NOW], work.motion[at.NEW] = motion, earlier
+            work.pairs[: len(held.pairs), [at.LATER, at.EARLIER]] = held.pairs
+            work.tally[at.PAIRS] = len(held.pairs)
             if self.judge(self.scene, work, time, time - since, self.kicks, loads, kinds):
                 return Bonds(held.pairs, kinds)
             self.work = with_room(work)

@@ -5,15 +5,8 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from flocsim.arrays import (
-    EARLIER,
-    LATER,
-    NOW,
-    PAIRS,
-    Scene,
-    with_room,
-    work_of,
-)
+import flocsim.arrays as at
+from flocsim.arrays import Scene, with_room, work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.body_pairs import list_near
 from flocsim.geometry.contact.near_pairs import gap_between
@@ -25,16 +18,18 @@ def measure_gaps(scene, work, within):
     without room."""
     if not list_near(scene, work, within):
         return False
-    for pair in range(work.tally[PAIRS]):
-        a, b = work.pairs[pair, LATER], work.pairs[pair, EARLIER]
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         work.budget[pair] = gap_between(scene, work, a, b)
     return True
 
 
 def vectors_between(scene, work, vectors):
     """From the earlier to the later body of every listed pair, by the nearest image [m]."""
-    for pair in range(work.tally[PAIRS]):
-        x, y = separation(scene, work, NOW, work.pairs[pair, LATER], work.pairs[pair, EARLIER])
+    for pair in range(work.tally[at.PAIRS]):
+        x, y = separation(
+            scene, work, at.NOW, work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        )
         vectors[pair, 0], vectors[pair, 1] = x, y
 
 
@@ -67,10 +62,10 @@ class Gauge:
 
     def neighbours(self, position: np.ndarray, within: float = 0.0) -> Neighbours:
         """The pairs nearer than a gap [m] where the bodies are at ``position`` (n, 3)."""
-        self.work.motion[NOW, :, :3] = position
+        self.work.motion[at.NOW, :, :3] = position
         while not self.gaps(self.scene, self.work, within):
             self.work = with_room(self.work)
-        count = int(self.work.tally[PAIRS])
+        count = int(self.work.tally[at.PAIRS])
         vectors = np.zeros((count, 2))
         self.vectors(self.scene, self.work, vectors)
         gaps = self.work.budget[:count]

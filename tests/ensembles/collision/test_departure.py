@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
-from flocsim.arrays import NOW
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.departure import CLEARANCE, can_meet_again, left_over, turn_left
 from flocsim.ensembles.collision.draw import Draw
@@ -60,13 +60,13 @@ class Falling:
 
     def seen(self, x, y, vx=0.0, vy=0.0, spin=0.0, collided=True):
         """What the observer says with the body there, at so much more than its settling speed."""
-        motion = self.work.motion[NOW]
+        motion = self.work.motion[at.NOW]
         motion[0, :] = 0.0
         motion[1, :3] = *(np.array([x, y]) + self.origin), 0.0
         motion[1, 3:] = vx, vy - self.fall, spin
         self.work.budget[:] = -1.0
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, NOW)
+        locate_contacts(self.scene, self.work, at.NOW)
         self.observed[numbers.COLLIDED] = float(collided)
         return watch_pair(self.scene, self.work, self.observed, 0.0)
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon
 
+import flocsim.arrays as at
 from flocsim import SpheroPolygon
-from flocsim.arrays import CODE, NOW, TIME, UNTIL, work_of
+from flocsim.arrays import work_of
 from flocsim.bonds.bond import NO_BOND, REST
 from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision import outcomes, resting
@@ -65,13 +66,13 @@ def go_on(study, condition, vertices, share, replicate, factor=11.0):
     work, observed = encounter.start(orientations(numbers), share), encounter.observed()
     integrator, driver = encounter.system.integrator, study.driver(encounter)
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
-    clock[UNTIL] = factor * row["t_end"]
+    clock[at.UNTIL] = factor * row["t_end"]
     decisions, widest, status = [], -math.inf, Status.STOPPED
     while status == Status.STOPPED:
         # The observer stops the run behind every step once it has decided.
         status = Status(driver(encounter.scene, work, observed, clock, counts, np.zeros((0, 13))))
         if status == Status.STOPPED:
-            decisions.append((int(counts[CODE]), float(clock[TIME])))
+            decisions.append((int(counts[at.CODE]), float(clock[at.TIME])))
             widest = max(widest, least_listed_gap(work))
     last = outline_gap(encounter.scene, work)
     return row, Continued(*decisions[0], widest, last, status)
@@ -258,7 +259,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     contact = sum(shape.radius for shape in encounter.shapes)
 
     def seen(gap, collided):
-        work.motion[NOW, 1, :2] = 0.0, -(contact + gap)
+        work.motion[at.NOW, 1, :2] = 0.0, -(contact + gap)
         observed[numbers.COLLIDED] = collided
         return watch_pair(scene, work, observed, 0.0)
 
@@ -266,7 +267,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     escape = observed[numbers.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
-    work.motion[NOW, 1, 4] = 0.0
+    work.motion[at.NOW, 1, 4] = 0.0
     assert seen(1.01 * escape, 1.0) == 0
 
 
@@ -276,19 +277,19 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     encounter = study.encounter(0, 1, draws(1, 0))
     work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
     spin, reach = 300.0, sum(shape.radius for shape in encounter.shapes) - 1e-12
-    work.motion[NOW] = 0.0
-    work.motion[NOW, :, 5] = spin
-    work.motion[NOW, 1, 1] = -reach
-    work.motion[NOW, 1, 3] = spin * reach
+    work.motion[at.NOW] = 0.0
+    work.motion[at.NOW, :, 5] = spin
+    work.motion[at.NOW, 1, 1] = -reach
+    work.motion[at.NOW, 1, 3] = spin * reach
     scene = encounter.system.scene(jit=False)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     observed[numbers.LOAD] = 1.0  # more than any attraction
     known, later = (scene, work, observed), 2.0 * observed[numbers.REST_TIME]
     resting.start_rest(scene, work, observed, 0.0)
     assert resting.bond_of(*known, later) == NO_BOND
     # Without the swing it does.
-    work.motion[NOW, :, 3:] = 0.0
+    work.motion[at.NOW, :, 3:] = 0.0
     assert resting.bond_of(*known, later) == REST
 
 

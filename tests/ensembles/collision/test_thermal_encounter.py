@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.arrays import NOW
+import flocsim.arrays as at
 from flocsim.forces.thermal import key_of
 from flocsim.run import Run
 from tests.helpers.small_study import small_study
@@ -34,7 +34,7 @@ def end_of(study, replicate, share, until=0.0015):
     run = draw.begin(driver, 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
-    return run.work.motion[NOW].copy()
+    return run.work.motion[at.NOW].copy()
 
 
 def test_a_replicate_has_a_key_of_its_own_at_every_condition(study):
@@ -69,5 +69,5 @@ def test_kicks_move_a_pair_off_its_way(study):
     driver = cold.system.compose(observer=cold.observer, jit=False)
     run = attrs.evolve(draw, encounter=cold).begin(driver, 10**6, 0.0015)
     run.to_end()
-    moved = np.abs(warm[:, :2] - run.work.motion[NOW, :, :2]).max()
+    moved = np.abs(warm[:, :2] - run.work.motion[at.NOW, :, :2]).max()
     assert 1e-10 < moved < 2e-6

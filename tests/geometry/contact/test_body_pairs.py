@@ -3,17 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import (
-    ALL_PAIRS,
-    CANDIDATES,
-    EARLIER,
-    EDGE_BODY,
-    LATER,
-    PAIRS,
-    VERTEX_BODY,
-    work_of,
-)
+from flocsim.arrays import work_of
 from flocsim.forces import CentreForce, Contact
 from flocsim.geometry.contact.candidates import list_candidates, spent, time_within
 from flocsim.integrators.loop.driver import too_deep
@@ -40,25 +32,25 @@ def listed(bodies):
 
 
 @pytest.mark.parametrize("shape", [Sphere(1e-5), SQUARE], ids=["spheres", "polygons"])
-@pytest.mark.parametrize("count", [2, 3, ALL_PAIRS, ALL_PAIRS + 1, 20])
+@pytest.mark.parametrize("count", [2, 3, at.ALL_PAIRS, at.ALL_PAIRS + 1, 20])
 @pytest.mark.parametrize("free", [(), (0,), (1,), (0, 1)])
 def test_pairs_with_a_free_body_are_listed_and_no_others(count, free, shape):
     if shape is SQUARE and count > 3 and free == (0, 1):
-        count = min(count, ALL_PAIRS + 1)
+        count = min(count, at.ALL_PAIRS + 1)
     _, work = listed(crossing(count, free, shape))
-    pairs = work.pairs[: work.tally[PAIRS], [LATER, EARLIER]].tolist()
+    pairs = work.pairs[: work.tally[at.PAIRS], [at.LATER, at.EARLIER]].tolist()
     near = [
         [a, b] for a in range(count) for b in range(a)
-        if (a in free or b in free) and (count <= ALL_PAIRS or 2e-6 * (a - b) < 2e-5)
+        if (a in free or b in free) and (count <= at.ALL_PAIRS or 2e-6 * (a - b) < 2e-5)
     ]  # fmt: skip
     assert [pair for pair in near if pair not in pairs] == []
     assert all(a in free or b in free for a, b in pairs)
-    rows = work.candidates[: work.tally[CANDIDATES], [VERTEX_BODY, EDGE_BODY]].tolist()
+    rows = work.candidates[: work.tally[at.CANDIDATES], [at.VERTEX_BODY, at.EDGE_BODY]].tolist()
     assert all(a in free or b in free for a, b in rows)
     assert bool(rows) == bool(free)
 
 
-@pytest.mark.parametrize("count", [3, ALL_PAIRS + 2])
+@pytest.mark.parametrize("count", [3, at.ALL_PAIRS + 2])
 def test_what_fixed_bodies_do_to_each_other_counts_for_nothing(count):
     """Not for the depth of overlaps, nor for how long a list is good."""
     bodies = crossing(count, (), Sphere(1e-5))
@@ -68,7 +60,7 @@ def test_what_fixed_bodies_do_to_each_other_counts_for_nothing(count):
     assert spent(scene, work, 0) == 0.0
     alone, own = listed([bodies[0], bodies[-1]])
     assert time_within(scene, work, 0.5) >= (
-        0.5 * time_within(alone, own, 0.5) if count <= ALL_PAIRS else 0.0
+        0.5 * time_within(alone, own, 0.5) if count <= at.ALL_PAIRS else 0.0
     )
 
 
@@ -80,7 +72,7 @@ class Push(CentreForce):
         return 1e-12
 
 
-@pytest.mark.parametrize("count", [2, ALL_PAIRS, ALL_PAIRS + 3])
+@pytest.mark.parametrize("count", [2, at.ALL_PAIRS, at.ALL_PAIRS + 3])
 def test_centre_forces_do_not_act_between_fixed_bodies(count):
     """The force on each free body is the sum over the others; a fixed one feels free ones alone."""
     bodies = [

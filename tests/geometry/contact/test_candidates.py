@@ -7,7 +7,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from flocsim.arrays import CANDIDATES, NOW, copy_of, with_capacity, work_of
+import flocsim.arrays as at
+from flocsim.arrays import copy_of, with_capacity, work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import (
     list_ahead,
@@ -38,19 +39,19 @@ def arrays(plain, reach=-1.0, capacity=4096):
 def spend_budget(scene, work, wanted):
     """Move the bodies as wanted (n, 3), scaled so that one pair spends just all of its budget."""
     steps = np.array(wanted)[: 3 * len(scene.bodies)].reshape(-1, 3) * (1e-5, 1e-5, 1.0)
-    start = work.motion[NOW, :, :3].copy()
+    start = work.motion[at.NOW, :, :3].copy()
     within, beyond = 0.0, 2.0
     # What a motion spends is not in proportion to it where bodies turn far: bisect.
     for _ in range(40):
         share = 0.5 * (within + beyond)
-        work.motion[NOW, :, :3] = start + share * steps
-        within, beyond = (share, beyond) if spent(scene, work, NOW) <= 1.0 else (within, share)
-    work.motion[NOW, :, :3] = start + within * steps
+        work.motion[at.NOW, :, :3] = start + share * steps
+        within, beyond = (share, beyond) if spent(scene, work, at.NOW) <= 1.0 else (within, share)
+    work.motion[at.NOW, :, :3] = start + within * steps
 
 
 def pairs_now(plain, work):
     """Every pair of the scene, near or far, where the bodies are now."""
-    places = work.motion[NOW, :, :3].copy()
+    places = work.motion[at.NOW, :, :3].copy()
     return measure(Scene(plain.bodies, places, plain.velocities), all_pairs(plain.bodies))
 
 
@@ -111,9 +112,9 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     plain = Scene((bar, stub), np.array([[0, 0, 0], [0, 51.5e-6, np.pi / 2]]), np.zeros((2, 3)))
     scene, work = arrays(plain)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
-    assert work.geometry[NOW, : work.tally[CANDIDATES], 2].min() < 0.0
+    assert work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2].min() < 0.0
 
 
 REACHES = [1e-8, 1e-7, 4e-7, 1e-6, 3e-6, 2e-5]
@@ -127,10 +128,10 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
     scene, work = arrays(plain, reach)
     middle = plain.positions[:, :2].mean(axis=0)
     away = plain.positions[:, :2] - middle
-    work.motion[NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
+    work.motion[at.NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
     assert list_candidates(scene, work)
     spend_budget(scene, work, wanted)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     every, listed = pairs_now(plain, work), keys_of(scene, work)
     for two in {frozenset(pair) for pair in every.pair[:, ::2].tolist()}:
         least = min(
@@ -139,7 +140,9 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
             if {pair[0], pair[2]} == two
         )
         known = [
-            work.geometry[NOW, row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two
+            work.geometry[at.NOW, row, 2]
+            for row, key in enumerate(listed)
+            if {key[0], key[2]} == two
         ]
         if least < reach:
             assert min(known, default=np.inf) == pytest.approx(least, rel=1e-9, abs=1e-17)
@@ -179,8 +182,8 @@ def test_displacements_survive_a_list_that_had_to_grow():
     plain = random_scene(next(seed for seed in range(40) if touching(seed) > 6))
     scene, roomy = arrays(plain)
     assert list_candidates(scene, roomy)
-    count = int(roomy.tally[CANDIDATES])
-    roomy.slip[NOW, :count] = 1e-9 * np.arange(1, count + 1)
+    count = int(roomy.tally[at.CANDIDATES])
+    roomy.slip[at.NOW, :count] = 1e-9 * np.arange(1, count + 1)
     tight = cut_to(roomy, count)
     for work in (roomy, tight):
         move_together(plain, work)
@@ -204,12 +207,12 @@ def cut_to(work, capacity):
 def move_together(plain, work):
     """Bring the bodies a little nearer to their middle, so that more pairs come near."""
     away = plain.positions[:, :2] - plain.positions[:, :2].mean(axis=0)
-    work.motion[NOW, :, :2] -= 8e-7 * away / np.hypot(*away.T)[:, None]
+    work.motion[at.NOW, :, :2] -= 8e-7 * away / np.hypot(*away.T)[:, None]
 
 
 def slips_of(scene, work):
     """{pair: displacement} of the listed pairs that have one."""
-    slips = work.slip[NOW, : work.tally[CANDIDATES]].tolist()
+    slips = work.slip[at.NOW, : work.tally[at.CANDIDATES]].tolist()
     return {key: slip for key, slip in zip(keys_of(scene, work), slips, strict=True) if slip}
 
 
@@ -217,7 +220,7 @@ def test_bodies_far_apart_list_nothing_and_may_move_until_they_are_near():
     plain = random_scene(0)
     far = plain.positions + np.arange(len(plain.bodies))[:, None] * (1e-3, 0.0, 0.0)
     scene, work = arrays(Scene(plain.bodies, far, plain.velocities))
-    assert list_candidates(scene, work) and work.tally[CANDIDATES] == 0
+    assert list_candidates(scene, work) and work.tally[at.CANDIDATES] == 0
     assert list_pair(scene, work, 0, 0.0) > 8e-4
 
 
@@ -226,11 +229,11 @@ def test_bodies_far_apart_list_nothing_and_may_move_until_they_are_near():
 def test_lists_are_as_wide_as_the_steps_ahead_need(seed):
     scene, work = arrays(random_scene(seed))
     assert list_candidates(scene, work)
-    rows, narrow = work.tally[CANDIDATES], work.budget.copy()
+    rows, narrow = work.tally[at.CANDIDATES], work.budget.copy()
     assume(rows > 0 and len(narrow) == 1)
     step = time_within(scene, work, 2.0)
     assert list_ahead(scene, work, step)
-    assert work.tally[CANDIDATES] >= rows and (work.budget >= narrow).all()
+    assert work.tally[at.CANDIDATES] >= rows and (work.budget >= narrow).all()
     # Half of what the bodies may move is enough for such a step.
     assert time_within(scene, work, 0.5) >= 0.99 * step
     assert not too_wide(scene, work, step)
@@ -240,7 +243,7 @@ def test_lists_that_are_far_too_wide_are_made_anew():
     scene, work = arrays(random_scene(3))
     assert list_candidates(scene, work)
     assert list_ahead(scene, work, time_within(scene, work, 6.0))
-    assert work.tally[CANDIDATES] > 0 and too_wide(scene, work, 0.0)
+    assert work.tally[at.CANDIDATES] > 0 and too_wide(scene, work, 0.0)
     assert list_candidates(scene, work) and not too_wide(scene, work, 0.0)
 
 
@@ -250,10 +253,10 @@ def test_a_short_motion_spends_no_more_than_the_speeds_tell(seed):
     scene, work = arrays(random_scene(seed))
     assert list_candidates(scene, work)
     time = time_within(scene, work, 1e-4)
-    work.motion[NOW, :, :3] += time * work.motion[NOW, :, 3:]
+    work.motion[at.NOW, :, :3] += time * work.motion[at.NOW, :, 3:]
     pairs = [(a, b) for a in range(len(scene.bodies)) for b in range(a)]
     for pair, budget in zip(pairs, work.budget, strict=True):
-        assert moved(scene, work, NOW, *pair, enough=0.0) <= 1.01e-4 * budget
+        assert moved(scene, work, at.NOW, *pair, enough=0.0) <= 1.01e-4 * budget
 
 
 def test_a_scene_that_turns_as_one_spends_nothing():
@@ -261,9 +264,9 @@ def test_a_scene_that_turns_as_one_spends_nothing():
     scene, work = arrays(plain)
     assert list_candidates(scene, work)
     c, s = np.cos(2.0), np.sin(2.0)
-    work.motion[NOW, :, :2] = work.motion[NOW, :, :2] @ np.array([[c, s], [-s, c]])
-    work.motion[NOW, :, 2] += 2.0
-    assert spent(scene, work, NOW) < 1e-6
-    now = work.motion[NOW]
+    work.motion[at.NOW, :, :2] = work.motion[at.NOW, :, :2] @ np.array([[c, s], [-s, c]])
+    work.motion[at.NOW, :, 2] += 2.0
+    assert spent(scene, work, at.NOW) < 1e-6
+    now = work.motion[at.NOW]
     now[:, 3:] = np.column_stack([-7.0 * now[:, 1], 7.0 * now[:, 0], np.full(len(now), 7.0)])
     assert time_within(scene, work, 1.0) > 1e6

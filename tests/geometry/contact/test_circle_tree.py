@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
-from flocsim.arrays import CANDIDATES, work_of
+from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.circle_tree import (
@@ -105,10 +106,10 @@ def least_of(distances):
 
 def listed(scene, work, cutoff, a=1, b=0):
     """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
-    work.tally[CANDIDATES] = 0
+    work.tally[at.CANDIDATES] = 0
     work.pairs[0, :2] = a, b
     assert compose(list_polygons, {})(scene, work, 0, cutoff)
-    rows = work.candidates[: work.tally[CANDIDATES]]
+    rows = work.candidates[: work.tally[at.CANDIDATES]]
     first = scene.first
     return [
         (int(a), int(b), int(point - first[a]), int(start - first[b]))

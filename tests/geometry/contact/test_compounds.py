@@ -8,18 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import flocsim.arrays as at
 from flocsim import Body, Composite, Fluid, Sphere, SpheroPolygon
-from flocsim.arrays import (
-    CANDIDATES,
-    EDGE_BODY,
-    EDGE_END,
-    EDGE_START,
-    PAIRS,
-    RADIUS,
-    VERTEX,
-    VERTEX_BODY,
-    work_of,
-)
+from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
@@ -82,14 +73,14 @@ DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0
 @given(*DRAWN, st.floats(0.01, 6.0))
 def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    assert work.tally[PAIRS] == 1 and list_compounds(scene, work, 0, cutoff)
-    rows = work.candidates[: work.tally[CANDIDATES]]
-    bodies = [VERTEX_BODY, VERTEX, EDGE_START, EDGE_END]
+    assert work.tally[at.PAIRS] == 1 and list_compounds(scene, work, 0, cutoff)
+    rows = work.candidates[: work.tally[at.CANDIDATES]]
+    bodies = [at.VERTEX_BODY, at.VERTEX, at.EDGE_START, at.EDGE_END]
     first = scene.first
     found = set()
     for of, vertex, start, end in rows[:, bodies].tolist():
         found.add((of == 0, vertex - first[of], start - first[1 - of], end - first[1 - of]))
-    assert np.all(rows[:, EDGE_BODY] == 1 - rows[:, VERTEX_BODY]) and len(found) == len(rows)
+    assert np.all(rows[:, at.EDGE_BODY] == 1 - rows[:, at.VERTEX_BODY]) and len(found) == len(rows)
     gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
     clear = {key for key, gap in gaps.items() if gap < cutoff - 1e-9}
     assert clear <= found <= {key for key, gap in gaps.items() if gap < cutoff + 1e-9}
@@ -99,7 +90,7 @@ def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
 @given(*DRAWN)
 def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    contact = scene.bodies[:, RADIUS].sum()
+    contact = scene.bodies[:, at.RADIUS].sum()
     gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
     both = [(0, 1), (1, 0)]
     for one, other in both:
@@ -120,7 +111,7 @@ def test_the_gap_is_that_of_shapely(a, b, x, y, turn_a, turn_b):
     here = affinity.rotate(drawn(a, 60), turn_a, (0.0, 0.0), use_radians=True)
     apart = shapely.distance(here, there)
     pose = pose_of(scene, work, 1, 0)
-    gap = compounds.swollen_distance(scene, 1, 0, pose) - scene.bodies[:, RADIUS].sum()
+    gap = compounds.swollen_distance(scene, 1, 0, pose) - scene.bodies[:, at.RADIUS].sum()
     if apart > 1e-2:
         assert gap == pytest.approx(apart, abs=2e-3)
 
@@ -177,6 +168,6 @@ def test_contacts_of_parts_are_seen():
 
 def test_a_lone_disk_as_a_part_is_a_disk():
     scene, work = placed(Composite([(Sphere(1.0), (7.0, 3.0))]), Sphere(2.0), 3.5, 0.0, 0.0, 0.0)
-    assert list_compounds(scene, work, 0, 1.0) and work.tally[CANDIDATES] == 1
+    assert list_compounds(scene, work, 0, 1.0) and work.tally[at.CANDIDATES] == 1
     pose = pose_of(scene, work, 1, 0)
     assert compounds.swollen_distance(scene, 1, 0, pose) == pytest.approx(3.5, rel=1e-14)

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flocsim.arrays import BODY_COLUMNS
+import flocsim.arrays as at
 from flocsim.geometry.contact import rotation
 from flocsim.geometry.contact.rotation import cosine_and_sine
 
 
 def new_work():
-    return SimpleNamespace(bodies=np.zeros((2, BODY_COLUMNS)))
+    return SimpleNamespace(bodies=np.zeros((2, at.BODY_COLUMNS)))
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 0.1, 4.0, 1e3, 1e5, 1e7, 1e300])

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import CANDIDATES, CLOSED, NOW, SLIP_RATES, work_of
+from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
@@ -30,34 +31,34 @@ def resting_on(slab_body, body, x, height, speed):
     velocity = np.array([[0.0, 0.0, 0.0], [speed, 0.0, 0.0]])
     work = work_of(scene, position, velocity)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     return scene, work
 
 
 def pull(work):
     """Σ ξ t_x over the closed pairs, as it acts on body 1 [m]."""
     total = 0.0
-    for row in range(work.tally[CANDIDATES]):
+    for row in range(work.tally[at.CANDIDATES]):
         side = 1.0 if work.candidates[row, 0] == 1 else -1.0
-        total -= side * work.slip[NOW, row] * -work.geometry[NOW, row, 1]
+        total -= side * work.slip[at.NOW, row] * -work.geometry[at.NOW, row, 1]
     return total
 
 
 def slide(scene, work, length, passing_on=hand_over, steps=400):
     """Carry body 1 along x, its contacts with it; the pull after every step."""
-    step = length / steps / work.motion[NOW, 1, 3]
+    step = length / steps / work.motion[at.NOW, 1, 3]
     pulls = []
     for _ in range(steps):
         set_modes(scene, work)
-        rate_slips(work, NOW)
-        closed = work.candidates[:, CLOSED] == 1
-        work.slip[NOW, closed] += step * work.slip[SLIP_RATES + NOW, closed]
-        work.motion[NOW, 1, 0] += length / steps
-        locate_contacts(scene, work, NOW)
+        rate_slips(work, at.NOW)
+        closed = work.candidates[:, at.CLOSED] == 1
+        work.slip[at.NOW, closed] += step * work.slip[at.SLIP_RATES + at.NOW, closed]
+        work.motion[at.NOW, 1, 0] += length / steps
+        locate_contacts(scene, work, at.NOW)
         passing_on(scene, work)
-        if spent(scene, work, NOW) > 0.5:
+        if spent(scene, work, at.NOW) > 0.5:
             assert list_candidates(scene, work)
-            locate_contacts(scene, work, NOW)
+            locate_contacts(scene, work, at.NOW)
         pulls.append(pull(work))
     return np.array(pulls)
 
@@ -84,8 +85,8 @@ def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
 
 def forget(scene, work):
     """What no hand-over would do: an opening pair loses its displacement."""
-    opened = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
-    work.slip[NOW, : work.tally[CANDIDATES]][opened] = 0.0
+    opened = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] >= 0.0
+    work.slip[at.NOW, : work.tally[at.CANDIDATES]][opened] = 0.0
 
 
 def test_on_one_undivided_edge_the_pull_is_the_distance():
@@ -97,12 +98,12 @@ def test_the_displacement_vanishes_with_the_last_pair():
     scene, work = ball_on([-10e-6, 12e-6])
     slide(scene, work, 1e-6)
     assert pull(work) != 0.0
-    work.motion[NOW, 1, 1] += 2.0 * OVERLAP
-    locate_contacts(scene, work, NOW)
+    work.motion[at.NOW, 1, 1] += 2.0 * OVERLAP
+    locate_contacts(scene, work, at.NOW)
     hand_over(scene, work)
-    assert not work.slip[NOW].any()
-    work.motion[NOW, 1, 1] -= 2.0 * OVERLAP
-    locate_contacts(scene, work, NOW)
+    assert not work.slip[at.NOW].any()
+    work.motion[at.NOW, 1, 1] -= 2.0 * OVERLAP
+    locate_contacts(scene, work, at.NOW)
     assert pull(work) == 0.0
 
 
@@ -118,15 +119,17 @@ def test_what_one_corner_loses_another_carries_on_and_only_along_its_own_tangent
     scene, work = square_on_slab(0.0)
     slide(scene, work, 1e-7, steps=10)
     before = pull(work)
-    closed = np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0)
+    closed = np.count_nonzero(work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] < 0.0)
     # Turned a little about its centre, the square stands on one corner less.
-    work.motion[NOW, 1, 2] = 0.03
-    locate_contacts(scene, work, NOW)
-    assert 0 < np.count_nonzero(work.geometry[NOW, : work.tally[CANDIDATES], 2] < 0.0) < closed
-    energy = np.sum(work.slip[NOW] ** 2)
+    work.motion[at.NOW, 1, 2] = 0.03
+    locate_contacts(scene, work, at.NOW)
+    assert (
+        0 < np.count_nonzero(work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] < 0.0) < closed
+    )
+    energy = np.sum(work.slip[at.NOW] ** 2)
     hand_over(scene, work)
     # One spring that holds as much as several have the energy of would hold more than they do.
-    assert np.sum(work.slip[NOW] ** 2) == pytest.approx(energy, rel=1e-9)
+    assert np.sum(work.slip[at.NOW] ** 2) == pytest.approx(energy, rel=1e-9)
     assert 0.5 * abs(before) < abs(pull(work)) < abs(before)
 
 
@@ -142,30 +145,30 @@ def test_a_displacement_is_not_handed_on_across_the_bodies():
     lowest = table.placed_vertices()[:, 1].min()
     scene, work = resting_on(slab([-30e-6, 30e-6]), body, 0.0, 2 * RADIUS - OVERLAP - lowest, 1e-3)
     slide(scene, work, 1e-7, steps=10)
-    held = work.slip[NOW].copy()
-    work.motion[NOW, 1, 2] = 0.03
-    locate_contacts(scene, work, NOW)
-    open_now = work.geometry[NOW, : work.tally[CANDIDATES], 2] >= 0.0
+    held = work.slip[at.NOW].copy()
+    work.motion[at.NOW, 1, 2] = 0.03
+    locate_contacts(scene, work, at.NOW)
+    open_now = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] >= 0.0
     assert np.any(held[: len(open_now)][open_now] != 0.0)
     hand_over(scene, work)
     closed = np.flatnonzero(~open_now)
     assert closed.size > 0
-    assert work.slip[NOW, closed] == pytest.approx(held[closed], rel=1e-12)
+    assert work.slip[at.NOW, closed] == pytest.approx(held[closed], rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     rng = np.random.default_rng(seed)
     scene, work = square_on_slab(0.02 * rng.normal())
-    rows = work.tally[CANDIDATES]
-    work.slip[NOW, :rows] = 1e-9 * rng.normal(size=rows)
-    work.motion[NOW, 1, :3] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
-    locate_contacts(scene, work, NOW)
-    energy = np.sum(work.slip[NOW] ** 2)
+    rows = work.tally[at.CANDIDATES]
+    work.slip[at.NOW, :rows] = 1e-9 * rng.normal(size=rows)
+    work.motion[at.NOW, 1, :3] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
+    locate_contacts(scene, work, at.NOW)
+    energy = np.sum(work.slip[at.NOW] ** 2)
     hand_over(scene, work)
-    assert np.sum(work.slip[NOW] ** 2) <= energy * (1.0 + 1e-12)
-    opened = work.geometry[NOW, :rows, 2] >= 0.0
-    assert not work.slip[NOW, :rows][opened].any()
+    assert np.sum(work.slip[at.NOW] ** 2) <= energy * (1.0 + 1e-12)
+    opened = work.geometry[at.NOW, :rows, 2] >= 0.0
+    assert not work.slip[at.NOW, :rows][opened].any()
 
 
 def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
@@ -178,12 +181,12 @@ def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
     ])  # fmt: skip
     work = work_of(scene, position, np.zeros((3, 3)))
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
-    gap = work.geometry[NOW, : work.tally[CANDIDATES], 2]
+    locate_contacts(scene, work, at.NOW)
+    gap = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2]
     opened = int(np.flatnonzero(gap >= 0.0)[0])
-    work.slip[NOW, opened] = 1e-9
+    work.slip[at.NOW, opened] = 1e-9
     hand_over(scene, work)
-    assert not work.slip[NOW].any()
+    assert not work.slip[at.NOW].any()
 
 
 def test_listing_anew_keeps_every_displacement():
@@ -192,5 +195,5 @@ def test_listing_anew_keeps_every_displacement():
     before = pull(work)
     for _ in range(3):
         assert list_candidates(scene, work)
-        locate_contacts(scene, work, NOW)
+        locate_contacts(scene, work, at.NOW)
         assert pull(work) == before

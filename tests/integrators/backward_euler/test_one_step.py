@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere
-from flocsim.arrays import CANDIDATES, GAP, NOW
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators.rhs.error import FREE_SHARE
 from flocsim.swarms.walls import floor
@@ -170,9 +170,9 @@ def energy_of(stage, bodies, contact):
     mass = np.array([[body.mass, body.mass, body.inertia] for body in bodies])
     free = np.array([not body.fixed for body in bodies])
     work = stage.work
-    rows = np.arange(work.tally[CANDIDATES])
-    overlap = np.maximum(-work.geometry[NOW, rows, GAP], 0.0)
-    slip = np.where(overlap > 0.0, work.slip[NOW, rows], 0.0)
+    rows = np.arange(work.tally[at.CANDIDATES])
+    overlap = np.maximum(-work.geometry[at.NOW, rows, at.GAP], 0.0)
+    slip = np.where(overlap > 0.0, work.slip[at.NOW, rows], 0.0)
     springs = contact.k_n * np.sum(overlap**2) + contact.shear * np.sum(slip**2)
     return 0.5 * (np.sum(mass[free] * stage.velocity[free] ** 2) + springs)
 

@@ -7,8 +7,9 @@ import attrs
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere
-from flocsim.arrays import CANDIDATES, NEW, NOW, TRIAL, work_of
+from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -30,10 +31,10 @@ def stepped(bodies, change, velocities):
     start = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, start, velocities[0], capacity=4096)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
-    work.motion[NEW] = np.hstack([start + change, velocities[1]])
-    locate_contacts(scene, work, NEW)
+    work.motion[at.NEW] = np.hstack([start + change, velocities[1]])
+    locate_contacts(scene, work, at.NEW)
     return scene, work
 
 
@@ -52,7 +53,7 @@ def test_a_graze_inside_one_step_is_found(depth, along):
     """Open at both ends of the step, and overlapping by a picometre in between."""
     half = 4.0 * math.sqrt(4.0 * RADIUS * depth) / min(along, 1.0 - along) / 2.0
     scene, work = passing(depth, half, along)
-    assert work.geometry[NOW, 0, 2] > 0.0 < work.geometry[NEW, 0, 2]
+    assert work.geometry[at.NOW, 0, 2] > 0.0 < work.geometry[at.NEW, 0, 2]
     share = first_switch(scene, work, 1.0, RESOLUTION, RESOLUTION)
     assert share < along
     assert -RESOLUTION <= look_at(scene, work, 1.0, share, 0) < 0.0
@@ -94,14 +95,14 @@ def wandering(seed):
 
 def worst_margin(scene, work, shares):
     """The least of all that must not become negative, at every share [m]."""
-    rows = work.tally[CANDIDATES]
-    closed = work.geometry[NOW, :rows, 2] < 0.0
+    rows = work.tally[at.CANDIDATES]
+    closed = work.geometry[at.NOW, :rows, 2] < 0.0
     worst = []
     for share in shares:
         for body in range(len(scene.bodies)):
             interpolate(work, 1.0, share, body)
-        locate_contacts(scene, work, TRIAL)
-        gaps = work.geometry[TRIAL, :rows, 2]
+        locate_contacts(scene, work, at.TRIAL)
+        gaps = work.geometry[at.TRIAL, :rows, 2]
         worst.append(np.where(closed, -gaps, gaps).min(initial=math.inf))
     return np.array(worst)
 

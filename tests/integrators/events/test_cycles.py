@@ -5,25 +5,8 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import (
-    CANDIDATES,
-    CLOSED,
-    CYCLE_AT,
-    CYCLE_AT_BEFORE,
-    CYCLE_BEFORE,
-    CYCLE_GAP,
-    CYCLE_GAP_BEFORE,
-    CYCLE_LAST,
-    CYCLE_MODES,
-    CYCLE_SLIP,
-    CYCLE_SLIP_BEFORE,
-    FLIGHTS,
-    GAP,
-    NOW,
-    TIME,
-    TRIAL,
-)
 from flocsim.forces import Contact, Gravity
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.events import cycles
@@ -57,54 +40,54 @@ def motion_of(turn, fixed=False):
 @pytest.mark.parametrize("turn", [0.0, 0.7, -2.0])
 def test_coordinates_say_where_the_pair_is(turn, fixed):
     scene, work = flagged(doublet(turn, fixed))
-    before = work.motion[NOW].copy()
+    before = work.motion[at.NOW].copy()
     for which in range(cycles.COORDINATES):
-        work.motion[TRIAL, which // 6, which % 6] = cycles.coordinate(scene, work, NOW, which)
-    work.motion[NOW] = 0.0
+        work.motion[at.TRIAL, which // 6, which % 6] = cycles.coordinate(scene, work, at.NOW, which)
+    work.motion[at.NOW] = 0.0
     cycles.place_by(scene, work)
-    assert work.motion[NOW] == pytest.approx(before, rel=1e-12, abs=1e-20)
+    assert work.motion[at.NOW] == pytest.approx(before, rel=1e-12, abs=1e-20)
 
 
 def after_two_cycles(change=0.0):
     """A doublet that turns evenly, at the end of a cycle, and what there was at the ends before;
     ``change``: of the gap in a cycle [m]."""
     scene, work = flagged(doublet(2.0 * TURN))
-    work.motion[CYCLE_LAST], work.motion[CYCLE_BEFORE] = motion_of(TURN), motion_of(0.0)
-    gap = work.geometry[NOW, :, GAP]
-    work.slip[NOW] = work.slip[CYCLE_SLIP] = work.slip[CYCLE_SLIP_BEFORE] = 2e-13
-    work.slip[CYCLE_GAP], work.slip[CYCLE_GAP_BEFORE] = gap - change, gap - 2.0 * change
+    work.motion[at.CYCLE_LAST], work.motion[at.CYCLE_BEFORE] = motion_of(TURN), motion_of(0.0)
+    gap = work.geometry[at.NOW, :, at.GAP]
+    work.slip[at.NOW] = work.slip[at.CYCLE_SLIP] = work.slip[at.CYCLE_SLIP_BEFORE] = 2e-13
+    work.slip[at.CYCLE_GAP], work.slip[at.CYCLE_GAP_BEFORE] = gap - change, gap - 2.0 * change
     clock = Implicit().fresh_clock()
-    clock[TIME], clock[CYCLE_AT], clock[CYCLE_AT_BEFORE] = 2.0 * PERIOD, PERIOD, 0.0
+    clock[at.TIME], clock[at.CYCLE_AT], clock[at.CYCLE_AT_BEFORE] = 2.0 * PERIOD, PERIOD, 0.0
     return scene, work, clock
 
 
 @pytest.mark.parametrize("many", [10.0, 300.0])
 def test_a_doublet_goes_on_turning_as_one(many):
     scene, work, clock = after_two_cycles()
-    gap = work.geometry[NOW, 0, GAP]
+    gap = work.geometry[at.NOW, 0, at.GAP]
     cycles.leave_out(scene, work, clock, many)
     cycles.restore_gaps(work)
-    assert clock[TIME] == pytest.approx((2.0 + many) * PERIOD, rel=1e-12)
+    assert clock[at.TIME] == pytest.approx((2.0 + many) * PERIOD, rel=1e-12)
     exact = motion_of((2.0 + many) * TURN)
     # Its middle goes along a parabola, where it turns: an arc, of which that is the beginning.
     middle = cycles.share_of_second(scene)
-    off = work.motion[NOW, :, :2] - exact[:, :2]
+    off = work.motion[at.NOW, :, :2] - exact[:, :2]
     assert np.abs(off[0] - off[1]).max() < 1e-16
     radius = middle * math.hypot(0.5e-6, 7e-6)
     assert np.abs(off).max() <= radius * (many * TURN) ** 3
-    assert work.geometry[NOW, 0, GAP] == gap
-    assert work.slip[NOW, 0] == 2e-13
+    assert work.geometry[at.NOW, 0, at.GAP] == gap
+    assert work.slip[at.NOW, 0] == 2e-13
 
 
 def test_so_many_cycles_are_left_out_as_leave_their_form():
     """A twentieth of what the gap changes by a fifth in, and none of it where it bends."""
     _, work, _ = after_two_cycles(change=1e-15)
-    closed = [row for row in range(work.tally[CANDIDATES]) if work.candidates[row, CLOSED]]
-    gap = max(abs(work.geometry[NOW, row, GAP]) for row in closed)
+    closed = [row for row in range(work.tally[at.CANDIDATES]) if work.candidates[row, at.CLOSED]]
+    gap = max(abs(work.geometry[at.NOW, row, at.GAP]) for row in closed)
     assert cycles.cycles_of_form(work) == pytest.approx(cycles.FORM * gap / 1e-15, rel=1e-3)
     _, work, _ = after_two_cycles()
     assert cycles.cycles_of_form(work) == cycles.MOST_AT_ONCE
-    work.slip[CYCLE_SLIP] = 1e-13
+    work.slip[at.CYCLE_SLIP] = 1e-13
     assert cycles.cycles_of_form(work) < 1.0
 
 
@@ -112,7 +95,7 @@ def test_a_turn_and_the_end_of_the_run_bound_them():
     scene, work, clock = after_two_cycles()
     many = cycles.cycles_of_motion(scene, work, clock, math.inf)
     assert many * TURN <= cycles.MOST_TURN * (1.0 + 1e-9)
-    until = clock[TIME] + 8.0 * PERIOD
+    until = clock[at.TIME] + 8.0 * PERIOD
     assert cycles.cycles_of_motion(scene, work, clock, until) == pytest.approx(4.0)
 
 
@@ -123,13 +106,13 @@ def test_rounding_is_no_change():
 def test_a_cycle_begins_with_any_switch_and_ends_where_its_modes_are_back():
     scene, work = flagged(doublet())
     clock, counts = Implicit().fresh_clock(), Implicit().fresh_counts(10)
-    work.slip[FLIGHTS] = MANY
+    work.slip[at.FLIGHTS] = MANY
     for touches in (1, 0, 1, 0, 1):
-        work.candidates[0, CLOSED] = touches
-        clock[TIME] += PERIOD
+        work.candidates[0, at.CLOSED] = touches
+        clock[at.TIME] += PERIOD
         cycles.leave_out_cycles(scene, work, clock, counts, math.inf)
-    assert counts[CYCLE_MODES] == cycles.modes_of(work)
-    assert clock[CYCLE_AT] == pytest.approx(5.0 * PERIOD)
+    assert counts[at.CYCLE_MODES] == cycles.modes_of(work)
+    assert clock[at.CYCLE_AT] == pytest.approx(5.0 * PERIOD)
 
 
 def test_no_bounce_is_left_out():

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import CANDIDATES, CLOSED, NEW, NOW, SPIN, VX, VY, Y, work_of
+from flocsim.arrays import work_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -28,13 +29,13 @@ def leaving(contact, rate_before, rate_after, slip=0.0, slip_after=0.0):
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     assert list_candidates(scene, work)
-    for state, rate, slipped in ((NOW, rate_before, slip), (NEW, rate_after, slip_after)):
-        work.motion[state] = work.motion[NOW]
-        work.motion[state, 1, VY] = rate
+    for state, rate, slipped in ((at.NOW, rate_before, slip), (at.NEW, rate_after, slip_after)):
+        work.motion[state] = work.motion[at.NOW]
+        work.motion[state, 1, at.VY] = rate
         locate_contacts(scene, work, state)
         work.slip[state, 0] = slipped
     set_modes(scene, work)
-    assert work.tally[CANDIDATES] == 1 and work.candidates[0, CLOSED] == 1
+    assert work.tally[at.CANDIDATES] == 1 and work.candidates[0, at.CLOSED] == 1
     return scene, work
 
 
@@ -48,7 +49,7 @@ def test_a_step_from_sticking_to_separated_ends_at_its_first_event():
     """Both events change their signs, and their product would not."""
     contact = Contact(k_n=20.0, k_t=2.0, damping_n=1e4, friction=0.3, tension=False)
     scene, work = leaving(contact, 0.0, 1.0, slip=1e-9, slip_after=2e-9)
-    before, after = events(scene, work, NOW), events(scene, work, NEW)
+    before, after = events(scene, work, at.NOW), events(scene, work, at.NEW)
     assert min(before) > 0.0 > max(after)
     share = law_event_share(scene, work, 2.0)
     wanted = min(b / (b - a) for b, a in zip(before, after, strict=True))
@@ -62,7 +63,7 @@ def test_a_step_from_sticking_to_separated_ends_at_its_first_event():
 def test_one_event_is_located(friction, tension, rate, slip, which):
     contact = Contact(k_n=20.0, k_t=2.0, damping_n=1e4, friction=friction, tension=tension)
     scene, work = leaving(contact, 0.0, rate, slip_after=slip)
-    before, after = events(scene, work, NOW)[which], events(scene, work, NEW)[which]
+    before, after = events(scene, work, at.NOW)[which], events(scene, work, at.NEW)[which]
     assert before > 0.0 > after
     assert law_event_share(scene, work, 2.0) == pytest.approx(before / (before - after), rel=1e-3)
 
@@ -85,6 +86,6 @@ def test_a_sliding_sphere_that_is_thrown_off_keeps_the_same_motion_at_any_tolera
     ]
     assert all(end.status.name == "FINISHED" for end in ends)
     apart = np.abs(ends[0].position[-1, 1] - ends[1].position[-1, 1])
-    assert ends[1].position[-1, 1, Y] > 2.0 * RADIUS
+    assert ends[1].position[-1, 1, at.Y] > 2.0 * RADIUS
     assert apart[:2].max() < 1e-9
-    assert ends[1].velocity[-1, 1, SPIN - VX] != 0.0
+    assert ends[1].velocity[-1, 1, at.SPIN - at.VX] != 0.0

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
-from flocsim.arrays import ACROSS, CANDIDATES, CLOSED, GAP, NEW, NOW, TOUCHES
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.events.overtaking import overtakes
@@ -49,14 +49,16 @@ def between(gaps, step, closed=True):
     """Whether a corner overtakes the other one in a step of so many seconds, which takes the gaps
     of both [m] from the first to the second ones."""
     scene, work = flagged(tilted(0.0, 0.0))
-    touching = [row for row in range(work.tally[CANDIDATES]) if work.geometry[NOW, row, GAP] < 0.0]
-    work.geometry[NOW, :, GAP] = work.geometry[NEW, :, GAP] = 1e-6
-    for state, values in zip((NOW, NEW), gaps, strict=True):
+    touching = [
+        row for row in range(work.tally[at.CANDIDATES]) if work.geometry[at.NOW, row, at.GAP] < 0.0
+    ]
+    work.geometry[at.NOW, :, at.GAP] = work.geometry[at.NEW, :, at.GAP] = 1e-6
+    for state, values in zip((at.NOW, at.NEW), gaps, strict=True):
         for row, value in zip((touching[0], touching[-1]), values, strict=True):
-            work.geometry[state, row, GAP] = value
-    assert len(touching) > 1 and (work.candidates[touching, CLOSED] == TOUCHES).all()
+            work.geometry[state, row, at.GAP] = value
+    assert len(touching) > 1 and (work.candidates[touching, at.CLOSED] == at.TOUCHES).all()
     clock = Implicit(1e-9).fresh_clock()
-    clock[ACROSS] = 0.0 if closed else 1.0
+    clock[at.ACROSS] = 0.0 if closed else 1.0
     return overtakes(scene, work, clock, step)
 
 

@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, System
-from flocsim.arrays import KICK_AT, KICK_SPAN, TIME
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
 from flocsim.forces.thermal import key_of
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
@@ -158,12 +158,12 @@ def test_a_new_kick_begins_just_where_the_last_one_ends():
     """Whatever rounding makes of the times: every kick in turn, none twice."""
     system = lone(Overdamped(1e-9), kick=1e-7 / 3.0)
     run = system.begin(1.0, jit=False)
-    run.clock[TIME], seen = 9.87654321, []
+    run.clock[at.TIME], seen = 9.87654321, []
     for _ in range(50):
         renew_kicks(run.scene, run.work, run.clock)
-        seen.append(run.work.bodies[0, KICK_AT])
-        run.clock[TIME] = (
-            run.work.bodies[0, KICK_AT] + run.work.bodies[0, KICK_SPAN]
+        seen.append(run.work.bodies[0, at.KICK_AT])
+        run.clock[at.TIME] = (
+            run.work.bodies[0, at.KICK_AT] + run.work.bodies[0, at.KICK_SPAN]
         ) * system.forces[1].kick
     assert all(after - before == 1.0 for before, after in pairwise(seen))
 
@@ -182,6 +182,6 @@ def test_a_kick_takes_bodies_a_quarter_of_their_gap_at_most(gap, way):
     run = system.begin(1.0, jit=False)
     renew_kicks(run.scene, run.work, run.clock)
     kick, halvings, spread, least = run.scene.kicks
-    found = math.sqrt(spread * run.work.bodies[0, KICK_SPAN] * kick / 2.0**halvings)
+    found = math.sqrt(spread * run.work.bodies[0, at.KICK_SPAN] * kick / 2.0**halvings)
     assert way / math.sqrt(2.0) * 0.99 <= found <= way
     assert found >= least / math.sqrt(2.0)

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import CANDIDATES, CLOSED, MEMORY, NOW, TOUCHES, work_of
+from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.forces import Contact
 from flocsim.geometry.contact.candidates import list_candidates
@@ -31,9 +32,9 @@ def first_step(speed, k_n=20.0, tolerance=1e-9):
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     assert linked[list_candidates](scene, work)
-    linked[locate_contacts](scene, work, NOW)
-    work.bodies[:, MEMORY] = 1e-4
-    work.candidates[: work.tally[CANDIDATES], CLOSED] = TOUCHES
+    linked[locate_contacts](scene, work, at.NOW)
+    work.bodies[:, at.MEMORY] = 1e-4
+    work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] = at.TOUCHES
     return linked[step_behind_touch](scene, work, integrator.fresh_clock())
 
 

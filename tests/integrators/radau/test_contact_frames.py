@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere
-from flocsim.arrays import CHANGE, FRAME_COLUMNS, FRAMES, MASS, work_of
+from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.forces import Contact, VanDerWaals
 from flocsim.integrators import Implicit
@@ -47,9 +48,9 @@ def framed():
     bodies = [Body(SPHERE, (0.0, 0.0), density=2650.0), Body(SPHERE, (1e-5, 0.0), density=1500.0)]
     scene = scene_of(bodies, Fluid(), [])
     work = work_of(scene, np.zeros((2, 3)), np.zeros((2, 3)))
-    turn, frame = 0.3, FRAMES + FRAME_COLUMNS
+    turn, frame = 0.3, at.FRAMES + at.FRAME_COLUMNS
     shifts = 1e-6 * np.random.default_rng(1).normal(size=(2, 2))
-    work.bodies[:, frame : frame + FRAME_COLUMNS] = [
+    work.bodies[:, frame : frame + at.FRAME_COLUMNS] = [
         [np.cos(turn), np.sin(turn), *s] for s in shifts
     ]
     work.cluster[:] = 0
@@ -59,10 +60,10 @@ def framed():
 def test_shifts_change_no_momentum_but_relative_velocities_by_what_spin_makes_of_them():
     scene, work = framed()
     before = np.random.default_rng(2).normal(size=(2, 3))
-    work.motion[CHANGE, :, 3:] = before
+    work.motion[at.CHANGE, :, 3:] = before
     add_shifts(scene, work, 1)
-    change = work.motion[CHANGE, :, 3:] - before
-    masses = scene.bodies[:, MASS]
+    change = work.motion[at.CHANGE, :, 3:] - before
+    masses = scene.bodies[:, at.MASS]
     assert np.abs(masses @ change).max() < 1e-15 * masses.sum()
     shifts = np.array([shift_at(work, body, 1) for body in range(2)])
     expected = before[0, 2] * shifts[0] - before[1, 2] * shifts[1]

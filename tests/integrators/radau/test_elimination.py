@@ -3,16 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import (
-    ACTING,
-    FREE,
-    INERTIA,
-    MASS,
-    NOW,
-    PAIRS,
-    work_of,
-)
+from flocsim.arrays import work_of
 from flocsim.body import Fluid
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
@@ -51,9 +44,9 @@ def packed(count, seed, fixed=()):
         scene, *System(bodies).motion(), capacity=40 * count, blocks=60 * count, pairs=10 * count
     )
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
-    evaluate_states(scene, work, 0.0, 0.0, NOW, NOW + 1)
+    evaluate_states(scene, work, 0.0, 0.0, at.NOW, at.NOW + 1)
     gather_clusters(scene, work)
     assemble_jacobian(scene, work, 0.0, 1e-3)
     return scene, work
@@ -68,15 +61,15 @@ def dense(scene, work, which):
 
     matrix = np.zeros((n, 3, n, 3), dtype=complex)
     for body in range(n):
-        inertia = scene.bodies[body, [MASS, MASS, INERTIA]]
+        inertia = scene.bodies[body, [at.MASS, at.MASS, at.INERTIA]]
         matrix[body, :, body] = block(body) + np.diag(value / STEP * inertia)
-    for pair in range(work.tally[PAIRS]):
+    for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, :2]
         matrix[a, :, b], matrix[b, :, a] = (
             block(lower_block(work, pair)),
             block(upper_block(work, pair)),
         )
-    for body in np.flatnonzero(scene.bodies[:, FREE] == 0.0):
+    for body in np.flatnonzero(scene.bodies[:, at.FREE] == 0.0):
         matrix[body] = 0.0
         matrix[body, :, body] = np.eye(3)
     return matrix.reshape(3 * n, 3 * n)
@@ -92,7 +85,7 @@ def random_loads(scene, rng):
         1e-12,
         1e-17,
     ]
-    return (loads * scene.bodies[:, FREE][None, :, None]).reshape(2, -1)
+    return (loads * scene.bodies[:, at.FREE][None, :, None]).reshape(2, -1)
 
 
 def put_loads(work, loads):
@@ -109,7 +102,7 @@ def put_loads(work, loads):
 @pytest.mark.parametrize("seed", range(3))
 def test_solutions_are_those_of_the_dense_systems(count, fixed, seed):
     scene, work = packed(count, seed, fixed)
-    assert work.pairs[: work.tally[PAIRS], ACTING].sum() > count // 3
+    assert work.pairs[: work.tally[at.PAIRS], at.ACTING].sum() > count // 3
     assert factorise_sparse(scene, work, STEP, True)
     loads = random_loads(scene, np.random.default_rng(seed))
     put_loads(work, loads)
@@ -137,7 +130,7 @@ def test_momentum_is_balanced_to_rounding(seed):
                 own = own_block(work, body)
                 drag = work.jacobian[0, own] + STEP / EIGENVALUES[0] * work.jacobian[1, own]
                 x = work.loads[0, 3 * body : 3 * body + 3]
-                mass = EIGENVALUES[0] / STEP * scene.bodies[body, MASS]
+                mass = EIGENVALUES[0] / STEP * scene.bodies[body, at.MASS]
                 terms += [mass * x[axis], drag[axis] @ x, -loads[0, 3 * body + axis]]
             assert abs(sum(terms)) < 1e-13 * max(np.abs(terms))
 
@@ -149,7 +142,7 @@ def test_a_chain_fills_in_nowhere():
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion(), capacity=2000)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
     gather_clusters(scene, work)
     assemble_jacobian(scene, work, 0.0, 1e-3)
@@ -170,7 +163,7 @@ def test_the_pattern_is_kept_while_the_same_pairs_act():
     assert np.all(work.elimination.graph == -7)
     assert work.elimination.found[PATTERN] == pattern
     # One more pair acts: the bodies are ordered anew.
-    acting = work.pairs[: work.tally[PAIRS], ACTING]
+    acting = work.pairs[: work.tally[at.PAIRS], at.ACTING]
     acting[np.flatnonzero(acting == 0)[0]] = 1
     assert factorise_sparse(scene, work, STEP, True)
     assert not np.all(work.elimination.graph == -7)

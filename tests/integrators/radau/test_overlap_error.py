@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import FIRST_STAGE, GAP, MASS, NOW, STAGED_STEP
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.radau.overlap_error import overlap_error
@@ -22,10 +22,10 @@ def error_of(overlaps, turns):
     run = system.begin(1e-9, jit=False)
     run.to_end()
     work = run.work
-    assert work.geometry[NOW, 0, GAP] < 0.0
-    work.geometry[FIRST_STAGE : FIRST_STAGE + 3, 0, GAP] = -np.asarray(overlaps)
+    assert work.geometry[at.NOW, 0, at.GAP] < 0.0
+    work.geometry[at.FIRST_STAGE : at.FIRST_STAGE + 3, 0, at.GAP] = -np.asarray(overlaps)
     clock = Implicit(1e-9).fresh_clock()
-    clock[STAGED_STEP] = turns / np.sqrt(STIFFNESS / (0.5 * scene.bodies[0, MASS]))
+    clock[at.STAGED_STEP] = turns / np.sqrt(STIFFNESS / (0.5 * scene.bodies[0, at.MASS]))
     return overlap_error(scene, work, clock, 0)
 
 

@@ -3,18 +3,8 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import (
-    CLOCK_SIZE,
-    EVALUATIONS,
-    LOCATED,
-    SEEN_PACE,
-    SEEN_STEP,
-    SOLVES,
-    STAGED_AT,
-    STAGED_STEP,
-    TIME,
-)
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit
 from flocsim.integrators.implicit import is_tried_again
@@ -23,13 +13,13 @@ from flocsim.integrators.radau.stages import DOUBTED_PACE, FIRST_PACE, LEAST_PAC
 
 def seen(pace, step):
     """A clock that has seen a second iteration of this pace in such a step."""
-    clock = np.zeros(CLOCK_SIZE)
-    clock[SEEN_PACE], clock[SEEN_STEP] = pace, step
+    clock = np.zeros(at.CLOCK_SIZE)
+    clock[at.SEEN_PACE], clock[at.SEEN_STEP] = pace, step
     return clock
 
 
 def test_without_experience_a_second_iteration_is_needed():
-    assert expected_pace(np.zeros(CLOCK_SIZE), 1e-6) == FIRST_PACE
+    assert expected_pace(np.zeros(at.CLOCK_SIZE), 1e-6) == FIRST_PACE
 
 
 def test_a_longer_step_is_expected_to_converge_as_its_square():
@@ -49,7 +39,7 @@ def test_constant_forces_take_one_iteration():
     body = Body(Sphere(1e-5), (0.0, 0.0), velocity=(1e-3, 0.0), density=2650.0)
     found = System([body], [Gravity()], Implicit()).begin(1e-3, max_steps=1000, jit=False)
     found.to_end()
-    assert found.work.tally[SOLVES] == found.steps + found.rejected
+    assert found.work.tally[at.SOLVES] == found.steps + found.rejected
 
 
 def test_a_step_that_is_taken_anew_starts_from_what_is_known():
@@ -61,10 +51,10 @@ def test_a_step_that_is_taken_anew_starts_from_what_is_known():
     system = System(bodies, [StokesDrag(), Contact()], Implicit())
     run = system.begin(2e-3, max_steps=1000, jit=False)
     run.to_end()
-    trials = run.steps + run.rejected + run.counts[LOCATED]
-    starts = run.work.tally[EVALUATIONS] - 3 * run.work.tally[SOLVES]
-    assert run.counts[LOCATED] > 0
-    assert starts == trials - run.counts[LOCATED]
+    trials = run.steps + run.rejected + run.counts[at.LOCATED]
+    starts = run.work.tally[at.EVALUATIONS] - 3 * run.work.tally[at.SOLVES]
+    assert run.counts[at.LOCATED] > 0
+    assert starts == trials - run.counts[at.LOCATED]
 
 
 @pytest.mark.parametrize(
@@ -74,6 +64,6 @@ def test_a_step_that_is_taken_anew_starts_from_what_is_known():
 )  # fmt: skip
 def test_surface_forces_and_rejected_steps_start_afresh(staged, began, reach, known):
     scene = System([Body(Sphere(1e-5), density=2650.0)], [Gravity()], Implicit()).scene(jit=False)
-    clock = np.zeros(CLOCK_SIZE)
-    clock[TIME], clock[STAGED_STEP], clock[STAGED_AT] = 0.5, staged, began
+    clock = np.zeros(at.CLOCK_SIZE)
+    clock[at.TIME], clock[at.STAGED_STEP], clock[at.STAGED_AT] = 0.5, staged, began
     assert bool(is_tried_again(scene._replace(surface_reach=reach), clock)) == known

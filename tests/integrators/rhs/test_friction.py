@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import CANDIDATES, CLOSED, NEW, NOW, SLIDING, STIFFNESS, VX, VY, work_of
+from flocsim.arrays import work_of
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -30,13 +31,13 @@ def ball_on_floor(speed, sinking=0.0, law=LAW):
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     return scene, work
 
 
 def row_of(work):
     """The one closed row."""
-    (row,) = np.flatnonzero(work.candidates[: work.tally[CANDIDATES], CLOSED] == 1)
+    (row,) = np.flatnonzero(work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] == 1)
     return int(row)
 
 
@@ -57,12 +58,12 @@ def test_a_contact_slides_where_its_displacement_would_outgrow_its_limit(
     scene, work = ball_on_floor(speed, sinking)
     assert set_modes(scene, work) == OTHER_CONTACTS
     row = row_of(work)
-    work.slip[NOW, row] = share * LIMIT
+    work.slip[at.NOW, row] = share * LIMIT
     set_modes(scene, work)
-    assert work.candidates[row, SLIDING] == (1 if slides else 0)
-    assert work.slip[NOW, row] == pytest.approx(share * LIMIT, rel=1e-9)
+    assert work.candidates[row, at.SLIDING] == (1 if slides else 0)
+    assert work.slip[at.NOW, row] == pytest.approx(share * LIMIT, rel=1e-9)
     assert set_modes(scene, work) == SAME
-    held = slip_in(scene, work, NOW, row, 7.0)
+    held = slip_in(scene, work, at.NOW, row, 7.0)
     assert held == (pytest.approx(LIMIT, rel=1e-9) if slides else 7.0)
 
 
@@ -70,16 +71,16 @@ def test_it_sticks_again_when_it_goes_back_and_an_open_pair_forgets():
     scene, work = ball_on_floor(-1e-3)
     set_modes(scene, work)
     row = row_of(work)
-    work.slip[NOW, row] = LIMIT
-    assert set_modes(scene, work) == OTHER_FRICTION and work.candidates[row, SLIDING] == 1
-    work.motion[NOW, 1, VX] = 1e-3
-    assert set_modes(scene, work) == OTHER_FRICTION and work.candidates[row, SLIDING] == 0
-    work.motion[NOW, 1, VX] = -1e-3
+    work.slip[at.NOW, row] = LIMIT
+    assert set_modes(scene, work) == OTHER_FRICTION and work.candidates[row, at.SLIDING] == 1
+    work.motion[at.NOW, 1, at.VX] = 1e-3
+    assert set_modes(scene, work) == OTHER_FRICTION and work.candidates[row, at.SLIDING] == 0
+    work.motion[at.NOW, 1, at.VX] = -1e-3
     set_modes(scene, work)
-    work.motion[NOW, 1, 1] += 2.0 * OVERLAP
-    locate_contacts(scene, work, NOW)
+    work.motion[at.NOW, 1, 1] += 2.0 * OVERLAP
+    locate_contacts(scene, work, at.NOW)
     assert set_modes(scene, work) == OTHER_CONTACTS
-    assert work.candidates[row, SLIDING] == 0
+    assert work.candidates[row, at.SLIDING] == 0
 
 
 @pytest.mark.parametrize("used", [0.2, 0.7])
@@ -89,10 +90,10 @@ def test_where_in_a_step_a_contact_begins_to_slide(used):
     scene, work = ball_on_floor(-speed)
     set_modes(scene, work)
     row = row_of(work)
-    work.slip[NOW, row] = LIMIT - used * speed * step
-    work.motion[NEW] = work.motion[NOW]
-    locate_contacts(scene, work, NEW)
-    work.slip[NEW, row] = work.slip[NOW, row] + speed * step
+    work.slip[at.NOW, row] = LIMIT - used * speed * step
+    work.motion[at.NEW] = work.motion[at.NOW]
+    locate_contacts(scene, work, at.NEW)
+    work.slip[at.NEW, row] = work.slip[at.NOW, row] + speed * step
     distance, share = beyond(scene, work, row, step)
     assert distance == pytest.approx((1.0 - used) * speed * step, rel=1e-6)
     assert share == pytest.approx(used, rel=1e-6)
@@ -102,11 +103,11 @@ def test_where_in_a_step_a_contact_ceases_to_slide():
     scene, work = ball_on_floor(-0.5)
     set_modes(scene, work)
     row = row_of(work)
-    work.slip[NOW, row] = LIMIT
+    work.slip[at.NOW, row] = LIMIT
     set_modes(scene, work)
-    work.motion[NEW] = work.motion[NOW]
-    work.motion[NEW, 1, VX] = 0.25
-    locate_contacts(scene, work, NEW)
+    work.motion[at.NEW] = work.motion[at.NOW]
+    work.motion[at.NEW, 1, at.VX] = 0.25
+    locate_contacts(scene, work, at.NEW)
     distance, share = beyond(scene, work, row, 1e-6)
     assert share == pytest.approx(2.0 / 3.0, rel=1e-9)
     # What it would have gone back by: the triangle under the velocity.
@@ -118,20 +119,20 @@ def test_stiffness_while_it_slides():
     scene, work = ball_on_floor(-1e-9, law=Contact(k_n=20.0, k_t=2.0, damping_n=1e3, friction=MU))
     set_modes(scene, work)
     row = row_of(work)
-    work.slip[NOW, row] = LIMIT
+    work.slip[at.NOW, row] = LIMIT
     set_modes(scene, work)
-    assert work.candidates[row, SLIDING] == 1
-    locate_and_rate(scene, work, NOW)
+    assert work.candidates[row, at.SLIDING] == 1
+    locate_and_rate(scene, work, at.NOW)
     assemble_jacobian(scene, work, 0.0, 1.0)
-    found = whole_matrix(work, STIFFNESS)[3:5, 3:5]
+    found = whole_matrix(work, at.STIFFNESS)[3:5, 3:5]
 
     def loads(axis, by):
-        work.motion[NOW, 1, axis] += by
-        locate_and_rate(scene, work, NOW)
-        work.slip[NOW, row] = slip_in(scene, work, NOW, row, 0.0)
-        sum_forces(scene, work, 0.0, NOW)
-        work.motion[NOW, 1, axis] -= by
-        return work.rates[NOW, 1, 3:5].copy()
+        work.motion[at.NOW, 1, axis] += by
+        locate_and_rate(scene, work, at.NOW)
+        work.slip[at.NOW, row] = slip_in(scene, work, at.NOW, row, 0.0)
+        sum_forces(scene, work, 0.0, at.NOW)
+        work.motion[at.NOW, 1, axis] -= by
+        return work.rates[at.NOW, 1, 3:5].copy()
 
     columns = [(loads(axis, -1e-12) - loads(axis, 1e-12)) / 2e-12 for axis in range(2)]
     assert found == pytest.approx(np.array(columns).T, abs=1e-3 * 20.0)
@@ -166,4 +167,4 @@ def test_drag_and_friction_together_come_to_rest():
     forces = [Gravity(), StokesDrag(), Contact(friction=MU)]
     run = System([floor, body], forces, Implicit()).run(5e-3, max_steps=5000)
     assert run.status == Status.FINISHED
-    assert np.abs(run.velocity[-1, 1, [0, 1]]).max() < 1e-8 and VY == 4
+    assert np.abs(run.velocity[-1, 1, [0, 1]]).max() < 1e-8 and at.VY == 4

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, forces
-from flocsim.arrays import BOUNDING_RADIUS, CANDIDATES, CLOSED, DAMPING, FIRST_STAGE, NOW, STIFFNESS
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
@@ -32,8 +32,8 @@ ALL = {gap: tuple(name for name in FORCES if not name.endswith(gap)) for gap in 
 
 def forces_in_first(scene, work):
     """Forces in state FIRST_STAGE by the flags that are there."""
-    locate_and_rate(scene, work, FIRST_STAGE)
-    sum_forces(scene, work, 0.0, FIRST_STAGE)
+    locate_and_rate(scene, work, at.FIRST_STAGE)
+    sum_forces(scene, work, 0.0, at.FIRST_STAGE)
 
 
 def derivatives_now(scene, work):
@@ -50,36 +50,38 @@ class Differences:
         self.fast.loads(slips)
         self.scene, self.work = self.fast.scene, self.fast.work
         if not moving:
-            self.work.motion[NOW, :, 3:] = 0.0
+            self.work.motion[at.NOW, :, 3:] = 0.0
         self.evaluate = system.compose(entry=forces_in_first, jit=False)
         self.assemble = system.compose(entry=derivatives_now, jit=False)
 
     @property
     def lever(self):
         """How far the outlines move for a unit of each coordinate (3n,)."""
-        return (self.scene.bodies[:, BOUNDING_RADIUS, None] ** [0, 0, 1]).ravel()
+        return (self.scene.bodies[:, at.BOUNDING_RADIUS, None] ** [0, 0, 1]).ravel()
 
     def carried(self, body, axis):
         """Change of every pair's displacement for a unit of a coordinate."""
         work = self.work
-        kept = work.motion[NOW, :, 3:].copy()
-        work.motion[NOW, :, 3:] = 0.0
-        work.motion[NOW, body, 3 + axis] = 1.0
-        rows = range(work.tally[CANDIDATES])
-        rates = [tangential_rate(work, NOW, row) * work.candidates[row, CLOSED] for row in rows]
-        work.motion[NOW, :, 3:] = kept
+        kept = work.motion[at.NOW, :, 3:].copy()
+        work.motion[at.NOW, :, 3:] = 0.0
+        work.motion[at.NOW, body, 3 + axis] = 1.0
+        rows = range(work.tally[at.CANDIDATES])
+        rates = [
+            tangential_rate(work, at.NOW, row) * work.candidates[row, at.CLOSED] for row in rows
+        ]
+        work.motion[at.NOW, :, 3:] = kept
         return np.array(rates)
 
     def loads(self, body, axis, by):
         """All forces (3n,) with one coordinate (axis 0–2) or velocity (3–5) changed."""
         work = self.work
-        work.motion[FIRST_STAGE] = work.motion[NOW]
-        work.motion[FIRST_STAGE, body, axis] += by
-        work.slip[FIRST_STAGE] = work.slip[NOW]
+        work.motion[at.FIRST_STAGE] = work.motion[at.NOW]
+        work.motion[at.FIRST_STAGE, body, axis] += by
+        work.slip[at.FIRST_STAGE] = work.slip[at.NOW]
         if axis < 3:
-            work.slip[FIRST_STAGE, : work.tally[CANDIDATES]] += by * self.carried(body, axis)
+            work.slip[at.FIRST_STAGE, : work.tally[at.CANDIDATES]] += by * self.carried(body, axis)
         self.evaluate(self.scene, work)
-        return work.rates[FIRST_STAGE, :, 3:].ravel().copy()
+        return work.rates[at.FIRST_STAGE, :, 3:].ravel().copy()
 
     def measured(self, part, size):
         """Minus the derivatives by places (part 0) or velocities (part 3), per metre of outline."""
@@ -101,7 +103,7 @@ class Differences:
 
     def miss(self, which, size):
         """The largest difference, as a share of the largest entry."""
-        found = self.measured(3 if which == DAMPING else 0, size)
+        found = self.measured(3 if which == at.DAMPING else 0, size)
         scale = np.abs(found).max()
         return np.abs(self.assembled(which) - found).max() / scale if scale > 0.0 else 0.0
 
@@ -120,26 +122,26 @@ ARMS = 2e-3
 @pytest.mark.parametrize("seed", SCENES)
 @pytest.mark.parametrize("gap", GAPS)
 def test_stiffness_of_all_forces_together(seed, gap):
-    assert differences(seed, ALL[gap], False).miss(STIFFNESS, 1e-12) < ARMS
+    assert differences(seed, ALL[gap], False).miss(at.STIFFNESS, 1e-12) < ARMS
 
 
 @pytest.mark.parametrize("seed", SCENES)
 @pytest.mark.parametrize("gap", GAPS)
 def test_damping_of_all_forces_together(seed, gap):
-    assert differences(seed, ALL[gap], True).miss(DAMPING, 1e-6) < 1e-5
+    assert differences(seed, ALL[gap], True).miss(at.DAMPING, 1e-6) < 1e-5
 
 
 @pytest.mark.parametrize("seed", SCENES)
 @pytest.mark.parametrize("name", [name for name in FORCES if name != "gravity"])
 def test_stiffness_of_every_force_alone(seed, name):
     allowed = ARMS if name == "contact" else 1e-6
-    assert differences(seed, (name,), False).miss(STIFFNESS, 1e-12) < allowed
+    assert differences(seed, (name,), False).miss(at.STIFFNESS, 1e-12) < allowed
 
 
 @pytest.mark.parametrize("seed", SCENES)
 @pytest.mark.parametrize("name", ["drag", "contact"])
 def test_damping_of_every_force_alone(seed, name):
-    assert differences(seed, (name,), True).miss(DAMPING, 1e-6) < 1e-5
+    assert differences(seed, (name,), True).miss(at.DAMPING, 1e-6) < 1e-5
 
 
 def own_scene():
@@ -151,7 +153,7 @@ def own_scene():
 
 
 @pytest.mark.parametrize(
-    ("which", "moving", "size"), [(STIFFNESS, False, 1e-12), (DAMPING, True, 1e-6)]
+    ("which", "moving", "size"), [(at.STIFFNESS, False, 1e-12), (at.DAMPING, True, 1e-6)]
 )
 def test_forces_of_a_user_are_differenced(which, moving, size):
     assert Differences(own_scene(), moving=moving).miss(which, size) < 2e-3
@@ -161,7 +163,7 @@ def test_damping_of_lubrication_is_that_of_the_gaps_rate():
     left, right = head_on(0.05, -2e-7)
     ragged = Body(star(), (3e-6, 13e-6), 0.4, (0.0, -0.05), 300.0, surface_density=2.0)
     system = PolygonSystem([left, right, ragged], [forces.Lubrication(h_min=3e-7)])
-    assert Differences(system).miss(DAMPING, 1e-6) < 1e-5
+    assert Differences(system).miss(at.DAMPING, 1e-6) < 1e-5
 
 
 def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
@@ -169,7 +171,7 @@ def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
     for seed in SCENES:
         found = differences(seed, ("contact",), True)
         found.assemble(found.scene, found.work)
-        for which in (STIFFNESS, DAMPING):
+        for which in (at.STIFFNESS, at.DAMPING):
             matrix = whole_matrix(found.work, which)
             total = matrix.reshape(-1, 3, matrix.shape[1]).sum(axis=0)[:2]
             scale = np.abs(matrix / found.lever)[np.arange(len(matrix)) % 3 < 2].max()

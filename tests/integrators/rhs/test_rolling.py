@@ -5,15 +5,16 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import CANDIDATES, FIRST_STAGE, GAP, NOW, TURNING, work_of
+from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
 from flocsim.integrators.rhs.views import tangential_rate
 
-LATER = FIRST_STAGE
+LATER = at.FIRST_STAGE
 """The state that places are compared in."""
 
 SQUARE = SpheroPolygon(2e-6 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]]), 5e-7)
@@ -26,7 +27,7 @@ def placed(shapes, places):
     scene = scene_of(bodies, Fluid(), [])
     work = work_of(scene, np.array(places, dtype=float), np.zeros((2, 3)))
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
+    locate_contacts(scene, work, at.NOW)
     return scene, work
 
 
@@ -34,14 +35,14 @@ def gone(scene, work, places):
     """How far every listed pair has rolled when the bodies have got to other places."""
     work.motion[LATER, :, :3] = places
     locate_contacts(scene, work, LATER)
-    rows = range(work.tally[CANDIDATES])
+    rows = range(work.tally[at.CANDIDATES])
     besides = [0.5 * rolled_besides(scene, work, LATER, row) for row in rows]
     return np.array([rolled(scene, work, LATER, row) for row in rows]) + besides
 
 
 def integral(scene, work, path, steps=4000):
     """∫ v_t dt of every listed pair along ``path(share)`` → places (2, 3), from 0 to 1."""
-    total = np.zeros(work.tally[CANDIDATES])
+    total = np.zeros(work.tally[at.CANDIDATES])
     for step in range(steps):
         share = (step + 0.5) / steps
         by = 0.5 / steps
@@ -67,7 +68,7 @@ def test_a_doublet_that_turns_as_one_has_no_displacement(shapes, angle):
 def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.4e-6, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [7e-7, 3.4e-6, 0.0]]))
-    closed = work.geometry[NOW, : len(found), GAP] < 0.0
+    closed = work.geometry[at.NOW, : len(found), at.GAP] < 0.0
     assert closed.sum() == 1
     assert abs(found[closed][0]) == pytest.approx(7e-7, rel=1e-12)
 
@@ -75,7 +76,7 @@ def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
 def test_a_ball_that_rolls_on_an_edge_without_slipping_has_none():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.5e-6 - 1e-12, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [5e-7, 3.5e-6 - 1e-12, -0.5]]))
-    closed = work.geometry[NOW, : len(found), GAP] < 0.0
+    closed = work.geometry[at.NOW, : len(found), at.GAP] < 0.0
     assert abs(found[closed][0]) < 1e-12
 
 
@@ -90,7 +91,7 @@ def test_it_is_the_integral_of_the_tangential_velocity(shapes, seed):
     for _ in range(120):  # up to the touch
         start[1, :2] = far * math.cos(way), far * math.sin(way)
         scene, work = placed(shapes, start)
-        least = work.geometry[NOW, : work.tally[CANDIDATES], GAP].min(initial=1e-7)
+        least = work.geometry[at.NOW, : work.tally[at.CANDIDATES], at.GAP].min(initial=1e-7)
         far -= least + 1e-10
     change = 1e-3 * rng.normal(size=(2, 3)) * [3e-7, 3e-7, 1.0]
 
@@ -101,7 +102,7 @@ def test_it_is_the_integral_of_the_tangential_velocity(shapes, seed):
     expected = integral(scene, work, path, 400)
     found = gone(scene, work, path(1.0))
     g = work.geometry
-    opened = np.abs(g[LATER, : len(found), GAP] - g[NOW, : len(found), GAP])
+    opened = np.abs(g[LATER, : len(found), at.GAP] - g[at.NOW, : len(found), at.GAP])
     allowed = opened * np.abs(change[:, 2]).sum() + 1e-6 * np.abs(expected)
     assert len(found) > 0 and np.all(np.abs(found - expected) < allowed)
 
@@ -121,8 +122,8 @@ def test_it_goes_on_around_a_corner(turn):
     scene, work = placed((SQUARE, Sphere(1e-6)), path(0.0))
     expected = integral(scene, work, path)
     found = gone(scene, work, path(1.0))
-    rows = work.geometry[NOW, : len(found)]
-    closed = (rows[:, GAP] < 0.0) & (rows[:, TURNING] == 0.0)
+    rows = work.geometry[at.NOW, : len(found)]
+    closed = (rows[:, at.GAP] < 0.0) & (rows[:, at.TURNING] == 0.0)
     assert closed.sum() == 1
     assert found[closed][0] == pytest.approx(expected[closed][0], rel=1e-3)
     # Way of the ball's centre, less what its disk rolls off.

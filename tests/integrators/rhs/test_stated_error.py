@@ -4,36 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import (
-    CANDIDATES,
-    CARRIED,
-    CLOSED,
-    DAMPING,
-    DEVIATION,
-    DOUBT_PLACE,
-    DOUBT_SPEED,
-    ERROR,
-    ERROR_PLACE,
-    ERROR_SPEED,
-    FORCING,
-    GRAZES,
-    GRAZING_FORCE,
-    INERTIA,
-    MASS,
-    NOW,
-    OPEN,
-    STAGED_STEP,
-    STATED,
-    STEP_PLACE,
-    SWITCH_PLACE,
-    SWITCH_SPEED,
-    TOUCHES,
-    VERTEX_ARM_N,
-    VERTEX_BODY,
-    VX,
-    work_of,
-)
+from flocsim.arrays import work_of
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -75,7 +48,7 @@ def at_start(forces):
 def stepped(scene, work, step):
     """The clock behind a step of this length [s], whose matrices are factorised."""
     clock = Implicit(1e-9).fresh_clock()
-    clock[STAGED_STEP] = step
+    clock[at.STAGED_STEP] = step
     gather_clusters(scene, work)
     assert factorise_systems(scene, work, step)
     return clock
@@ -85,12 +58,12 @@ def carried(forces, place, speed, until, steps):
     """(x, vx) of an error that starts as such, carried on with no error of the steps' own."""
     scene, work = at_start(forces)
     # No sum stands in the way.
-    work.bodies[0, ERROR_PLACE] = work.bodies[0, ERROR_SPEED] = 1.0
-    work.motion[CARRIED, 0, [0, 3]] = place, speed
+    work.bodies[0, at.ERROR_PLACE] = work.bodies[0, at.ERROR_SPEED] = 1.0
+    work.motion[at.CARRIED, 0, [0, 3]] = place, speed
     clock = stepped(scene, work, until / steps)
     for _ in range(steps):
         carry_error(scene, work, clock, until / steps)
-    return work.motion[CARRIED, 0, [0, 3]]
+    return work.motion[at.CARRIED, 0, [0, 3]]
 
 
 @pytest.mark.parametrize(("steps", "precision"), [(5, 0.1), (50, 2e-3)])
@@ -105,7 +78,7 @@ def test_an_error_goes_on_as_the_motion_does(steps, precision):
 
 def test_drag_uses_up_an_error_of_velocity():
     scene, work = at_start([StokesDrag()])
-    tau = scene.bodies[0, MASS] / work.jacobian[DAMPING, 0, 0, 0]
+    tau = scene.bodies[0, at.MASS] / work.jacobian[at.DAMPING, 0, 0, 0]
     place, speed = carried([StokesDrag()], 0.0, 1e-6, 30.0 * tau, 300)
     assert place == pytest.approx(1e-6 * tau, rel=1e-3)
     assert abs(speed) < 1e-12
@@ -123,9 +96,9 @@ def touching(error, sticks_since):
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, NOW)
-    work.bodies[:, ERROR_PLACE] = work.bodies[:, ERROR_SPEED] = 1.0
-    work.motion[CARRIED, 1, :2] = error
+    locate_contacts(scene, work, at.NOW)
+    work.bodies[:, at.ERROR_PLACE] = work.bodies[:, at.ERROR_SPEED] = 1.0
+    work.motion[at.CARRIED, 1, :2] = error
     if sticks_since:
         forget_offsets(work)
     set_modes(scene, work)
@@ -134,7 +107,7 @@ def touching(error, sticks_since):
         assemble_jacobian(scene, work, 0.0, 1.0)
         clock = stepped(scene, work, 1e-5)
         carry_error(scene, work, clock, 1e-5)
-    return work.motion[CARRIED, 1, :2]
+    return work.motion[at.CARRIED, 1, :2]
 
 
 def test_a_contact_takes_up_what_is_wrong_along_its_normal_but_not_where_it_has_stuck():
@@ -147,9 +120,9 @@ def test_a_contact_takes_up_what_is_wrong_along_its_normal_but_not_where_it_has_
 def test_a_vector_is_kept_within_the_sums():
     """The sums of this body's errors are nought, and so is what is carried on."""
     scene, work = at_start([StokesDrag()])
-    work.motion[CARRIED, 0] = 1e-3
+    work.motion[at.CARRIED, 0] = 1e-3
     assert carry_error(scene, work, stepped(scene, work, 1e-5), 1e-5) == 0.0
-    assert not work.motion[CARRIED].any()
+    assert not work.motion[at.CARRIED].any()
 
 
 def test_shortening_gives_a_cluster_no_momentum():
@@ -162,13 +135,13 @@ def test_shortening_gives_a_cluster_no_momentum():
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     work.cluster[:] = 0
-    masses = scene.bodies[:, MASS]
-    work.motion[CARRIED, :, 0] = work.motion[CARRIED, :, 3] = 1e-9 / masses * masses.min()
-    work.motion[CARRIED, 1] *= -1.0
-    work.bodies[:, ERROR_PLACE] = 1e-12, 1e-10
+    masses = scene.bodies[:, at.MASS]
+    work.motion[at.CARRIED, :, 0] = work.motion[at.CARRIED, :, 3] = 1e-9 / masses * masses.min()
+    work.motion[at.CARRIED, 1] *= -1.0
+    work.bodies[:, at.ERROR_PLACE] = 1e-12, 1e-10
     assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
     for axis in (0, 3):
-        moved = masses * work.motion[CARRIED, :, axis]
+        moved = masses * work.motion[at.CARRIED, :, axis]
         assert moved[0] != 0.0
         assert moved[0] == pytest.approx(-moved[1], rel=1e-12, abs=0.0)
 
@@ -181,11 +154,11 @@ def test_a_body_takes_over_what_others_hand_on_to_it():
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     work.cluster[:] = 0, 0, 2
-    work.motion[CARRIED, :, 0] = 3e-9, 2e-9, 1e-9
-    work.bodies[:, ERROR_PLACE] = 4e-9, 0.0, 5e-10
+    work.motion[at.CARRIED, :, 0] = 3e-9, 2e-9, 1e-9
+    work.bodies[:, at.ERROR_PLACE] = 4e-9, 0.0, 5e-10
     assert stated_error.bound_carried(scene, work) == pytest.approx(3e-9)
-    assert work.motion[CARRIED, :, 0] == pytest.approx([3e-9, 2e-9, 5e-10])
-    assert work.bodies[:, ERROR_PLACE] == pytest.approx([4e-9, 2e-9, 5e-10])
+    assert work.motion[at.CARRIED, :, 0] == pytest.approx([3e-9, 2e-9, 5e-10])
+    assert work.bodies[:, at.ERROR_PLACE] == pytest.approx([4e-9, 2e-9, 5e-10])
 
 
 def test_a_doubt_counts_for_its_own_body_alone():
@@ -194,18 +167,20 @@ def test_a_doubt_counts_for_its_own_body_alone():
     scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
     clock = Implicit(1e-9).fresh_clock()
     stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
-    assert not work.bodies[:, [SWITCH_SPEED, DOUBT_SPEED]].any()
-    work.motion[DEVIATION, 0, 0] = 1e-12
+    assert not work.bodies[:, [at.SWITCH_SPEED, at.DOUBT_SPEED]].any()
+    work.motion[at.DEVIATION, 0, 0] = 1e-12
     stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
-    assert not work.bodies[:, SWITCH_SPEED].any() and (work.bodies[:, DOUBT_SPEED] > 0.0).all()
-    work.candidates[0, CLOSED] = OPEN
-    work.motion[NOW, 0, VX] = 1e-6
+    assert (
+        not work.bodies[:, at.SWITCH_SPEED].any() and (work.bodies[:, at.DOUBT_SPEED] > 0.0).all()
+    )
+    work.candidates[0, at.CLOSED] = at.OPEN
+    work.motion[at.NOW, 0, at.VX] = 1e-6
     stated_error.add_switch_errors(scene, work, clock, 1e-4, 1e-12)
-    assert (work.bodies[:, SWITCH_SPEED] > 0.0).all()
-    work.motion[CARRIED] = 0.0
-    work.motion[CARRIED, :, 0] = 1e-9
-    work.bodies[:, DOUBT_PLACE] = 1e-6, 0.0
-    work.bodies[:, ERROR_PLACE] = 0.0, 1e-10
+    assert (work.bodies[:, at.SWITCH_SPEED] > 0.0).all()
+    work.motion[at.CARRIED] = 0.0
+    work.motion[at.CARRIED, :, 0] = 1e-9
+    work.bodies[:, at.DOUBT_PLACE] = 1e-6, 0.0
+    work.bodies[:, at.ERROR_PLACE] = 0.0, 1e-10
     work.cluster[:] = 0
     assert stated_error.bound_carried(scene, work) == pytest.approx(1e-10)
 
@@ -216,13 +191,13 @@ def test_the_load_tells_whether_a_contact_is_there_that_a_long_step_only_holds()
     bodies = [Body(Sphere(5e-6), (x, 0.0), surface_density=2.0) for x in (0.0, 1e-5 - 1e-13)]
     scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
     clock = Implicit(1e-9).fresh_clock()
-    work.motion[DEVIATION, 0, 0] = 1e-12
-    clock[STAGED_STEP] = 1e-2
+    work.motion[at.DEVIATION, 0, 0] = 1e-12
+    clock[at.STAGED_STEP] = 1e-2
     stated_error.add_switch_errors(scene, work, clock, 1e-2, 1e-14)
-    assert not work.bodies[:, DOUBT_SPEED].any()
-    clock[STAGED_STEP] = 1e-6
+    assert not work.bodies[:, at.DOUBT_SPEED].any()
+    clock[at.STAGED_STEP] = 1e-6
     stated_error.add_switch_errors(scene, work, clock, 1e-6, 1e-14)
-    assert (work.bodies[:, DOUBT_SPEED] > 0.0).all()
+    assert (work.bodies[:, at.DOUBT_SPEED] > 0.0).all()
 
 
 def corner_on_slab(force):
@@ -235,9 +210,9 @@ def corner_on_slab(force):
         Body(rod, (0.0, 6e-6 - 1e-12), surface_density=2.0),
     ]
     scene, work = flagged(System(bodies, [Contact(), StokesDrag()]))
-    (row,) = np.flatnonzero(work.candidates[: work.tally[CANDIDATES], CLOSED] == TOUCHES)
-    assert work.candidates[row, VERTEX_BODY] == 1
-    work.slip[NOW, row] = -force / 2.0  # k_t is 2 N/m
+    (row,) = np.flatnonzero(work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] == at.TOUCHES)
+    assert work.candidates[row, at.VERTEX_BODY] == 1
+    work.slip[at.NOW, row] = -force / 2.0  # k_t is 2 N/m
     return scene, work, row
 
 
@@ -246,28 +221,28 @@ def test_what_a_pair_that_grazes_has_lost_counts_as_an_error():
     force, step = 1e-11, 1e-4
     scene, work, row = corner_on_slab(force)
     clock = Implicit(1e-9).fresh_clock()
-    work.candidates[row, CLOSED] = GRAZES
-    work.slip[GRAZING_FORCE, row] = force
+    work.candidates[row, at.CLOSED] = at.GRAZES
+    work.slip[at.GRAZING_FORCE, row] = force
     stated_error.add_switch_errors(scene, work, clock, step, 1e-12)
-    least = force * step / scene.bodies[1, MASS]
-    assert least < work.bodies[1, SWITCH_SPEED] < 40.0 * least
+    least = force * step / scene.bodies[1, at.MASS]
+    assert least < work.bodies[1, at.SWITCH_SPEED] < 40.0 * least
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_grazing_force_that_may_be_lost_moves_the_error_along_the_gap_and_enlarges_it(side):
     force = 1e-11
     scene, work, row = corner_on_slab(force)
-    work.candidates[row, CLOSED] = GRAZES
-    work.slip[GRAZING_FORCE, row] = force
-    work.motion[CARRIED, 1, VX] = side * 1e-6
+    work.candidates[row, at.CLOSED] = at.GRAZES
+    work.slip[at.GRAZING_FORCE, row] = force
+    work.motion[at.CARRIED, 1, at.VX] = side * 1e-6
     assemble_jacobian(scene, work, 0.0, 1.0)
-    pushed = work.motion[FORCING, 1, 3:]
+    pushed = work.motion[at.FORCING, 1, 3:]
     assert pushed[0] * side > 0.0
     assert abs(pushed[0]) == pytest.approx(stated_error.OF_BOUNDS * force, rel=1e-6)
     # What presses instead of it keeps the gap as it is.
-    arm = work.geometry[NOW, row, VERTEX_ARM_N]
-    opening = pushed[1] / scene.bodies[1, MASS] + arm * pushed[2] / scene.bodies[1, INERTIA]
-    assert abs(opening) < 1e-6 * abs(pushed[0]) / scene.bodies[1, MASS]
+    arm = work.geometry[at.NOW, row, at.VERTEX_ARM_N]
+    opening = pushed[1] / scene.bodies[1, at.MASS] + arm * pushed[2] / scene.bodies[1, at.INERTIA]
+    assert abs(opening) < 1e-6 * abs(pushed[0]) / scene.bodies[1, at.MASS]
 
 
 def test_every_body_states_an_error_of_its_own(monkeypatch):
@@ -279,14 +254,14 @@ def test_every_body_states_an_error_of_its_own(monkeypatch):
     work = work_of(scene, *system.motion())
     assemble_jacobian(scene, work, 0.0, 1.0)
     clock = stepped(scene, work, 1e-9)
-    work.bodies[:, ERROR_PLACE] = 1e-8, 1e-8, 2e-6
-    work.bodies[:, STEP_PLACE] = 1e-30
-    work.motion[CARRIED, :, 0] = 1e-9, 1e-9, 3e-7
+    work.bodies[:, at.ERROR_PLACE] = 1e-8, 1e-8, 2e-6
+    work.bodies[:, at.STEP_PLACE] = 1e-30
+    work.motion[at.CARRIED, :, 0] = 1e-9, 1e-9, 3e-7
     stated_error.carry_errors(scene, work, clock, 1e-9)
     own = stated_error.OF_VECTOR * 1e-9
     sums = Implicit.estimate_share * 2e-6
-    assert work.bodies[:, STATED] == pytest.approx([own, own, sums])
-    assert clock[ERROR] == work.bodies[:, STATED].max()
+    assert work.bodies[:, at.STATED] == pytest.approx([own, own, sums])
+    assert clock[at.ERROR] == work.bodies[:, at.STATED].max()
 
 
 def head_on(damping):
@@ -321,7 +296,7 @@ def test_what_a_contact_takes_up_is_no_longer_stated():
     run.to_end()
     exact = attrs.evolve(system, integrator=Implicit(1e-13)).run(2e-4, jit=False)
     states = run.work.bodies
-    sums = system.integrator.estimate_share * states[:, ERROR_PLACE]
-    sums += stated_error.OF_SWITCHES * states[:, SWITCH_PLACE]
+    sums = system.integrator.estimate_share * states[:, at.ERROR_PLACE]
+    sums += stated_error.OF_SWITCHES * states[:, at.SWITCH_PLACE]
     true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
     assert true <= run.error < 0.1 * sums.max()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
-from flocsim.arrays import CANDIDATES, GAP, NEAR, NOW, SHARE
 from flocsim.constants import LARGEST_BIAS
 from flocsim.ensembles.collision.outcomes import outline_gap
 from flocsim.forces import DoubleLayer, VanDerWaals
@@ -41,7 +41,7 @@ class Pair:
         self.scene, self.work = self.fast.scene, self.fast.work
 
     def place(self, x, y, angle):
-        self.work.motion[NOW, 1, :3] = x, y, angle
+        self.work.motion[at.NOW, 1, :3] = x, y, angle
 
     def loads(self, x, y, angle):
         """Forces and torques (2, 3) with the second body there."""
@@ -62,16 +62,16 @@ class Pair:
 
     def gaps(self):
         """(g̃, gaps of all pairs that have a share) where the forces were last asked for."""
-        end = int(self.work.tally[CANDIDATES])
-        near = self.work.candidates[:end, NEAR] == 1
-        return soften(self.scene, self.work, NOW, 0, end)[0], self.work.geometry[NOW, :end, GAP][
-            near
-        ]
+        end = int(self.work.tally[at.CANDIDATES])
+        near = self.work.candidates[:end, at.NEAR] == 1
+        return soften(self.scene, self.work, at.NOW, 0, end)[0], self.work.geometry[
+            at.NOW, :end, at.GAP
+        ][near]
 
     def closest(self):
         """Vertex and edge that have the largest share in g̃."""
-        end = int(self.work.tally[CANDIDATES])
-        row = np.argmax(self.work.geometry[NOW, :end, SHARE])
+        end = int(self.work.tally[at.CANDIDATES])
+        row = np.argmax(self.work.geometry[at.NOW, :end, at.SHARE])
         return tuple(self.work.candidates[row, :4])
 
     def strength(self, gap):
@@ -113,10 +113,13 @@ def test_what_is_flagged_far_off_has_no_share_and_changes_none():
     far = 0
     for pair, place in random_pairs(ATTRACTION, 10):
         pair.loads(*place)
-        end = int(pair.work.tally[CANDIDATES])
-        pair.work.candidates[:end, NEAR] = 1
-        soft, _ = soften(pair.scene, pair.work, NOW, 0, end)
-        gaps, shares = pair.work.geometry[NOW, :end, GAP], pair.work.geometry[NOW, :end, SHARE]
+        end = int(pair.work.tally[at.CANDIDATES])
+        pair.work.candidates[:end, at.NEAR] = 1
+        soft, _ = soften(pair.scene, pair.work, at.NOW, 0, end)
+        gaps, shares = (
+            pair.work.geometry[at.NOW, :end, at.GAP],
+            pair.work.geometry[at.NOW, :end, at.SHARE],
+        )
         measures = np.array([measure_of(pair.scene, gap) for gap in gaps])
         parts = np.exp(measures.min() - measures)
         own = np.array([length_at(pair.scene, gap) for gap in gaps])

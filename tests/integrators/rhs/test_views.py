@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, System
-from flocsim.arrays import EQUIVALENT_RADIUS, NOW
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.forces import VanDerWaals
 from flocsim.integrators.rhs import views
@@ -26,12 +26,12 @@ def fast():
 
 def softening(scene):
     """ε [m] of the two bodies."""
-    return CENTRE_SOFTENING * sum(scene.bodies[:, EQUIVALENT_RADIUS])
+    return CENTRE_SOFTENING * sum(scene.bodies[:, at.EQUIVALENT_RADIUS])
 
 
 def attraction(fast, x, y):
     """Force (2,) on the second body with its centroid there."""
-    fast.work.motion[NOW, 1, :2] = x, y
+    fast.work.motion[at.NOW, 1, :2] = x, y
     return fast.loads()[1, :2]
 
 
@@ -61,9 +61,9 @@ def test_the_pull_between_centres_is_the_same_from_all_sides_and_continuous(fast
 
 
 def test_elsewhere_the_soft_line_of_centres_is_the_line_of_centres(fast):
-    reach = sum(fast.scene.bodies[:, EQUIVALENT_RADIUS])
-    fast.work.motion[NOW, 1, :2] = 0.6 * reach, -0.8 * reach
-    nx, ny, distance = soft_centre_line(fast.scene, fast.work, NOW, 1, 0)
+    reach = sum(fast.scene.bodies[:, at.EQUIVALENT_RADIUS])
+    fast.work.motion[at.NOW, 1, :2] = 0.6 * reach, -0.8 * reach
+    nx, ny, distance = soft_centre_line(fast.scene, fast.work, at.NOW, 1, 0)
     assert (nx, ny) == pytest.approx((0.6, -0.8), rel=1e-8)
     assert distance == pytest.approx(reach, rel=1e-8)
 

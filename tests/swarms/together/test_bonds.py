@@ -6,8 +6,9 @@ import types
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, Swarm
-from flocsim.arrays import NOW, work_of
+from flocsim.arrays import work_of
 from flocsim.bonds.bond import CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.bonds.certificate import CALM
 from flocsim.bonds.rest import REST_TURNS
@@ -239,7 +240,7 @@ def test_two_bodies_are_judged_as_a_pair_of_a_study_is(tmp_path, gap, ends):
             motion[1, 3:5] = (0.0, 0.5, 0.9, 1.1)[case % 4] * calm * rng.choice([-0.7, 0.7], 2)
             work, observed = work_of(scene, places, motion[:, 3:]), encounter.observed()
             assert list_candidates(scene, work)
-            locate_contacts(scene, work, NOW)
+            locate_contacts(scene, work, at.NOW)
             set_modes(scene, work)
             start_rest(scene, work, observed, 0.0)
             time = 1.1 * observed[REST_TIME]

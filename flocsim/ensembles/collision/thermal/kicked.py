@@ -18,15 +18,7 @@ What is none of these goes on until it is, or is undecided at the end.
 
 import math
 
-from flocsim.arrays import (
-    BOUNDING_RADIUS,
-    MASS,
-    NOW,
-    VX,
-    VY,
-    X,
-    Y,
-)
+import flocsim.arrays as at
 from flocsim.bonds.bond import NO_BOND, are_spheres, bond_between, radii_of
 from flocsim.ensembles.collision.observed import (
     BODY_I,
@@ -60,8 +52,14 @@ def drift_from(scene, work, observed, outer):
     """(how far j is beyond i along the drift [m], the least drift at half of what is more than
     ``outer`` of that [m/s], the speed of j besides the drift)."""
     v = work.motion
-    x, y = v[NOW, BODY_J, X] - v[NOW, BODY_I, X], v[NOW, BODY_J, Y] - v[NOW, BODY_I, Y]
-    ux, uy = v[NOW, BODY_J, VX] - v[NOW, BODY_I, VX], v[NOW, BODY_J, VY] - v[NOW, BODY_I, VY]
+    x, y = (
+        v[at.NOW, BODY_J, at.X] - v[at.NOW, BODY_I, at.X],
+        v[at.NOW, BODY_J, at.Y] - v[at.NOW, BODY_I, at.Y],
+    )
+    ux, uy = (
+        v[at.NOW, BODY_J, at.VX] - v[at.NOW, BODY_I, at.VX],
+        v[at.NOW, BODY_J, at.VY] - v[at.NOW, BODY_I, at.VY],
+    )
     if observed[IN_FLOW] != 0.0:
         # An extension draws out along x.
         ux -= observed[FLOW_XX] * x + observed[FLOW_XY] * y
@@ -74,7 +72,7 @@ def drift_from(scene, work, observed, outer):
 
 def return_bound(scene, work, observed, time):
     """A bound of the probability that the two ever come back against the drift."""
-    outer = scene.bodies[BODY_I, BOUNDING_RADIUS] + scene.bodies[BODY_J, BOUNDING_RADIUS]
+    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
     along, drift, besides = drift_from(scene, work, observed, outer)
     if along - outer <= observed[ESCAPE]:
         return 1.0
@@ -82,8 +80,8 @@ def return_bound(scene, work, observed, time):
     mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
     drift += mobility * min(repulsion_at(scene, time, BODY_J, BODY_I, outer + half, half), 0.0)
     relaxation = max(
-        scene.bodies[BODY_I, MASS] * observed[MOBILITY_I],
-        scene.bodies[BODY_J, MASS] * observed[MOBILITY_J],
+        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
+        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
     )
     way = half - relaxation * besides
     if drift <= 0.0 or way <= 0.0:
