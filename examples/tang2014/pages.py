@@ -94,7 +94,10 @@ def write_probabilities(path, study, changes):
 def hold_readings(readings):
     """{name: (Results, Findings of the claims about collisions)}."""
     results = {name: read_results(file) for name, file in readings.items()}
-    return {name: (each, check_claims(each)[len(FIT_CLAIMS) :]) for name, each in results.items()}
+    return {
+        name: (each, [found for found in check_claims(each) if found.number not in FIT_CLAIMS])
+        for name, each in results.items()
+    }
 
 
 def write_readings(path, held):

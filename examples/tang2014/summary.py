@@ -26,7 +26,7 @@ BESIDE = {"pr_inside": "Pr[C inside]", "pr_a_inside": "Pr[A|inside]",
 def write_summary(folder, study, changes, findings, readings, zones):
     """Write the page: each part stands between marks, as in docs/reproduction.md.
 
-    ``findings``: of all claims; ``readings``: {name: (Results, Findings of claims 6 to 18)};
+    ``findings``: of all claims; ``readings``: {name: (Results, Findings about collisions)};
     ``zones``: {type: D_0 [m]}.
     """
     parts = {

@@ -2,6 +2,7 @@
 
 import attrs
 import numpy as np
+from scipy.special import ndtri
 
 from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import Results
@@ -20,7 +21,7 @@ def fall(first, with_vertices, with_delta):
 
 def paper_outcomes():
     """Outcomes and sides on (type, vertices, delta, replicate), from the same random numbers."""
-    inside = [fall(0.55, 0.08, 0.06), fall(0.95, 0.06, 0.06), fall(1.0, 0.0, 0.0)]
+    inside = [fall(0.55, 0.08, 0.06), fall(0.95, 0.06, 0.04), fall(1.0, 0.0, 0.0)]
     bound_inside = [fall(0.80, 0.08, 0.06), fall(0.98, 0.06, 0.05), fall(0.85, 0.08, 0.06)]
     bound_outside = [fall(0.45, 0.08, 0.10), fall(0.45, 0.08, 0.10), fall(0.0, 0.0, 0.0)]
     bound_outside[0][:, -1] = 0.0
@@ -54,14 +55,26 @@ def blank_replicates(shape):
     return blank | {name: np.full(shape, 255, "u1") for name in again}
 
 
+FIT_VERTICES = (4, 16, 28, 64)
+SMALL_ERRORS = {4: 14.0, 16: 5.0, 28: 2.0, 64: 2.6}
+"""RE of small flocs at r = 1, least at N = 28; at larger r it hardly hangs on N."""
+
+
 def paper_fits(radii=(1.0, 2.0, 4.0), scale=1.0, sphere=38.0):
-    """Entries of twelve flocs, half of them small; RE falls with N and rises with r."""
+    """Entries of sixty flocs of many sizes; RE of large ones falls with N, all rise with r."""
     entries = []
+    places = (np.arange(60) + 0.5) / 60.0
+    sizes = 5.0 * np.exp(0.8 * ndtri(places))
     for radius in radii:
-        for floc in range(12):
-            size = 4.0 if floc % 2 else 16.0
-            errors = {n: scale * radius * (20.0 + floc) / n / 2.0 for n in VERTICES if n > 1}
-            errors[1] = sphere + floc % 3
+        for floc, size in enumerate(sizes):
+            few = floc % 6
+            if size > 5.0:
+                errors = {n: radius * (20.0 + few) / n / 2.0 for n in FIT_VERTICES}
+            elif radius > min(radii):
+                errors = {n: 10.0 * radius + few + 0.1 * k for k, n in enumerate(FIT_VERTICES)}
+            else:
+                errors = {n: SMALL_ERRORS[n] + 0.1 * few for n in FIT_VERTICES}
+            errors = {n: scale * re for n, re in errors.items()} | {1: sphere + floc % 3}
             fits = {n: StoredFit(np.zeros((n, 2)), 1e-6, re) for n, re in errors.items()}
             entries.append(ShapeEntry(f"f#{floc} r={radius}", "f.png", 1e-6, (0.0, 0.0), 100, size,
                                       radius, fits))  # fmt: skip

@@ -15,6 +15,10 @@ FIT_CLAIMS = {
     3: ("RE(r=1) < RE(r=2) < RE(r=4)", fits.radius_error),
     4: ("r_eq > 5 µm: RE falls with N", fits.error_trend),
     5: ("best RE < 1 % (N = 64, r = 1)", fits.best_error),
+    20: ("RE of spheropolygons from 0.5 to 20 %", fits.range_of_errors),
+    21: ("r_eq ≤ 5 µm, r = 1: RE least at N = 28", fits.least_error_at),
+    22: ("r_eq ≤ 5 µm, r = 2 and 4: RE constant over N", fits.constant_error),
+    25: ("sizes: mean r_eq above the median", fits.sizes),
 }
 """Number → (words, function of a shape library's entries that yields Parts)."""
 
@@ -32,6 +36,9 @@ COLLISION_CLAIMS = {
     16: ("Pr[A|outside] < Pr[A|inside]", soft.outside_below_inside),
     17: ("Type I: D ≈ 50 %, rising with N", soft.half_depart),
     18: ("Type II: A most frequent, falling with N", soft.most_frequent),
+    19: ("Pr[A] at δ = 0 falls asymptotically with N, further at δ > 0", soft.asymptotic),
+    23: ("Pr[C inside] of Type I depends most on δ", soft.most_sensitive),
+    24: ("Pr[A|outside] of I and II alike", soft.alike_outside),
 }
 """Number → (words, function of Results and their Counts that yields Parts)."""
 
@@ -45,9 +52,9 @@ def check_claims(results=None, entries=None):
     fitted = (entries,) if entries else None
     enough = results is not None and results.count >= FEWEST
     collided = (results, counts_of(results)) if enough else None
-    return [check(number, *claim, fitted) for number, claim in FIT_CLAIMS.items()] + [
-        check(number, *claim, collided) for number, claim in COLLISION_CLAIMS.items()
-    ]
+    found = [check(number, *claim, fitted) for number, claim in FIT_CLAIMS.items()]
+    found += [check(number, *claim, collided) for number, claim in COLLISION_CLAIMS.items()]
+    return sorted(found, key=lambda finding: finding.number)
 
 
 def check(number, claim, parts_of, data):

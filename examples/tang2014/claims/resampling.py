@@ -61,6 +61,11 @@ class Counts:
         return ratio(self.classes[2], self.classes[2] + self.classes[3])
 
     @property
+    def pr_a(self):
+        """Pr[A] over decided collisions."""
+        return ratio(self.classes[0] + self.classes[2], self.classes.sum(axis=0))
+
+    @property
     def pr_class(self):
         """Pr[class], the class as the first axis, over decided collisions."""
         return ratio(self.classes, self.classes.sum(axis=0))

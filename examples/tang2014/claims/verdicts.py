@@ -98,3 +98,18 @@ def occurs(what, count, trials):
     value, low, high = (float(each) for each in proportion(count, trials))
     verdict = FAILS if high < RARE else UNDECIDED
     return Part(what, value, low, high, HOLDS if count else verdict, f"{count} of {trials}")
+
+
+def everywhere(what, parts):
+    """Whether a claim of single conditions, Parts by their names, is right in all of them.
+
+    It fails where it fails in any, and holds where it holds in all.
+    """
+    verdicts = [part.verdict for part in parts.values()]
+    counts = {verdict: verdicts.count(verdict) for verdict in (HOLDS, FAILS)}
+    value, low, high = (float(each) for each in proportion(counts[HOLDS], len(verdicts)))
+    verdict = FAILS if counts[FAILS] else HOLDS if counts[HOLDS] == len(verdicts) else UNDECIDED
+    against = [name for name, part in parts.items() if part.verdict == FAILS]
+    shown = f", against: {', '.join(against[:3])}{', …' if len(against) > 3 else ''}"
+    note = f"{counts[HOLDS]} of {len(verdicts)} conditions{shown if against else ''}"
+    return Part(what, value, low, high, verdict, note)
