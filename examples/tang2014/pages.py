@@ -3,6 +3,7 @@
 import numpy as np
 from claims import FIT_CLAIMS, check_claims
 from claims.table import claims_table
+from exceptions import exceptions_figure
 from output import save_all, write_page, write_table
 from summary import write_summary
 
@@ -34,6 +35,8 @@ def write(folder, config, library, readings):
     if entries:
         for name, figure in POPULATION_FIGURES.items():
             write_figure(folder, name, figure(entries))
+        if (figure := exceptions_figure(study, entries)) is not None:
+            write_figure(folder, "exceptions", figure)
     write_probabilities(folder / "probabilities.csv", study, changes)
     held = hold_readings(readings)
     if held:

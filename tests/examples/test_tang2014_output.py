@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from flocsim.io.plots.collision import draw_distance
+from tests.helpers.paper_like import paper_fits, paper_results, relabelled
 
 FOLDER = Path(__file__).parents[2] / "examples" / "tang2014"
 
@@ -60,3 +61,21 @@ def test_a_table_of_something_else_is_not_added_to(example, tmp_path, capsys):
     with pytest.raises(SystemExit) as caught:
         steps.check(path)
     assert caught.value.code == 2 and "is no table of steps" in capsys.readouterr().err
+
+
+def test_the_outlines_of_flocs_that_contradict_are_drawn(example):
+    """One pair of Type III collides outside; its two flocs are shown, and no other."""
+
+    def outside(outcome, inside):
+        outcome[2, 1, 4, 7], inside[2, 1, 4, 7] = 3, 0
+
+    exceptions = example("exceptions")
+    entries = paper_fits(radii=(1.0,))
+    names = tuple(entry.floc_id for entry in entries)
+    clean = relabelled(paper_results(), flocs=names)
+    assert exceptions.exceptions_figure(clean, entries) is None
+    study = relabelled(paper_results(outside), flocs=names)
+    study.replicates["floc_i"][2, 1, 4, 7], study.replicates["floc_j"][2, 1, 4, 7] = 3, 5
+    figure = exceptions.exceptions_figure(study, entries)
+    titles = {axes.get_title() for axes in figure.axes}
+    assert titles == {f"{names[k]}\nin 1 of 1 pairs" for k in (3, 5)}
