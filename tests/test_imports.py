@@ -121,7 +121,7 @@ HEAVYWEIGHTS = {
     "xarray": ["io/labelled.py"],
     "pandas": ["io/labelled.py"],
 }
-MOST_FILES = 15
+MOST_FILES = 16
 """Of a folder: more are found by their prefixes, not by their room."""
 
 

@@ -24,7 +24,6 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.choice import (
     ALLOWED,
     REFERENCE,
-    choice_lines,
     choose,
     first_methods,
     sampling_error,
@@ -35,6 +34,7 @@ from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from flocsim.io.confidence import wilson
+from flocsim.io.results.run_words import choice_lines
 
 STUDIES = {
     "tang2014 I": 'preset = "tang2014"\n[scene]\ntypes = ["I"]',

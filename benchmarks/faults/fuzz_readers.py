@@ -176,8 +176,9 @@ class SwarmJournalReader:
         """Take what it has, and make results of it where all is there."""
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.ensembles.swarms.kind import results, table_of
+        from flocsim.ensembles.swarms.kind import results
         from flocsim.io.journal.journal import Journal
+        from flocsim.io.results.swarm_file import table_of
 
         journal = Journal(path)
         try:

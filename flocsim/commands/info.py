@@ -11,13 +11,9 @@ import attrs
 import numpy as np
 
 from flocsim.commands import SUMMARIES
-from flocsim.ensembles.collision.failures import describe_note
-from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.consent import read_sources
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.equivalent_spheres import sphere_words
-from flocsim.ensembles.estimates import strengths
-from flocsim.ensembles.pilot.choice import choice_lines
+from flocsim.ensembles.estimates.strengths import table_of as strength_table
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
     change_lines,
@@ -31,8 +27,6 @@ from flocsim.ensembles.report import (
 )
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
-from flocsim.ensembles.swarms.kind import SWARMS
-from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
 from flocsim.io.contents import (
     LIBRARY,
@@ -44,10 +38,13 @@ from flocsim.io.contents import (
     TRAJECTORY,
     content_of,
 )
+from flocsim.io.journal.journal import journal_of
 from flocsim.io.results import strength_file, swarm_file
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview
+from flocsim.io.results.run_words import choice_lines, class_words, describe_note, sphere_words
 from flocsim.io.results.schema import BONDS, Results
+from flocsim.io.results.swarm_file import table_of
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import read_settings
 from flocsim.io.terminal import aligned
@@ -85,6 +82,9 @@ def run(args: Namespace) -> int:
     if journal is not None:
         if args.config or args.modules:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
+        # All kinds of studies, and the engine with them, are wanted here alone.
+        from flocsim.ensembles.unfinished import read_unfinished
+
         print(unfinished_text(read_unfinished(journal)))
         return 0
     if not (args.config or args.modules):
@@ -131,7 +131,7 @@ def swarm_text(path, results):
     facts, came, warnings = swarm_summary(path, results)
     lines = fact_lines([*facts, *came])
     lines += [f"warning: {visible(line, '')}" for line in warnings]
-    table = SWARMS.table(results)
+    table = table_of(results)
     return "\n".join([f"{path}: results of a swarm study", "", *lines, "", table])
 
 
@@ -319,7 +319,7 @@ def strength_text(path, found):
         if name not in ("asked", "complete", "cpus"):
             facts.append((name.replace("_", " "), str(value)))
     kind = "strengths of bonds" + ("" if found.complete else ", unfinished")
-    table = strengths.table_of(found)
+    table = strength_table(found)
     return "\n".join([f"{path}: {kind}", "", *fact_lines(facts), "", table])
 
 
@@ -338,7 +338,7 @@ def unfinished_text(found):
     shown = reasons.most_common(MOST_FAILURES)
     lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
     if of_swarms:
-        return "\n".join([*lines, "", f"{found.progress}:", SWARMS.table(results)])
+        return "\n".join([*lines, "", f"{found.progress}:", table_of(results)])
     table = format_table(results.types, results.vertices, results.delta, results.probabilities)
     marked = f"{found.progress}, with 95 % intervals:"
     return "\n".join([*lines, *efficiency_block(results), "", marked, table])

@@ -7,6 +7,7 @@ from typing import Any
 from flocsim.commands import SUMMARIES
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
+from flocsim.io.journal.journal import journal_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.kernel import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES
@@ -125,7 +126,7 @@ def label(name):
 
 def read_content(path):
     """What a file holds, {name: function} of its figures, and what each of them has to say."""
-    from flocsim.ensembles.unfinished import journal_of, read_unfinished
+    from flocsim.ensembles.unfinished import read_unfinished
     from flocsim.io.contents import LIBRARY, RESULTS, STRENGTH, SWARM, SWEEP, TRAJECTORY, content_of
 
     figures_of = {

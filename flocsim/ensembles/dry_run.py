@@ -7,14 +7,14 @@ from math import inf
 import numpy as np
 
 from flocsim.ensembles.collision.checking import EASILY, count_checks, exact_method
-from flocsim.ensembles.collision.pairings import class_facts, class_words
+from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.doubts import settling_facts, study_doubts
-from flocsim.ensembles.equivalent_spheres import sphere_facts, sphere_words
+from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
-from flocsim.ensembles.pilot.choice import choice_lines, choose, first_methods, run_alone
+from flocsim.ensembles.pilot.choice import choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
     Forecast,
     forecast_of,
@@ -35,6 +35,7 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.interruption import INTERRUPTION, stop_requested
+from flocsim.io.results.run_words import choice_lines, class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
 

@@ -50,16 +50,3 @@ def facts_of(pair: Encounter) -> dict[str, Any]:
         }
     plain = {name: value if math.isfinite(value) else None for name, value in found.items()}
     return {"release": near, "escape": far, "diffusion": pair.diffusion} | plain
-
-
-def sphere_words(facts: dict) -> str:
-    """The facts of one collision type in a line."""
-    free, touch, stability = (
-        "no number" if facts[name] is None else f"{facts[name]:.4g}"
-        for name in ("free", "touch", "stability")
-    )
-    return (
-        f"let go {1e6 * facts['release']:.4g} um apart, escaped at {1e6 * facts['escape']:.4g} um, "
-        f"D = {facts['diffusion']:.4g} m2/s; equivalent spheres touch with probability {free} "
-        f"without forces between them, {touch} with them; stability ratio W = {stability}"
-    )

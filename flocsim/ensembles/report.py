@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flocsim.ensembles.collision.failures import describe_note
-from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
 from flocsim.io.confidence import wilson
 from flocsim.io.results.efficiency import efficiency
-from flocsim.io.results.events import HOOK
+from flocsim.io.results.events import HOOK, MOST_UNKNOWN
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
+from flocsim.io.results.run_words import describe_note
 from flocsim.io.results.schema import Results
 
 ENDS = {
@@ -197,7 +196,7 @@ MOST_UNDECIDED = "most_undecided"
 
 def most_undecided(results: Results) -> float:
     """That share; of files that do not say, the default."""
-    return float(results.run.get(MOST_UNDECIDED, StopConfig().undecided))
+    return float(results.run.get(MOST_UNDECIDED, MOST_UNKNOWN))
 
 
 def shares_undecided(results: Results) -> np.ndarray:

@@ -37,7 +37,6 @@ from flocsim.ensembles.parallel.study_state import StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.pilot.choice import (
     Choice,
-    choice_lines,
     choose,
     first_methods,
     recorded_choice,
@@ -53,6 +52,7 @@ from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
 from flocsim.io.provenance import provenance, storable
+from flocsim.io.results.run_words import choice_lines
 from flocsim.io.terminal import Progress, tell
 
 

@@ -12,7 +12,7 @@ from flocsim.ensembles.collision.draw import CHECKED, Draw
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
-from flocsim.ensembles.collision.pairings import Pairing, class_facts, class_words, pairings_of
+from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
 from flocsim.ensembles.collision.points import point, point_facts
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
@@ -24,6 +24,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.events import flips_easily
+from flocsim.io.results.run_words import class_words
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 

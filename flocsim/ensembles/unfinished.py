@@ -4,7 +4,6 @@ The job that writes the journal only ever appends to it, so that what is whole i
 while it is read here.
 """
 
-import os
 from pathlib import Path
 
 from flocsim.ensembles.kinds import KINDS
@@ -13,22 +12,8 @@ from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.ensembles.storage.unfinished import Unfinished
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import SUFFIX, journal_path
 from flocsim.io.journal.records import SESSION, Record, scan
 from flocsim.io.json_text import matches
-
-
-def journal_of(path: str | Path) -> Path | None:
-    """The journal to read where a command is given this path: the path itself, or the journal
-    beside results that are not there yet; None where there is neither."""
-    place = Path(path)
-    if place.name.endswith(SUFFIX) and place.is_file():
-        return place
-    try:
-        beside = journal_path(path)
-    except FileError:
-        return None
-    return beside if not os.path.lexists(path) and beside.is_file() else None
 
 
 def read_unfinished(path: str | Path) -> Unfinished:

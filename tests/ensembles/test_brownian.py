@@ -9,13 +9,14 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.body import Fluid
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.equivalent_spheres import sphere_facts, sphere_words
+from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
 from flocsim.forces import Thermal
 from flocsim.io.confidence import wilson
 from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.run_words import sphere_words
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 
 STUDY = """\

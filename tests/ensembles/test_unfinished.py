@@ -7,9 +7,9 @@ from flocsim.__main__ import main
 from flocsim.ensembles import pairs
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.estimates.statistics import tabulate
-from flocsim.ensembles.unfinished import journal_of, read_unfinished
+from flocsim.ensembles.unfinished import read_unfinished
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import Journal
+from flocsim.io.journal.journal import Journal, journal_of
 from flocsim.io.journal.records import SESSION, encode
 from tests.helpers.synthetic_results import make_results
 

@@ -13,12 +13,11 @@ from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import facts_of, list_of, page_of, picture_of, table_of, text
 from flocsim.commands.reporting.motion import SCRIPT, motion_of
 from flocsim.ensembles.report import EFFICIENCY, efficiency_rows, graze_lines
-from flocsim.ensembles.swarms.assembly import table_rows
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import METADATA, house_style
 from flocsim.io.results.file import Totals
 from flocsim.io.results.schema import CLASSES, POOLED_PROBABILITIES, PROBABILITIES, Results
-from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.io.results.swarm_file import SwarmResults, table_rows
 
 MOST_FAILURES = 20
 Section = tuple[str, str, str]

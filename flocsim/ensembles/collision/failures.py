@@ -145,11 +145,3 @@ def make_note(study, place, replicate, why):
     return {
         "type": name, "vertices": vertices, "delta": share, "replicate": replicate, "why": why,
     }  # fmt: skip
-
-
-def describe_note(note: dict) -> str:
-    """A failed replicate for messages, with the words that run it again."""
-    return (
-        f"{note['why']} (flocsim trajectory CONFIG --scene "
-        f"{note['type']},{note['vertices']},{note['delta']!r} --replicate {note['replicate']})"
-    )

@@ -194,16 +194,6 @@ def class_facts(pairings: Sequence[Pairing]) -> list[dict]:
     ]  # fmt: skip
 
 
-def class_words(facts: Sequence[dict]) -> str:
-    """Size classes in a line; "" where there is one at most."""
-    told = (
-        f"{each['label']} {1e6 * each['low']:.4g} to {1e6 * each['high']:.4g} um "
-        f"({each['flocs']} flocs)"
-        for each in facts
-    )
-    return f"size classes, r_eq: {', '.join(told)}" if len(facts) > 1 else ""
-
-
 def in_words(sizes):
     return f"{1e6 * np.min(sizes):.3g} to {1e6 * np.max(sizes):.3g} um"
 

@@ -70,6 +70,7 @@ from flocsim.integrators import (
     Overdamped,
     VelocityVerlet,
 )
+from flocsim.io.results.events import MOST_UNKNOWN
 
 
 def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> Any:
@@ -120,7 +121,7 @@ class StopConfig:
         "",
         at_least=0.0,
         at_most=1.0,
-        default=0.05,
+        default=MOST_UNKNOWN,
         help="share of a condition's replicates, or of a rate's encounters, that may be undecided "
         "or failed; a study of more is complete, but ends with exit code 65, and such rates have "
         "an interval alone",

@@ -11,12 +11,12 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.chunks import Chunk
-from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.parallel.messages import ChunkResult, Kept
 from flocsim.ensembles.parallel.schedule import Schedule
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
 from flocsim.io.journal.records import data_digest, record_at
+from flocsim.io.results.run_words import describe_note
 
 MOST_NOTES = 1000
 """Notes on failed replicates that are kept."""

@@ -334,22 +334,3 @@ def final_methods(config: Config) -> dict[str, Integrator]:
     if not config.integrator.is_chosen:
         return first_methods(config)
     return choose(study_of(config, methods=first_methods(config))).methods
-
-
-def choice_lines(record: dict) -> list[str]:
-    """A choice for people: a line for each type, and one on what was asked for."""
-    lines = []
-    for each in record["types"]:
-        mine = [tried for tried in each["tried"] if tried["method"] == each["method"]]
-        seen = ", ".join(f"{tried['flips']} at {tried['tolerance']:g} m" for tried in mine)
-        from_pilot = f"of {each['replicates']} replicates {seen}" if seen else "no pilot: too few"
-        lines.append(
-            f"{each['name']}: {each['method']}, {each['tolerance']:g} m, expected flips "
-            f"{100.0 * each['expected']:.2g} % ({from_pilot})"
-            + ("" if each["bound"] <= record["target"] else "; the ladder ends here")
-        )
-    lines.append(
-        f"asked for: flips below {100.0 * record['target']:.2g} %, a fifth of a sampling error of "
-        f"{100.0 * record['half_width']:.2g} %"
-    )
-    return lines

@@ -16,9 +16,7 @@ from flocsim.io.results.swarm_file import (
     POINTS,
     RINGS,
     SwarmResults,
-    mean,
 )
-from flocsim.io.terminal import aligned
 
 Groups = dict[str, dict[str, np.ndarray]]
 
@@ -104,34 +102,3 @@ def results_from(
 def filled_up(column: np.ndarray, rows: int) -> np.ndarray:
     """A column of core points with zeros behind them, so many rows in all."""
     return np.pad(column, ((0, rows - len(column)), *[(0, 0)] * (column.ndim - 1)))
-
-
-def table_of(results: SwarmResults) -> str:
-    """Numbers on the clusters over time, means over replicates, as text."""
-    many = len(results.scales["replicate"])
-    return "\n".join(aligned(table_rows(results)) + ([f"means over {many} swarms"] * (many > 1)))
-
-
-def table_rows(results: SwarmResults) -> list[list[str]]:
-    """The same as rows of words, their heads first."""
-    counts = results.groups["counts"]
-    columns = {
-        "time [s]": (results.scales["time"], "{:.4g}"),
-        "clusters": (mean(counts["clusters"]), "{:.1f}"),
-        "largest": (mean(counts["largest"]), "{:.1f}"),
-        "mean size": (mean(counts["mean_size"]), "{:.2f}"),
-        "percolating": (mean(counts["percolating"]), "{:.1f}"),
-        "R_g [um]": (1e6 * mean(counts["gyration"]), "{:.3g}"),
-        "porosity": (mean(counts["porosity"]), "{:.3f}"),
-        "held": (mean(counts["bonds_certificate"]), "{:.1f}"),
-        "hooks": (mean(counts["bonds_hook"]), "{:.1f}"),
-        "settling [mm/s]": (1e3 * mean(counts["settling"]), "{:.4g}"),
-        "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
-        "largest [m]": (mean(counts["error"]), "{:.1e}"),
-    }
-    if not np.any(counts["percolating"] > 0.0):
-        del columns["percolating"]
-    rows = [list(columns)]
-    for place in range(len(results.scales["time"])):
-        rows.append([form.format(values[place]) for values, form in columns.values()])
-    return rows

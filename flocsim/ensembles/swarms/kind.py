@@ -29,7 +29,7 @@ from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable
 from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished
-from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from, table_of
+from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from
 from flocsim.ensembles.swarms.checks import FORM, Form, check_part
 from flocsim.ensembles.swarms.dry_run import dry_run, largest_pair
 from flocsim.ensembles.swarms.records import Found, part_of
@@ -44,6 +44,7 @@ from flocsim.io.results.swarm_file import (
     SwarmResults,
     check_swarm,
     read_swarm,
+    table_of,
     write_swarm,
 )
 from flocsim.plausibility.doubts import doubts_of

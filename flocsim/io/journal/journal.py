@@ -183,3 +183,16 @@ class MemoryJournal:
 
     def remove(self) -> None:
         """Nothing to delete."""
+
+
+def journal_of(path: str | Path) -> Path | None:
+    """The journal to read where a command is given this path: the path itself, or the journal
+    beside results that are not there yet; None where there is neither."""
+    place = Path(path)
+    if place.name.endswith(SUFFIX) and place.is_file():
+        return place
+    try:
+        beside = journal_path(path)
+    except FileError:
+        return None
+    return beside if not os.path.lexists(path) and beside.is_file() else None

@@ -26,6 +26,9 @@ UNDECIDED = OUTCOMES.index("undecided")
 HELD = OUTCOMES.index("held")
 DECIDED = len(CLASSES)
 """Outcomes below this code are classes A to D."""
+MOST_UNKNOWN = 0.05
+"""Share of a condition without an outcome up to which a study counts as done, unless it says."""
+
 AGGREGATED = (0, 2)
 INSIDE_CLASSES, OUTSIDE_CLASSES = (0, 1), (2, 3)
 CERTIFICATE, HOOK, REST = (1 + BONDS.index(name) for name in ("certificate", "hook", "rest"))

@@ -1,0 +1,53 @@
+"""What the group ``run`` of a results file says as JSON, in words."""
+
+from collections.abc import Sequence
+
+
+def describe_note(note: dict) -> str:
+    """A failed replicate for messages, with the words that run it again."""
+    return (
+        f"{note['why']} (flocsim trajectory CONFIG --scene "
+        f"{note['type']},{note['vertices']},{note['delta']!r} --replicate {note['replicate']})"
+    )
+
+
+def class_words(facts: Sequence[dict]) -> str:
+    """Size classes in a line; "" where there is one at most."""
+    told = (
+        f"{each['label']} {1e6 * each['low']:.4g} to {1e6 * each['high']:.4g} um "
+        f"({each['flocs']} flocs)"
+        for each in facts
+    )
+    return f"size classes, r_eq: {', '.join(told)}" if len(facts) > 1 else ""
+
+
+def sphere_words(facts: dict) -> str:
+    """The facts of one collision type in a line."""
+    free, touch, stability = (
+        "no number" if facts[name] is None else f"{facts[name]:.4g}"
+        for name in ("free", "touch", "stability")
+    )
+    return (
+        f"let go {1e6 * facts['release']:.4g} um apart, escaped at {1e6 * facts['escape']:.4g} um, "
+        f"D = {facts['diffusion']:.4g} m2/s; equivalent spheres touch with probability {free} "
+        f"without forces between them, {touch} with them; stability ratio W = {stability}"
+    )
+
+
+def choice_lines(record: dict) -> list[str]:
+    """A choice for people: a line for each type, and one on what was asked for."""
+    lines = []
+    for each in record["types"]:
+        mine = [tried for tried in each["tried"] if tried["method"] == each["method"]]
+        seen = ", ".join(f"{tried['flips']} at {tried['tolerance']:g} m" for tried in mine)
+        from_pilot = f"of {each['replicates']} replicates {seen}" if seen else "no pilot: too few"
+        lines.append(
+            f"{each['name']}: {each['method']}, {each['tolerance']:g} m, expected flips "
+            f"{100.0 * each['expected']:.2g} % ({from_pilot})"
+            + ("" if each["bound"] <= record["target"] else "; the ladder ends here")
+        )
+    lines.append(
+        f"asked for: flips below {100.0 * record['target']:.2g} %, a fifth of a sampling error of "
+        f"{100.0 * record['half_width']:.2g} %"
+    )
+    return lines
