@@ -15,7 +15,7 @@ from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.consent import read_sources
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.equivalent_spheres import sphere_words
+from flocsim.ensembles.equivalent_spheres import sphere_words, water_facts, water_words
 from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
@@ -31,6 +31,7 @@ from flocsim.ensembles.report import (
 )
 from flocsim.ensembles.storage.cpu_kind import describe_kind
 from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.studies.opened import open_results
 from flocsim.ensembles.swarms.kind import SWARMS
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
@@ -77,15 +78,23 @@ def add_parser(subparsers: Any) -> None:
         "--modules", action="store_true",
         help="print only the modules of one's own that it was run with",
     )  # fmt: skip
+    parser.add_argument(
+        "--water", action="store_true",
+        help="print only how often the equivalent spheres of a study of pairs or rates touch, with "
+        "the water that they push at each other and without; a second or two for each pair",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     journal = journal_of(args.results)
     if journal is not None:
-        if args.config or args.modules:
+        if args.config or args.modules or args.water:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
         print(unfinished_text(read_unfinished(journal)))
+        return 0
+    if args.water:
+        print("\n".join(map(water_words, water_facts(open_results(args.results).config))))
         return 0
     if not (args.config or args.modules):
         print(text_of(args.results))
