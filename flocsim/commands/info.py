@@ -35,6 +35,7 @@ from flocsim.ensembles.studies.opened import open_results
 from flocsim.ensembles.swarms.kind import SWARMS
 from flocsim.ensembles.unfinished import journal_of, read_unfinished
 from flocsim.errors import ConfigError, FileError, visible
+from flocsim.hydrodynamics import prism_drag
 from flocsim.io.contents import (
     LIBRARY,
     READERS,
@@ -81,7 +82,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--water", action="store_true",
         help="print only how often the equivalent spheres of a study of pairs or rates touch, with "
-        "the water that they push at each other and without; a second or two for each pair",
+        "the water that they push at each other and without, a second or two for each pair; of a "
+        "shape library how fast its flocs sink and turn",
     )  # fmt: skip
     parser.set_defaults(run=run)
 
@@ -94,7 +96,7 @@ def run(args: Namespace) -> int:
         print(unfinished_text(read_unfinished(journal)))
         return 0
     if args.water:
-        print("\n".join(map(water_words, water_facts(open_results(args.results).config))))
+        print("\n".join(water_lines(args.results)))
         return 0
     if not (args.config or args.modules):
         print(text_of(args.results))
@@ -102,6 +104,27 @@ def run(args: Namespace) -> int:
     _, results = content_of(args.results, (RESULTS, SWARM))
     print_kept(args, results.run)
     return 0
+
+
+def water_lines(path):
+    """What slow flow makes of the equivalent spheres of a study, or of the flocs of a library."""
+    kind, entries = content_of(path, (RESULTS, LIBRARY), READERS | {RESULTS: read_overview})
+    if kind == RESULTS:
+        return [water_words(each) for each in water_facts(open_results(path).config)]
+    rows = [("floc", "sinks", "at least", "turns", "B", "+- %")]
+    for entry in entries:
+        count = max(entry.fits)
+        drag = prism_drag(entry.fits[count].shape.outline())
+        rows.append((
+            visible(entry.floc_id, ""), *(f"{each:.3f}" for each in drag.mobility),
+            f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
+        ))  # fmt: skip
+    heading = (
+        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: how fast they sink, at most and at "
+        "least, and turn, over their equivalent spheres; B, by which a strain turns them, over "
+        "that of a line"
+    )
+    return [heading, *aligned(rows)]
 
 
 def print_kept(args, run):
