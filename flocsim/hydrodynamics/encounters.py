@@ -32,11 +32,11 @@ SETTLING_FAR, FLOW_FAR, LAST = 100.0, 40.0, 1000.0
 """Distances over r₁ + r₂ from which ways are followed in settling and in a flow, and up to which
 what water does in settling beforehand is added up; from there on it falls with the distance."""
 
-WIDEST = 4.0
-"""Offset over r₁ + r₂ beyond which none is looked for."""
+WIDEST, NARROWEST, TRIED = 4.0, 1e-4, 60
+"""The largest offset over r₁ + r₂ that is looked at, the least over it, and how many."""
 
-OFFSETS, ROUNDS = 24, 4
-"""Offsets that are tried at once; how often, each time between the two that tell."""
+OFFSETS, ROUNDS = 20, 2
+"""How many are tried at once between one that touches and the next that does not; how often."""
 
 AZIMUTHS = 12
 """Directions of offsets in a flow, Gauss's over a quarter turn."""
@@ -67,6 +67,13 @@ class Meeting:
     force: Force
     touch: float
     water: bool = True
+
+    def __attrs_post_init__(self) -> None:
+        if not 0.0 < self.touch < 0.1 * self.reach:
+            raise UsageError(
+                "two spheres touch at a gap above 0 m and below a tenth of the sum of their radii, "
+                f"{self.reach:g} m, found {self.touch:g} m"
+            )
 
     @property
     def reach(self) -> float:
@@ -124,20 +131,33 @@ class Meeting:
             log, n, left, share = log[going], n[going], left[going], share[going]
         return found
 
-    def widest(self, hits: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
-        """Offsets (count,) [m] up to which ways touch; ``hits``: from offsets (count, m) to whether
-        they do. 0 where none does."""
-        low, high = np.zeros(count), np.full(count, WIDEST * self.reach)
+    def between(
+        self, hits: Callable[[np.ndarray], np.ndarray], count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest offset (count,) over r₁ + r₂ of ways that touch, 0 where none
+        does; ``hits``: from offsets (count, m) [m] to whether they do.
+
+        In shear those nearest to the middle come round before they meet.
+        """
+        tried = np.append(0.0, WIDEST * np.geomspace(NARROWEST, 1.0, TRIED))
+        found = hits(np.tile(self.reach * tried[1:], (count, 1)))
+        first, last = np.argmax(found, axis=1), TRIED - np.argmax(found[:, ::-1], axis=1)
+        any_, all_in = found.any(axis=1), first == 0
+        # Where each of the two lies between a way that touches and the next that does not.
+        low = self.edge(hits, tried[first + 1], tried[first])
+        high = self.edge(hits, tried[last], tried[np.minimum(last + 1, TRIED)])
+        return np.where(any_ & ~all_in, low, 0.0), np.where(any_, high, 0.0)
+
+    def edge(self, hits: Any, touching: np.ndarray, passing: np.ndarray) -> np.ndarray:
+        """Where between offsets that touch and such as do not (count,) ways cease to."""
         shares = np.arange(1, OFFSETS + 1) / (OFFSETS + 1)
         for _ in range(ROUNDS):
-            wide = high - low
-            found = hits(low[:, None] + wide[:, None] * shares)
+            wide = passing - touching
+            found = hits(self.reach * (touching[:, None] + wide[:, None] * shares))
             inside = np.where(found.all(axis=1), OFFSETS, np.argmin(found, axis=1))
-            low, high = (
-                low + wide * inside / (OFFSETS + 1),
-                low + wide * (inside + 1) / (OFFSETS + 1),
-            )
-        return np.where(low > 0.0, 0.5 * (low + high), 0.0)
+            passing = touching + wide * (inside + 1) / (OFFSETS + 1)
+            touching = touching + wide * inside / (OFFSETS + 1)
+        return 0.5 * (touching + passing)
 
     def settling(self, weights: tuple[float, float]) -> float:
         """The share of π (r₁ + r₂)² from which settling spheres come to touch, (b_c/(r₁ + r₂))².
@@ -178,7 +198,8 @@ class Meeting:
         gap = np.exp(log)
         change = gap / (gap + self.reach) - sideways / radial
         before = np.trapezoid(change, log) + change[-1]
-        return float((self.widest(hits, 1)[0] * math.exp(before) / self.reach) ** 2)
+        low, high = self.between(hits, 1)
+        return float((high[0] ** 2 - low[0] ** 2) * math.exp(2.0 * before))
 
     def in_flow(self, flow: str, rate: float) -> float:
         """The share of the rectilinear kernel, 4/3 G (r₁ + r₂)³ or 8/3 s (r₁ + r₂)³, of spheres
@@ -226,9 +247,9 @@ class Meeting:
             directions = directions / np.linalg.norm(directions, axis=1)[:, None]
             return self.touches(table, rates, start, directions).reshape(offsets.shape)
 
-        widest = self.widest(hits, AZIMUTHS) / self.reach
+        low, high = self.between(hits, AZIMUTHS)
         if is_shear:
             # 4 ∫∫ G |y| dy dz over 4/3 G.
-            return float(np.sum(weight * np.cos(angle) * widest**3))
+            return float(np.sum(weight * np.cos(angle) * (high**3 - low**3)))
         # Of x y and z 2 · 4 ∫∫ s d(x y) dz over 8/3 s; d(x y) = ½ (r₁ + r₂) d(first).
-        return float(np.sum(weight * 0.75 * widest**2))
+        return float(np.sum(weight * 0.75 * (high**2 - low**2)))

@@ -39,6 +39,14 @@ class SpherePair:
     radii: tuple[float, float]
     viscosity: float = 1.0
 
+    def __attrs_post_init__(self) -> None:
+        given = (*self.radii, self.viscosity)
+        if len(given) != 3 or not all(0.0 < each < math.inf for each in given):
+            raise UsageError(
+                "two spheres in water need two radii and a viscosity above 0, found "
+                f"{self.radii} m and {self.viscosity} Pa s"
+            )
+
     @cached_property
     def functions(self) -> TwoSpheres:
         """Those of the ratio of the radii."""

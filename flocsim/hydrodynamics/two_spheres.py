@@ -200,7 +200,9 @@ class TwoSpheres:
     ratio: float = attrs.field(converter=float)
 
     def __attrs_post_init__(self) -> None:
-        if not LEAST_RATIO <= self.ratio <= 1.0 / LEAST_RATIO:
+        # Of radii whose quotient is rounded, too.
+        less = min(self.ratio, 1.0 / (self.ratio or 1.0))
+        if not less * (1.0 + 1e-12) >= LEAST_RATIO:
             raise UsageError(
                 f"the radii of two spheres in water must be {LEAST_RATIO:g} to "
                 f"{1.0 / LEAST_RATIO:g} times each other, found {self.ratio:.4g}"

@@ -28,7 +28,7 @@ def settling(k, water, radii=(0.5, 1.0), touch=1e-7):
 ])  # fmt: skip
 def test_settling(k, with_water, without):
     assert settling(k, True) == pytest.approx(with_water, rel=3e-3)
-    assert settling(k, False) == pytest.approx(without, rel=1e-4)
+    assert settling(k, False) == pytest.approx(without, rel=3e-4)
     assert settling(k, True, (1.0, 0.5)) == pytest.approx(settling(k, True), rel=1e-6)
 
 
@@ -60,7 +60,7 @@ def test_without_water_and_forces_all_of_the_kernel_touches(flow, rate):
 
 def test_without_water_and_forces_spheres_settle_straight():
     meeting = Meeting(SpherePair((0.4, 1.0)), np.zeros_like, 1e-6, water=False)
-    assert meeting.settling((0.2, 3.0)) == pytest.approx(1.0, rel=1e-4)
+    assert meeting.settling((0.2, 3.0)) == pytest.approx(1.0, rel=5e-4)
 
 
 def test_a_small_one_goes_round_a_large_one():
@@ -70,6 +70,16 @@ def test_a_small_one_goes_round_a_large_one():
     caught = [Meeting(SpherePair((0.05, 1.0)), np.zeros_like, touch).settling(weights)
               for touch in (1e-5, 1e-4, 1e-3)]  # fmt: skip
     assert np.all(np.diff(caught) > 0.0) and caught[-1] < 0.5 * (0.05 / 1.05) ** 2
+
+
+def test_in_shear_small_ones_come_round_before_they_meet():
+    # Closed ways around the large one let no small one near (Wang, Zinchenko and Davis 1994).
+    def share(ratio, flow):
+        radii = (ratio, 1.0)
+        return Meeting(SpherePair(radii), attraction(radii, 1e-6), 1e-5).in_flow(flow, 1.0)
+
+    assert share(0.02, "shear") == 0.0 < share(0.02, "extension")
+    assert share(0.1, "shear") < 0.3 * share(0.1, "extension")
 
 
 def test_repulsion_keeps_all_apart():
@@ -94,6 +104,12 @@ def test_units():
     small = Meeting(SpherePair((0.5e-6, 1e-6), 1e-3), force, 1e-12)
     unit = Meeting(SpherePair((0.5, 1.0)), unit_force, 1e-6)
     assert small.in_flow("shear", 5.0) == pytest.approx(unit.in_flow("shear", 1.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("touch", [0.0, -1e-9, 1.0, float("nan")])
+def test_a_touch_lies_near_the_spheres(touch):
+    with pytest.raises(UsageError, match="touch at a gap above 0 m"):
+        Meeting(SpherePair((1.0, 1.0)), np.zeros_like, touch)
 
 
 @pytest.mark.parametrize(("flow", "rate"), [("rotation", 1.0), ("shear", 0.0), ("shear", -1.0)])

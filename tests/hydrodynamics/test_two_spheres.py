@@ -170,8 +170,16 @@ def test_the_leading_terms_near_touching():
 
 @pytest.mark.parametrize("ratio", [0.01, 60.0, 0.0, -1.0, float("nan")])
 def test_other_ratios_are_refused(ratio):
+    assert SpherePair((1e-6, 5e-5)).functions.ratio == pytest.approx(50.0)
     with pytest.raises(UsageError, match=r"0\.02 to 50 times each other"):
         TwoSpheres(ratio)
+
+
+@pytest.mark.parametrize("given", [((0.0, 1.0), 1.0), ((1.0, np.inf), 1.0), ((1.0, 1.0), -1.0),
+                                   ((1.0, 1.0, 1.0), 1.0)])  # fmt: skip
+def test_what_are_no_two_spheres_in_water(given):
+    with pytest.raises(UsageError, match="need two radii and a viscosity above 0"):
+        SpherePair(*given)
 
 
 @pytest.mark.parametrize("gap", [0.0, -1e-9, float("nan"), [1.0, 0.0]])
