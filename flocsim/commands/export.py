@@ -121,12 +121,11 @@ def kernel_in(path):
 def water_factors(path):
     """{mechanism: (i, j)}: how often the equivalent spheres of a study touch with the water between
     them, over how often they do without."""
-    from flocsim.ensembles.equivalent_spheres import water_facts
     from flocsim.ensembles.studies.opened import open_results
 
-    config = open_results(path).config
-    scene, found = config.scene, {}
-    for facts, (m, i, j) in zip(water_facts(config), scene.conditions, strict=True):
+    results = open_results(path)
+    scene, found = results.config.scene, {}
+    for facts, (m, i, j) in zip(results.in_water(), scene.conditions, strict=True):
         count = len(scene.labels)
         factors = found.setdefault(scene.meeting[m], np.ones((count, count)))
         # Where none touches without water, none does with it.

@@ -15,7 +15,7 @@ from flocsim.ensembles.collision.failures import describe_note
 from flocsim.ensembles.collision.pairings import class_words
 from flocsim.ensembles.config.consent import read_sources
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.equivalent_spheres import sphere_words, water_facts, water_words
+from flocsim.ensembles.equivalent_spheres import sphere_words, water_words
 from flocsim.ensembles.estimates import strengths
 from flocsim.ensembles.pilot.choice import choice_lines
 from flocsim.ensembles.report import (
@@ -110,7 +110,7 @@ def water_lines(path):
     """What slow flow makes of the equivalent spheres of a study, or of the flocs of a library."""
     kind, entries = content_of(path, (RESULTS, LIBRARY), READERS | {RESULTS: read_overview})
     if kind == RESULTS:
-        return [water_words(each) for each in water_facts(open_results(path).config)]
+        return [water_words(each) for each in open_results(path).in_water()]
     rows = [("floc", "sinks", "at least", "turns", "B", "+- %")]
     for entry in entries:
         count = max(entry.fits)

@@ -98,6 +98,28 @@ class SpherePair:
         n, t = n[:, 1] - n[:, 0], t[:, 1] - t[:, 0]
         return Relative(n[:, :2], t[:, :2], -n[:, 2] / distance, -t[:, 2] / distance)
 
+    def doublet(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """(tension over E_nn (k,) [N s], B (k,)) of the two as one rigid body, free in a flow.
+
+        The tension is what water pulls at either along n; the doublet turns by
+        ω_z + B E_nt, in a shear G once in 4π/(G √(1 − B²)). Both have limits as the gap closes:
+        of equal spheres 12.23 πµa² and .594.
+        """
+        gap = apart(gap)
+        arm = 0.5 * (sum(self.radii) + gap)
+        (along, stretch), (across, shear) = self.along(gap), self.across(gap)
+        ones = np.ones_like(gap)
+        # What the spheres do against the flow at their centres, for E_nn = 1 and E_nt = 1.
+        held = stretch - np.einsum("kij,kj->ki", along, np.stack([arm, -arm], axis=1))
+        drift = held.sum(axis=1) / along.sum(axis=(1, 2))
+        tension = held[:, 1] - drift * along[:, 1].sum(axis=1)
+        moves = np.stack([[ones, ones, 0 * ones, 0 * ones], [-arm, arm, ones, ones]]).T
+        flow = np.stack([-arm, arm, 0 * ones, 0 * ones], axis=1)
+        load = shear + np.einsum("kij,kj->ki", across, flow)
+        whole = np.einsum("kia,kij,kjb->kab", moves, across, moves)
+        turning = np.linalg.solve(whole, np.einsum("kia,ki->ka", moves, load)[..., None])
+        return tension, turning[:, 1, 0]
+
     def alone(self, gap: ArrayLike) -> "Relative":
         """The same of two spheres that do not move the water around each other."""
         gap = apart(gap)

@@ -69,17 +69,31 @@ def test_straining_flow_far_away():
 
 
 def test_a_rigid_doublet_in_shear():
-    gap = 1e-8
-    (along,), (stretch,) = EQUAL.along(gap)
-    (across,), (shear,) = EQUAL.across(gap)
-    half = 1.0 + 0.5 * gap
-    # E_nn is G/2 at most; the two are held against the flow that parts their centres.
-    tension = 0.5 * (along @ [half, -half] - stretch)[0] / np.pi
-    assert abs(tension) == pytest.approx(6.116, abs=1e-3)
-    held = np.array([-half, half, 1.0, 1.0])
-    flow = np.array([-half, half, 0.0, 0.0])
-    turning = held @ (shear + across @ flow) / (held @ across @ held)
+    tension, turning = EQUAL.doublet([1e-8, 1e-4])
+    # At most E_nn = G/2.
+    assert 0.5 * tension / np.pi == pytest.approx(6.116, abs=2e-3)
+    assert tension == pytest.approx(38.43, rel=1e-3)
     assert 4.0 * np.pi / np.sqrt(1.0 - turning**2) == pytest.approx(15.62, abs=0.01)
+    # Of quartz of 5 um, 1 nm apart at least, the rate that opens it.
+    pair = SpherePair((5e-6, 5e-6), 0.89e-3)
+    attraction = 4.7e-20 * 2.5e-6 / (6.0 * 1e-9**2)
+    assert attraction / (0.5 * pair.doublet(1e-9)[0][0]) == pytest.approx(4.58e4, rel=0.02)
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, *RATIOS])
+def test_an_unequal_doublet(ratio):
+    first, second = SpherePair((1.0, ratio)), SpherePair((ratio, 1.0))
+    for own, other in zip(first.doublet([1e-6, 0.1]), second.doublet([1e-6, 0.1]), strict=True):
+        assert own == pytest.approx(other, rel=1e-9)
+    tension, turning = first.doublet([1e-6, 1e-8])
+    assert tension[0] == pytest.approx(tension[1], rel=1e-3) and tension.min() > 0.0
+    assert turning[0] == pytest.approx(turning[1], rel=1e-4) and 0.0 <= turning.min() < 0.6
+
+
+def test_a_doublet_far_apart_is_held_by_two_drags():
+    tension, turning = EQUAL.doublet(1e4)
+    assert tension == pytest.approx(3.0 * np.pi * 1e4, rel=1e-3)
+    assert turning == pytest.approx(1.0, rel=1e-3)
 
 
 def test_batchelors_settling_coefficient():
