@@ -91,9 +91,15 @@ class Meeting:
         nearest, farthest = 0.5 * self.touch, 1.1 * LAST * self.reach
         count = math.ceil(NODES_A_DECADE * math.log10(farthest / nearest))
         gaps = np.geomspace(nearest, farthest, count)
-        motion = self.motion(gaps)
+        motion, force = self.motion(gaps), np.broadcast_to(self.force(gaps), gaps.shape)
+        if not np.isfinite(force).all():
+            where = gaps[np.argmin(np.isfinite(force))]
+            raise UsageError(
+                f"the force between two spheres gives no number at a gap of {where:.3g} m: bound "
+                "what it divides by, or takes a root, power or logarithm of"
+            )
         # Mobility against each other: a pull on one is a push on the other.
-        driven = (motion.along[:, 1] - motion.along[:, 0]) * self.force(gaps) / gaps
+        driven = (motion.along[:, 1] - motion.along[:, 0]) * force / gaps
         table = CubicSpline(np.log(gaps), np.column_stack([*columns(gaps, motion), driven]))
         # A step that overshoots the touch ends the way whatever it is told.
         return lambda log: table(np.clip(log, table.x[0], table.x[-1])).T
