@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from flocsim import errors as errors
     from flocsim import forces as forces
     from flocsim import geometry as geometry
+    from flocsim import hydrodynamics as hydrodynamics
     from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
     from flocsim.ensembles.studies.compare import Comparison, SwarmComparison, compare
@@ -63,7 +64,7 @@ HOMES = {
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked
 for: a job takes over Ctrl-C before it loads any."""
 
-ROOMS = ("ensembles", "errors", "forces", "geometry", "integrators")
+ROOMS = ("ensembles", "errors", "forces", "geometry", "hydrodynamics", "integrators")
 """Packages that are reached without an import of their own: flocsim.forces.Gravity."""
 
 __all__ = [

@@ -30,7 +30,7 @@ ROWS = [
     ["bonds", "plausibility"],
     ["forces", "integrators"],
     ["body"],
-    ["geometry", "laws"],
+    ["geometry", "hydrodynamics", "laws"],
     ["arrays", "hooks"],
     ["compiler", "fields", "interruption"],
     ["constants", "errors", "limits"],
@@ -55,6 +55,7 @@ INNER_ROWS = {
         ["arrays", "methods"],
     ],
     "brownian": [["meeting"], ["splitting"]],
+    "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

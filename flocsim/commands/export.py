@@ -14,7 +14,7 @@ from flocsim.io.exchange.gsd_file import write_gsd
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.swarm import last_known, shape_of
-from flocsim.io.results.curvilinear import CORRECTIONS
+from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
 from flocsim.io.results.kernel_tables import (
     MODELS,
     OF_MODELS,
@@ -48,9 +48,11 @@ def add_parser(subparsers: Any) -> None:
     add("--model", choices=MODELS, default="spheres",
         help="of matrices of efficiencies: whose kernels they multiply (default: %(default)s); "
         "flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
-    add("--curvilinear", choices=tuple(CORRECTIONS),
+    add("--curvilinear", choices=(SPHERES, *CORRECTIONS),
         help="of matrices of efficiencies: times this factor of solid spheres, for the water that "
-        "they push aside; not known for flocs (default: none, an upper bound)")  # fmt: skip
+        "they push aside: spheres, those of the study with its forces, computed here, a second or "
+        "two for each pair; or a formula of the literature. Not known for flocs (default: none, an "
+        "upper bound)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -116,6 +118,21 @@ def kernel_in(path):
     return kernel
 
 
+def water_factors(path):
+    """{mechanism: (i, j)}: how often the equivalent spheres of a study touch with the water between
+    them, over how often they do without."""
+    from flocsim.ensembles.studies.opened import open_results
+
+    results = open_results(path)
+    scene, found = results.config.scene, {}
+    for facts, (m, i, j) in zip(results.in_water(), scene.conditions, strict=True):
+        count = len(scene.labels)
+        factors = found.setdefault(scene.meeting[m], np.ones((count, count)))
+        # Where none touches without water, none does with it.
+        factors[i, j] = factors[j, i] = facts["water"] / (facts["alone"] or 1.0)
+    return found
+
+
 def run_matrices(args):
     """Write a matrix for each mechanism, that the model and the factor have, and N."""
     kernel, rule = kernel_in(args.source), data_rule(args.overwrite)
@@ -123,18 +140,22 @@ def run_matrices(args):
     start = start.with_suffix("") if start.suffix.lower() == ".csv" else start
     ending = (args.model, args.curvilinear) if args.what in OF_MODELS else ()
     texts, without = {}, []
+    wanted = args.curvilinear == SPHERES and args.what in OF_MODELS
+    exact = water_factors(args.source) if wanted else {}
     for mechanism in kernel.mechanisms:
         if args.what in OF_MODELS and args.model not in REFERENCES.get(mechanism, {}):
             continue
-        if args.curvilinear and mechanism not in CORRECTIONS[args.curvilinear].mechanisms:
+        formulas = CORRECTIONS.get(args.curvilinear)
+        if formulas is not None and mechanism not in formulas.mechanisms:
             without.append(mechanism)
             continue
         for count in kernel.vertices.tolist():
             parts = (mechanism, f"N{count}", args.what, *ending)
             name = f"{start.name}-{'-'.join(filter(None, parts))}.csv"
             texts[start.with_name(name)] = kernel_matrix(
-                kernel, mechanism, count, args.what, args.model, args.curvilinear
-            )
+                kernel, mechanism, count, args.what, args.model, args.curvilinear,
+                exact.get(mechanism),
+            )  # fmt: skip
     if without:
         words = (
             f"{args.curvilinear} has no curvilinear factor for {', '.join(without)}: export "

@@ -42,7 +42,13 @@ from flocsim.io.journal.journal import journal_of
 from flocsim.io.results import strength_file, swarm_file
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import OUTCOMES, Totals, read_overview
-from flocsim.io.results.run_words import choice_lines, class_words, describe_note, sphere_words
+from flocsim.io.results.run_words import (
+    choice_lines,
+    class_words,
+    describe_note,
+    sphere_words,
+    water_words,
+)
 from flocsim.io.results.schema import BONDS, Results
 from flocsim.io.results.swarm_file import table_of
 from flocsim.io.shapes.fit_report import format_errors
@@ -74,18 +80,27 @@ def add_parser(subparsers: Any) -> None:
         "--modules", action="store_true",
         help="print only the modules of one's own that it was run with",
     )  # fmt: skip
+    parser.add_argument(
+        "--water", action="store_true",
+        help="print only how often the equivalent spheres of a study of pairs or rates touch, with "
+        "the water that they push at each other and without, a second or two for each pair; of a "
+        "shape library how fast its flocs sink and turn",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:
     journal = journal_of(args.results)
     if journal is not None:
-        if args.config or args.modules:
+        if args.config or args.modules or args.water:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
         # All kinds of studies, and the engine with them, are wanted here alone.
         from flocsim.ensembles.unfinished import read_unfinished
 
         print(unfinished_text(read_unfinished(journal)))
+        return 0
+    if args.water:
+        print("\n".join(water_lines(args.results)))
         return 0
     if not (args.config or args.modules):
         print(text_of(args.results))
@@ -93,6 +108,30 @@ def run(args: Namespace) -> int:
     _, results = content_of(args.results, (RESULTS, SWARM))
     print_kept(args, results.run)
     return 0
+
+
+def water_lines(path):
+    """What slow flow makes of the equivalent spheres of a study, or of the flocs of a library."""
+    from flocsim.ensembles.studies.opened import open_results
+    from flocsim.hydrodynamics import prism_drag
+
+    kind, entries = content_of(path, (RESULTS, LIBRARY), READERS | {RESULTS: read_overview})
+    if kind == RESULTS:
+        return [water_words(each) for each in open_results(path).in_water()]
+    rows = [("floc", "sinks", "at least", "turns", "B", "+- %")]
+    for entry in entries:
+        count = max(entry.fits)
+        drag = prism_drag(entry.fits[count].shape.outline())
+        rows.append((
+            visible(entry.floc_id, ""), *(f"{each:.3f}" for each in drag.mobility),
+            f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
+        ))  # fmt: skip
+    heading = (
+        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: how fast they sink, at most and at "
+        "least, and turn, over their equivalent spheres; B, by which a strain turns them, over "
+        "that of a line"
+    )
+    return [heading, *aligned(rows)]
 
 
 def print_kept(args, run):

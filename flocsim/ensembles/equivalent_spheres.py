@@ -1,9 +1,14 @@
-"""What integrals say of the equivalent spheres of a brownian study: how often they would touch, and
-how much their interaction slows down their coagulation.
+"""What is known of the equivalent spheres of a study without running it.
 
-In the plane, where the study is, so many of two spheres that are let go at a distance r touch
-before they are b apart: ln(b/r)/ln(b/(r_i + r_j)) without forces between them. What shapes do
-beyond that is the difference to these. The stability ratio W is that of three dimensions.
+Of a brownian one by integrals: how often they would touch, and how much their interaction slows
+down their coagulation. In the plane, where the study is, so many of two spheres that are let go at
+a distance r touch before they are b apart: ln(b/r)/ln(b/(r_i + r_j)) without forces between them.
+What shapes do beyond that is the difference to these. The stability ratio W is that of three
+dimensions.
+
+Of settling and flows by their ways in three dimensions, without inertia: the share of the
+rectilinear kernel of those that come to touch, with the water that they push at each other, and
+without (flocsim.hydrodynamics).
 """
 
 import math
@@ -12,13 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.brownian.splitting import splitting_probability, stability_ratio
+from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
+from flocsim.constants import MINIMUM_GAP
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import sphere_pairs
+from flocsim.errors import UsageError
+from flocsim.forces import VanDerWaals
 from flocsim.forces.thermal import thermal_in
+from flocsim.hydrodynamics import Meeting, SpherePair
 
 
 def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
@@ -50,3 +59,50 @@ def facts_of(pair: Encounter) -> dict[str, Any]:
         }
     plain = {name: value if math.isfinite(value) else None for name, value in found.items()}
     return {"release": near, "escape": far, "diffusion": pair.diffusion} | plain
+
+
+def water_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
+    """[{type, water, alone}] of the collision types that settling or a flow brings together: the
+    share of the rectilinear kernel of their equivalent spheres that touches with the water that
+    they push at each other, and without.
+
+    UsageError for ratios of radii that the resistance functions do not reach.
+    """
+    found = []
+    for name, pair in sphere_pairs(config, flocs):
+        if pair.meeting != BROWNIAN:
+            try:
+                shares = {key: share_in(pair, key == "water") for key in ("water", "alone")}
+            except UsageError as error:
+                raise UsageError(f"{name}: {error}") from error
+            found.append({"type": name, **shares})
+    return found
+
+
+def share_in(pair: Encounter, water: bool) -> float:
+    """Of one pair, with the water between the two or without."""
+    system = pair.system
+    if words := unknown_in_water(pair):
+        raise UsageError(f"how often spheres touch in water is not known {words}")
+    first, second = (shape.equivalent_radius for shape in pair.shapes)
+    spheres = SpherePair((first, second), system.fluid.viscosity)
+    force = repulsion(system.forces, (first, second), system.fluid)
+    cuts = [each.d_min for each in system.forces if isinstance(each, VanDerWaals)]
+    meeting = Meeting(spheres, force, min(cuts, default=MINIMUM_GAP), water)
+    if pair.rate is not None:
+        return meeting.in_flow(pair.meeting, pair.rate)
+    # The weights of spheres that settle alone, by Stokes's law, as fast as these do.
+    speeds = [-float(velocity[1]) for velocity, _ in pair.settling]
+    drag = 6.0 * math.pi * system.fluid.viscosity
+    return meeting.settling((drag * first * speeds[0], drag * second * speeds[1]))
+
+
+def unknown_in_water(pair: Encounter) -> str:
+    """Why what water does to two spheres cannot be said of a pair; "" where it can."""
+    if thermal_in(pair.system.forces):
+        return "where they are kicked: leave [forces.thermal] out"
+    if any(body.fixed for body in pair.system.bodies):
+        return "where one is held: choose scene.receiver = 'free'"
+    if pair.meeting == SETTLING and any(pair.system.fluid.flow):
+        return "where they settle in a flow: leave fluid.velocity and fluid.gradient out"
+    return ""

@@ -115,6 +115,9 @@ RECTILINEAR = (
 )
 """What is to be known of all widths and kernels."""
 
+IN_WATER = "what water does to the equivalent spheres: flocsim info FILE --water"
+"""Where that is to be had."""
+
 KERNEL_HEADER = (
     ("class", "i"), ("", "j"), ("width [um]", "touched"), ("", "aggregated"),
     ("alpha", "95 %    num."), ("beta2", "[m2/s]"), ("beta3 [m3/s]", "+- 95 %"),
@@ -124,7 +127,7 @@ KERNEL_HEADER = (
 
 def kernel_lines(kernel: Kernel) -> list[str]:
     """The rates of a kernel study as tables of text: one for each mechanism and N."""
-    lines = [f"capture widths and kernels, {RECTILINEAR}"]
+    lines = [f"capture widths and kernels, {RECTILINEAR}", IN_WATER]
     for m, mechanism in enumerate(kernel.mechanisms):
         for v, count in enumerate(kernel.vertices):
             rows = [

@@ -2,9 +2,11 @@
 
 import pytest
 
+from flocsim.__main__ import main
 from flocsim.commands.info import results_text, text_of
 from flocsim.io.results.file import read_overview, write_results
 from flocsim.io.results.strength_file import write_strengths
+from flocsim.io.shapes.library import SHIPPED
 from tests.helpers.small_rates import mixed
 from tests.helpers.synthetic_results import make_results
 
@@ -37,3 +39,12 @@ def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
     assert "2 at 1e-11 m, 1 at 1e-10 m, 1 at 1e-09 m" in text
     assert "1 opened, 1 opens at least rate, 1 holds at most rate, 1 failed" in text
     assert text.splitlines()[-1].split()[:5] == ["III", "1", "0.5", "6", "4"]
+
+
+def test_flocs_of_a_library_are_known_in_water(capsys):
+    assert main(["info", str(SHIPPED), "--water"]) == 0
+    heading, columns, *rows = capsys.readouterr().out.splitlines()
+    assert "prisms of 24 outlines" in heading and columns.split()[:2] == ["floc", "sinks"]
+    assert len(rows) == 24
+    most, least, turns, b, error = (float(each) for each in rows[0].split()[1:])
+    assert 0.6 < least <= most < 1.0 and 0.1 < turns < most and 0.0 <= b < 1.0 and error < 30.0

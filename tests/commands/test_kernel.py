@@ -66,6 +66,41 @@ def test_a_mechanism_without_a_factor_is_named(folder, capsys):
     assert told.err.count("\n") == 1 and "hill has no curvilinear factor for extension" in told.err
 
 
+def test_equivalent_spheres_are_known_in_water(folder, capsys):
+    (folder / "kernel.toml").write_text(
+        kernel_text(**SHEAR | {"scene": 'rate = "10 1/s"', "more": "[forces]\ndouble_layer = false",
+                               "sizes": '["5 um", "10 um"]'}), "utf-8",
+    )  # fmt: skip
+    assert main(["kernel", "kernel.toml", "--quiet"]) == 0
+    assert main(["info", "kernel.h5", "--water"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    names = ["settling:5um-10um", "shear:5um-5um", "shear:5um-10um", "shear:10um-10um"]
+    assert [line.partition(": equivalent")[0] for line in lines] == names
+    # Of quartz in water at 10 1/s.
+    assert float(lines[1].split()[4]) == pytest.approx(0.257, rel=0.02)
+    assert float(lines[3].split()[4]) == pytest.approx(0.159, rel=0.02)
+    assert main(["export", "matrix", "kernel.h5"]) == 0
+    assert main(["export", "matrix", "kernel.h5", "--curvilinear", "spheres"]) == 0
+    names = capsys.readouterr().out.split()
+    assert names[-1] == "kernel-shear-N1-efficiency-spheres-spheres.csv"
+    plain, wet = (np.genfromtxt(name, delimiter=",")[-2:, 1:] for name in names[1::2])
+    # Of spheres the product is what touches in water, closed in the plane as the efficiency is.
+    ratio = wet / plain
+    assert ratio == pytest.approx(ratio.T) and ratio[0, 0] == pytest.approx(0.257 / 1.124, rel=0.02)
+    assert "Jeffrey and Onishi" in (folder / names[-1]).read_text("utf-8")
+
+
+def test_spheres_too_unlike_for_water_are_refused_in_one_line(folder, capsys):
+    sizes = "scene.sizes=['1 um', '60 um']"
+    (folder / "kernel.toml").write_text(kernel_text(), "utf-8")
+    assert main(["kernel", "kernel.toml", "--quiet", "--set", sizes]) == 0
+    capsys.readouterr()
+    for command in ("info kernel.h5 --water", "export matrix kernel.h5 --curvilinear spheres"):
+        assert main(command.split()) == 2
+        told = capsys.readouterr().err
+        assert "0.02 to 50 times each other, found 60" in told and told.count("\n") == 1
+
+
 def test_more_points_extend_a_study_as_if_run_at_once(folder):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     assert main(["kernel", "kernel.toml", "--quiet", "--replicates", "64", "--resume"]) == 0

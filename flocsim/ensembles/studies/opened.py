@@ -12,6 +12,7 @@ from flocsim.ensembles.config.consent import Consent, read_sources
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.equivalent_spheres import water_facts
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
 from flocsim.ensembles.storage.stored_json import stored
@@ -169,6 +170,15 @@ class StudyResults(Tables):
         found = replicate_of(int(replicate), place, study, STEPS_MORE + 2 * int(row["steps"]))
         self.hold(found, row)
         return found
+
+    def in_water(self) -> list[dict[str, Any]]:
+        """[{type, water, alone}]: the share of the rectilinear kernel of the equivalent spheres of
+        each type that touches with the water that they push at each other, and without.
+
+        Computed by their ways in three dimensions, without inertia (flocsim.hydrodynamics), in a
+        second for each type. UsageError where that is not known.
+        """
+        return water_facts(self.config)
 
     def row(self, replicate: int, place: Place) -> dict[str, Any]:
         """The stored row of a replicate, in words."""

@@ -22,6 +22,9 @@ As in public codes, read at these commits:
 - settling: all of these, and ESCOMP/CARMA (source/base/setupckern.F90, 11868d2), as Fuchs's.
 
 SLAMS 1.0 has 1 + 2p² for (1 + 2p)², which would be 2.5 times the rectilinear kernel at p = 1.
+
+These know neither attraction nor how water is squeezed out of a gap; what does, for a study's own
+spheres and forces, is "spheres" (flocsim.hydrodynamics, computed by whoever has the config).
 """
 
 from collections.abc import Callable
@@ -73,6 +76,17 @@ CORRECTIONS = {
     ),
 }
 """{name: Correction}."""
+
+SPHERES = "spheres"
+"""The name of what two spheres in water do, which no formula says."""
+
+ABOUT_SPHERES = [
+    "curvilinear factor 'spheres': how often equivalent spheres touch with the water that they "
+    "push at each other, over how often they do without; resistance functions of Jeffrey and "
+    "Onishi (1984) and Jeffrey (1992), the study's own forces, no inertia",
+    "it is one of solid spheres: what shapes and permeable flocs do to it is not known",
+]
+"""Lines for whoever gets numbers with that factor in them."""
 
 
 def formula(name: str, mechanism: str) -> tuple[Callable[[np.ndarray], np.ndarray], str]:

@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.results.curvilinear import about_factor, curvilinear_factor
+from flocsim.io.results.curvilinear import ABOUT_SPHERES, about_factor, curvilinear_factor
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, Kernel
 
 REFERENCES = {
@@ -92,14 +92,14 @@ def efficiency_for(
 
 def kernel_matrix(
     kernel: Kernel, mechanism: str, vertices: int, quantity: str = "efficiency",
-    model: str = "spheres", curvilinear: str | None = None,
+    model: str = "spheres", curvilinear: str | None = None, factors: np.ndarray | None = None,
 ) -> str:  # fmt: skip
     """A square matrix as CSV, radii [m] in its first row and column, behind lines that start with #
     and say what it holds and what it multiplies. ``curvilinear``: the name of a factor that
-    efficiencies are multiplied by, element by element."""
+    efficiencies are multiplied by, element by element; ``factors`` (i, j): those of "spheres"."""
     m, v = kernel.place_of(mechanism, vertices)
     bound = ["without hydrodynamic interaction: an upper bound"]
-    if curvilinear is not None and quantity not in OF_MODELS:
+    if (curvilinear is not None or factors is not None) and quantity not in OF_MODELS:
         raise UsageError(
             f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: take "
             "efficiency, or leave it out"
@@ -109,7 +109,10 @@ def kernel_matrix(
         held = quantity.replace("_low", ", lower 95 % bound,").replace(
             "_high", ", upper 95 % bound,"
         )
-        if curvilinear is not None:
+        if factors is not None:
+            held, bound = f"{held} times curvilinear factor", ABOUT_SPHERES
+            values = values * factors
+        elif curvilinear is not None:
             rows = kernel.radii[:, np.newaxis]
             values = values * curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
             held += " times curvilinear factor"

@@ -51,3 +51,11 @@ def choice_lines(record: dict) -> list[str]:
         f"{100.0 * record['half_width']:.2g} %"
     )
     return lines
+
+
+def water_words(facts: dict) -> str:
+    """The facts of one collision type in a line."""
+    return (
+        f"{facts['type']}: equivalent spheres touch {facts['water']:.4g} times as often as on "
+        f"undisturbed ways with the water between them, {facts['alone']:.4g} times without it"
+    )

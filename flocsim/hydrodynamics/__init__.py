@@ -1,0 +1,13 @@
+"""How slow flow resists bodies.
+
+two_spheres: the resistance functions of two unequal spheres, exactly; pair: what follows from them
+for motion in a plane; encounters: which of two spheres that meet touch; prism: the drag of a
+floc's outline. May import errors.
+"""
+
+from flocsim.hydrodynamics.encounters import Meeting
+from flocsim.hydrodynamics.pair import Relative, SpherePair
+from flocsim.hydrodynamics.prism import PrismDrag, prism_drag
+from flocsim.hydrodynamics.two_spheres import TwoSpheres
+
+__all__ = ["Meeting", "PrismDrag", "Relative", "SpherePair", "TwoSpheres", "prism_drag"]

@@ -1,0 +1,193 @@
+"""Drag of a floc's outline: a prism of it, its surface covered by small spheres that move as one.
+
+The spheres push each other by the tensor of Rotne, Prager and Yamakawa, and what each has to bear
+follows from one linear system (a rigid multiblob). As the spheres stand out from the surface, the
+body is too large by a share of their spacing: from three spacings follow the limit of none, and by
+how much that may be wrong. Nothing moves out of the plane, so that half of the surface is enough.
+
+Sources: H. Yamakawa (1970), J. Chem. Phys. 53, 436 (with overlaps: E. Wajnryb et al. 2013, J. Fluid
+Mech. 731, R3); S. Delong et al. (2015), Commun. Appl. Math. Comput. Sci. 11, 217.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.errors import UsageError
+
+SPHERES = (150, 300, 600)
+"""Of half of a surface, about: three coverings."""
+
+RADIUS = 0.5
+"""Of a sphere, over their spacing."""
+
+LEAST_LAYER = 0.6
+"""Spheres of the two faces are as many spacings from the outline at least, where others are."""
+
+
+ACROSS = np.array([[math.cos(0.3), math.sin(0.3)], [-math.sin(0.3), math.cos(0.3)]])
+"""How rows of a face lie: along no straight side, whose distance to the nearest would count."""
+
+
+@attrs.frozen(eq=False)
+class PrismDrag:
+    """How a rigid prism moves in its plane through slow flow of viscosity 1, around the origin.
+
+    ``resistance`` (3, 3) [m, m², m³], symmetric and positive, of (v_x, v_y, spin); ``strain``
+    (3, 2) [m², m³] of E_xx = −E_yy and E_xy. Times the viscosity µ the load is
+    (f_x, f_y, torque) = −R (v − u, ω − Ω) + Γ (E_xx, E_xy), u and Ω the flow's at the origin.
+    ``error``: by which share numbers may be wrong; ``radius``: r_eq of the outline [m].
+    """
+
+    resistance: np.ndarray
+    strain: np.ndarray
+    error: float
+    radius: float
+
+    @property
+    def mobility(self) -> np.ndarray:
+        """Those in the plane (2,), the larger first, of a body that is free to turn, over that of
+        the equivalent sphere."""
+        free = np.linalg.inv(self.resistance)[:2, :2]
+        return 6.0 * math.pi * self.radius * np.linalg.eigvalsh(free)[::-1]
+
+    @property
+    def turning(self) -> float:
+        """The mobility of turning freely, over that of the equivalent sphere."""
+        return float(8.0 * math.pi * self.radius**3 * np.linalg.inv(self.resistance)[2, 2])
+
+    @property
+    def elongation(self) -> float:
+        """B by which a strain turns it freely, Jeffery's (a² − b²)/(a² + b²) of an ellipse."""
+        return float(np.hypot(*np.linalg.solve(self.resistance, self.strain)[2]))
+
+
+def prism_drag(rings: Sequence[np.ndarray], depth: float | None = None) -> PrismDrag:
+    """The PrismDrag of an outline, closed ``rings`` [(k, 2), …] in metres, outer ones and holes.
+
+    ``depth`` [m]: by default 4/3 r_eq, with which the prism has the volume of the equivalent
+    sphere. UsageError where the rings hold no area, or the depth none.
+    """
+    rings = [np.asarray(ring, dtype=float) for ring in rings]
+    rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
+    # Where rings nest, a hole takes away what it holds.
+    area = sum(
+        ring_area(ring) * (-1.0) ** depth_of(place, rings) for place, ring in enumerate(rings)
+    )
+    if not 0.0 < area < math.inf:
+        raise UsageError(f"an outline must hold an area above 0 m^2, found {area:.3g}")
+    radius = math.sqrt(area / math.pi)
+    height = 4.0 / 3.0 if depth is None else depth / radius
+    if not 0.0 < height < math.inf:
+        raise UsageError(f"the depth of a prism must be above 0 m, found {depth!r}")
+    unit = [ring / radius for ring in rings]
+    spacings, found = [], []
+    perimeter = sum(np.sum(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)) for ring in unit)
+    for count in SPHERES:
+        spacings.append(math.sqrt((0.5 * height * perimeter + math.pi) / count))
+        found.append(loads(surface(unit, height, spacings[-1]), RADIUS * spacings[-1]))
+    # The line through the three, and those through two of them.
+    spacing, values = np.array(spacings), np.reshape(found, (len(found), -1))
+    lines = [np.polyfit(spacing[use], values[use], 1)[1] for use in ([0, 1, 2], [0, 1], [1, 2])]
+    last, *others = (each.reshape(found[0].shape) for each in lines)
+    error = max(np.max(np.abs(np.diag(each) / np.diag(last) - 1.0)) for each in others)
+    powers = np.array([1.0, 1.0, 2.0])
+    grown = radius ** (powers[:, None] + np.array([1.0, 1.0, 2.0, 2.0, 2.0]) - 1.0)
+    whole = last * grown
+    resistance = 0.5 * (whole[:, :3] + whole[:, :3].T)
+    return PrismDrag(resistance, whole[:, 3:], float(error), radius)
+
+
+def ring_area(ring: np.ndarray) -> float:
+    """What a ring encloses, whatever its sense."""
+    x, y = ring.T
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+
+
+def depth_of(place: int, rings: Sequence[np.ndarray]) -> int:
+    """How many of the others a ring lies in."""
+    others = [ring for other, ring in enumerate(rings) if other != place]
+    return int(crossings(rings[place][:1], others)[0]) if others else 0
+
+
+def crossings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
+    """In how many rings points (k, 2) lie (k,)."""
+    count = np.zeros(len(points), dtype=int)
+    x, y = points[:, 0, None], points[:, 1, None]
+    for ring in rings:
+        ahead = np.roll(ring, -1, axis=0)
+        passes = (ring[:, 1] > y) != (ahead[:, 1] > y)
+        rise = np.where(ahead[:, 1] == ring[:, 1], 1.0, ahead[:, 1] - ring[:, 1])
+        left = x < ring[:, 0] + (ahead[:, 0] - ring[:, 0]) * (y - ring[:, 1]) / rise
+        count += np.sum(passes & left, axis=1) % 2
+    return count
+
+
+def surface(rings: Sequence[np.ndarray], height: float, spacing: float) -> np.ndarray:
+    """Places (k, 3) of spheres that cover the upper half of a prism: its wall, and a face."""
+    walls = [along(ring, spacing) for ring in rings]
+    # An even number: none lies in the middle.
+    layers = 2 * max(1, round((height / spacing + 1.0) / 2.0))
+    levels = np.linspace(-0.5 * height, 0.5 * height, layers)[layers // 2 :]
+    wall = np.concatenate(walls)
+    middle = wall.mean(axis=0)
+    reach = float(np.max(np.hypot(*(wall - middle).T))) + spacing
+    rows = np.arange(-reach, reach, spacing * math.sqrt(0.75))
+    columns = np.arange(-reach, reach, spacing)
+    shift = 0.5 * spacing * (np.arange(len(rows)) % 2)
+    grid = np.column_stack([(columns + shift[:, None]).ravel(), np.repeat(rows, len(columns))])
+    grid = middle + grid @ ACROSS
+    grid = grid[crossings(grid, rings) % 2 == 1]
+    # Wall spheres are as dense as the spacing: the nearest is as far as the outline, nearly.
+    gap = np.min(np.hypot(*(grid[:, None] - wall).T), axis=0) if len(grid) else np.empty(0)
+    grid = grid[gap > LEAST_LAYER * spacing]
+    return np.concatenate([
+        np.column_stack([places, np.full(len(places), level)])
+        for places, level in [*((wall, level) for level in levels), (grid, 0.5 * height)]
+    ])  # fmt: skip
+
+
+def along(ring: np.ndarray, spacing: float) -> np.ndarray:
+    """Even points of a ring."""
+    closed = np.vstack([ring, ring[:1]])
+    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(closed, axis=0).T)))
+    count = max(3, round(way[-1] / spacing))
+    places = (np.arange(count) + 0.5) * way[-1] / count
+    return np.column_stack([np.interp(places, way, axis) for axis in closed.T])
+
+
+def pushes(places: np.ndarray, others: np.ndarray, radius: float) -> np.ndarray:
+    """(k, m, 3, 3): velocities of spheres by forces on others, all of one radius, viscosity 1."""
+    apart = places[:, None] - others
+    distance = np.linalg.norm(apart, axis=2)
+    r = np.maximum(distance, 1e-9 * radius)
+    outside = distance >= 2.0 * radius
+    even = np.where(
+        outside, (1.0 + 2.0 * radius**2 / (3.0 * r**2)) / (8.0 * math.pi * r),
+        (1.0 - 9.0 * r / (32.0 * radius)) / (6.0 * math.pi * radius),
+    )  # fmt: skip
+    towards = np.where(
+        outside, (1.0 - 2.0 * radius**2 / r**2) / (8.0 * math.pi * r**3),
+        3.0 / (32.0 * radius * r) / (6.0 * math.pi * radius),
+    )  # fmt: skip
+    found = (towards[..., None] * apart)[..., None] * apart[..., None, :]
+    found[..., range(3), range(3)] += even[..., None]
+    return found
+
+
+def loads(places: np.ndarray, radius: float) -> np.ndarray:
+    """(3, 5): forces and torque that v_x, v_y, a spin, E_xx and E_xy take, by unit viscosity."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    count, mirror = len(places), np.array([1.0, 1.0, -1.0])
+    matrix: Any = pushes(places, places, radius)
+    matrix += pushes(places, places * mirror, radius) * mirror
+    matrix = np.moveaxis(matrix, 2, 1).reshape(3 * count, 3 * count)
+    x, y, _ = places.T
+    none, one = np.zeros(count), np.ones(count)
+    motions = [(one, none, none), (none, one, none), (-y, x, none), (x, -y, none), (y, x, none)]
+    wanted = np.stack([np.column_stack(each).ravel() for each in motions], axis=1)
+    return 2.0 * wanted[:, :3].T @ cho_solve(cho_factor(matrix, overwrite_a=True), wanted)

@@ -1,0 +1,131 @@
+"""Spheres that meet in water: published and exact efficiencies."""
+
+import numpy as np
+import pytest
+
+from flocsim.errors import UsageError
+from flocsim.hydrodynamics import Meeting, SpherePair
+
+
+def attraction(radii, k):
+    """−H_A r*/(6 d²) with H_A = 36πµ k, in units of µ = 1."""
+    first, second = radii
+    return lambda gap: -6.0 * np.pi * k * first * second / (first + second) / gap**2
+
+
+def settling(k, water, radii=(0.5, 1.0), touch=1e-7):
+    """b_c/R of spheres of one density, k over w R²."""
+    size = sum(radii)
+    speeds = [radius**2 for radius in radii]
+    force = attraction(radii, k * abs(speeds[1] - speeds[0]) * size**2)
+    weights = tuple(6.0 * np.pi * radius**3 for radius in radii)
+    meeting = Meeting(SpherePair(radii), force, touch * size, water)
+    return meeting.settling(weights) ** 0.5
+
+
+@pytest.mark.parametrize(("k", "with_water", "without"), [
+    (1e-2, 0.6288, 1.30769), (1e-4, 0.2537, 1.0474), (1e-6, 0.1400, 1.0075),
+])  # fmt: skip
+def test_settling(k, with_water, without):
+    assert settling(k, True) == pytest.approx(with_water, rel=3e-3)
+    assert settling(k, False) == pytest.approx(without, rel=3e-4)
+    assert settling(k, True, (1.0, 0.5)) == pytest.approx(settling(k, True), rel=1e-6)
+
+
+@pytest.mark.parametrize(("k", "with_water", "without"), [
+    (1e-2, 0.604, 1.51), (1e-3, 0.325, 1.19), (1e-4, 0.189, 1.07), (1e-5, 0.110, 1.03),
+])  # fmt: skip
+def test_shear(k, with_water, without):
+    pair, force = SpherePair((1.0, 1.0)), attraction((1.0, 1.0), k)
+    assert Meeting(pair, force, 1e-7).in_flow("shear", 1.0) == pytest.approx(with_water, rel=8e-3)
+    alone = Meeting(pair, force, 1e-7, water=False).in_flow("shear", 1.0)
+    assert alone == pytest.approx(without, abs=6e-3)
+
+
+@pytest.mark.parametrize(("radius", "alpha"), [(5e-6, 0.257), (10e-6, 0.159), (20e-6, 0.096)])
+def test_quartz_in_shear(radius, alpha):
+    def force(gap):
+        return -4.7e-20 * 0.5 * radius / (6.0 * np.maximum(gap, 1e-9) ** 2)
+
+    meeting = Meeting(SpherePair((radius, radius), 0.89e-3), force, 1e-9)
+    assert meeting.in_flow("shear", 10.0) == pytest.approx(alpha, rel=0.02)
+
+
+@pytest.mark.parametrize("flow", ["shear", "extension"])
+@pytest.mark.parametrize("rate", [1.0, 30.0])
+def test_without_water_and_forces_all_of_the_kernel_touches(flow, rate):
+    meeting = Meeting(SpherePair((0.4, 1.0)), np.zeros_like, 1e-6, water=False)
+    assert meeting.in_flow(flow, rate) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_without_water_and_forces_spheres_settle_straight():
+    meeting = Meeting(SpherePair((0.4, 1.0)), np.zeros_like, 1e-6, water=False)
+    assert meeting.settling((0.2, 3.0)) == pytest.approx(1.0, rel=5e-4)
+
+
+def test_a_small_one_goes_round_a_large_one():
+    # Of spheres of one density that do not attract each other, the more is left the nearer they
+    # may come; in Stokes's flow around the large one all are fewer than ½ p² (Fuchs).
+    weights = 6.0 * np.pi * 0.05**3, 6.0 * np.pi
+    caught = [Meeting(SpherePair((0.05, 1.0)), np.zeros_like, touch).settling(weights)
+              for touch in (1e-5, 1e-4, 1e-3)]  # fmt: skip
+    assert np.all(np.diff(caught) > 0.0) and caught[-1] < 0.5 * (0.05 / 1.05) ** 2
+
+
+def test_in_shear_small_ones_come_round_before_they_meet():
+    # Closed ways around the large one let no small one near (Wang, Zinchenko and Davis 1994).
+    def share(ratio, flow):
+        radii = (ratio, 1.0)
+        return Meeting(SpherePair(radii), attraction(radii, 1e-6), 1e-5).in_flow(flow, 1.0)
+
+    assert share(0.02, "shear") == 0.0 < share(0.02, "extension")
+    assert share(0.1, "shear") < 0.3 * share(0.1, "extension")
+
+
+def test_repulsion_keeps_all_apart():
+    meeting = Meeting(SpherePair((0.5, 1.0)), lambda gap: 1e3 * np.exp(-gap / 0.1), 1e-4)
+    assert meeting.settling((0.1, 1.0)) == 0.0
+    assert meeting.in_flow("shear", 1.0) == 0.0
+
+
+def test_spheres_change_places_in_shear():
+    found = [Meeting(SpherePair(radii), attraction(radii, 1e-3), 1e-6).in_flow("shear", 1.0)
+             for radii in ((0.5, 1.0), (1.0, 0.5))]  # fmt: skip
+    assert found[0] == pytest.approx(found[1], rel=1e-4)
+
+
+def test_units():
+    unit_force = attraction((0.5, 1.0), 1e-3)
+
+    def force(gap):
+        # µ G a² of 1 mPa s, 5/s and 1 µm.
+        return 5e-15 * unit_force(1e6 * gap)
+
+    small = Meeting(SpherePair((0.5e-6, 1e-6), 1e-3), force, 1e-12)
+    unit = Meeting(SpherePair((0.5, 1.0)), unit_force, 1e-6)
+    assert small.in_flow("shear", 5.0) == pytest.approx(unit.in_flow("shear", 1.0), rel=1e-3)
+
+
+def test_a_force_that_gives_no_number_is_refused():
+    def force(gap):
+        return np.where(gap < 0.1, np.nan, 0.0)
+
+    with pytest.raises(UsageError, match="gives no number at a gap of 5e-07 m"):
+        Meeting(SpherePair((1.0, 1.0)), force, 1e-6).in_flow("shear", 1.0)
+
+
+@pytest.mark.parametrize("touch", [0.0, -1e-9, 1.0, float("nan")])
+def test_a_touch_lies_near_the_spheres(touch):
+    with pytest.raises(UsageError, match="touch at a gap above 0 m"):
+        Meeting(SpherePair((1.0, 1.0)), np.zeros_like, touch)
+
+
+@pytest.mark.parametrize(("flow", "rate"), [("rotation", 1.0), ("shear", 0.0), ("shear", -1.0)])
+def test_other_flows_are_refused(flow, rate):
+    with pytest.raises(UsageError, match="flow must be one of shear, extension"):
+        Meeting(SpherePair((1.0, 1.0)), np.zeros_like, 1e-6).in_flow(flow, rate)
+
+
+def test_alike_ones_never_meet():
+    with pytest.raises(UsageError, match="settle at the same speed"):
+        Meeting(SpherePair((1.0, 1.0)), np.zeros_like, 1e-6).settling((1.0, 1.0))

@@ -1,0 +1,141 @@
+"""Drag of outlines: spheroids and prisms whose drag is known, symmetry, and real flocs."""
+
+import numpy as np
+import pytest
+
+from flocsim import Sphere, SpheroPolygon
+from flocsim.errors import UsageError
+from flocsim.hydrodynamics import prism, prism_drag
+from tests.helpers.real_images import silhouettes
+
+TURN = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+DISC = np.column_stack([np.cos(TURN), np.sin(TURN)])
+ELLIPSE = DISC * [2.0**0.5, 0.5**0.5]
+HOOK = np.array([[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]], dtype=float) - [1.3, 0.9]
+
+
+def test_a_disc_prism():
+    drag = prism_drag([DISC])
+    assert drag.mobility == pytest.approx(0.976, rel=0.015)
+    assert drag.turning == pytest.approx(0.830, rel=0.02)
+    assert drag.elongation < 2e-3 and drag.radius == pytest.approx(1.0, rel=1e-3)
+    assert np.abs(drag.resistance[2, :2]).max() < 3e-2
+
+
+def test_an_ellipse_of_two_to_one():
+    drag = prism_drag([ELLIPSE])
+    assert drag.mobility == pytest.approx([1.007, 0.886], rel=0.015)
+    # Of an ellipsoid (a² − b²)/(a² + b²).
+    assert drag.elongation == pytest.approx(0.6, rel=0.03)
+
+
+@pytest.mark.parametrize("count", [400, 800])
+def test_a_sphere_of_spheres(count):
+    # By the same pushes and the same limit: from two coverings to none.
+    speeds, spacings = [], []
+    for number in (count // 2, count):
+        place = np.arange(number) + 0.5
+        z, angle = 1.0 - 2.0 * place / number, np.pi * (1.0 + 5.0**0.5) * place
+        flat = np.sqrt(1.0 - z * z)
+        points = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), z])
+        spacings.append((4.0 * np.pi / number) ** 0.5)
+        radius = prism.RADIUS * spacings[-1]
+        matrix = np.moveaxis(prism.pushes(points, points, radius), 2, 1)
+        matrix = matrix.reshape(3 * number, 3 * number)
+        wanted = np.tile(np.eye(3), (number, 1))
+        speeds.append(6.0 * np.pi / (wanted.T @ np.linalg.solve(matrix, wanted))[0, 0])
+    wide, fine = spacings
+    limit = speeds[1] + (speeds[1] - speeds[0]) * fine / (wide - fine)
+    assert limit == pytest.approx(1.0, abs=6e-3)
+    assert 0.95 < speeds[1] < 1.0
+
+
+def test_the_stated_error_covers_a_finer_covering(monkeypatch):
+    usual = prism_drag([HOOK])
+    monkeypatch.setattr(prism, "SPHERES", (300, 600, 1200))
+    finer = prism_drag([HOOK])
+    assert np.all(np.abs(finer.mobility / usual.mobility - 1.0) < usual.error)
+    assert abs(finer.turning / usual.turning - 1.0) < usual.error < 0.05
+
+
+def test_resistance_is_positive_symmetric_and_scales():
+    drag, large = prism_drag([HOOK]), prism_drag([3.0 * HOOK])
+    assert np.array_equal(drag.resistance, drag.resistance.T)
+    assert np.linalg.eigvalsh(drag.resistance).min() > 0.0
+    powers = np.array([1.0, 1.0, 2.0])
+    scale = 3.0 ** (powers[:, None] + powers - 1.0)
+    assert large.resistance == pytest.approx(scale * drag.resistance, rel=1e-6, abs=1e-6)
+    assert large.strain == pytest.approx(3.0 ** (powers[:, None] + 1.0) * drag.strain, rel=1e-6)
+
+
+def test_a_turned_body_has_the_turned_resistance():
+    angle = 0.7
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s], [s, c]])
+    whole = np.eye(3)
+    whole[:2, :2] = turn
+    drag, turned = prism_drag([HOOK]), prism_drag([HOOK @ turn.T])
+    # But for how the spheres of the faces lie.
+    scale = np.sqrt(np.outer(np.diag(drag.resistance), np.diag(drag.resistance)))
+    expected = whole @ drag.resistance @ whole.T
+    assert np.abs((turned.resistance - expected) / scale).max() < 0.02
+    assert turned.mobility == pytest.approx(drag.mobility, rel=0.01)
+    assert turned.elongation == pytest.approx(drag.elongation, rel=0.1)
+
+
+def test_elsewhere_the_resistance_is_that_of_the_same_body():
+    away = np.array([2.0, -1.0])
+    shift = np.eye(3)
+    # v at the old origin by v and spin at the new one.
+    shift[:2, 2] = -away[1], away[0]
+    drag, moved = prism_drag([HOOK]), prism_drag([HOOK + away])
+    expected = shift.T @ drag.resistance @ shift
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs((moved.resistance - expected) / scale).max() < 0.01
+
+
+def test_holes_count():
+    ring = prism_drag([DISC, 0.6 * DISC[::-1]])
+    assert ring.radius == pytest.approx(0.8, rel=1e-3)
+    # What is let through and what is not: less area, as wide.
+    assert ring.mobility.max() < prism_drag([DISC]).mobility.min()
+
+
+def test_shapes_of_flocsim():
+    sphere, square = Sphere(2e-6), SpheroPolygon(1e-6 * HOOK, 2e-7)
+    drag = prism_drag(sphere.outline())
+    assert drag.radius == pytest.approx(2e-6, rel=5e-3)
+    assert drag.mobility == pytest.approx(prism_drag([DISC]).mobility, rel=5e-3)
+    assert prism_drag(square.outline()).mobility.max() < 1.0
+
+
+def test_a_deeper_prism_sinks_more_slowly():
+    shallow, deep = (prism_drag([DISC], depth).mobility[0] for depth in (1.0, 3.0))
+    assert deep < shallow
+
+
+def test_real_flocs():
+    found = []
+    for mask, _ in silhouettes()[:8]:
+        # The runs of its pixels as an outline: the marching of the mask's corners.
+        import shapely
+
+        rows, columns = np.nonzero(mask)
+        squares = shapely.box(columns, rows, columns + 1.0, rows + 1.0)
+        whole = shapely.union_all(squares)
+        largest = max(getattr(whole, "geoms", [whole]), key=lambda each: each.area)
+        ring = np.asarray(largest.exterior.coords)
+        found.append(prism_drag([ring - ring.mean(axis=0)]))
+    sinking = np.mean([np.mean(each.mobility) for each in found])
+    assert sinking == pytest.approx(0.923, abs=0.03)
+    assert np.mean([each.turning for each in found]) == pytest.approx(0.60, abs=0.09)
+
+
+@pytest.mark.parametrize(("rings", "depth", "words"), [
+    ([np.zeros((3, 2))], None, "must hold an area above 0"),
+    ([DISC], 0.0, "depth of a prism must be above 0 m, found 0.0"),
+    ([DISC], float("nan"), "depth of a prism"),
+])  # fmt: skip
+def test_what_is_no_prism(rings, depth, words):
+    with pytest.raises(UsageError, match=words):
+        prism_drag(rings, depth)
