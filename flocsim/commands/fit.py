@@ -24,6 +24,7 @@ from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule,
 from flocsim.io.plots.style import checked_format
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
+from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.ranges import PIXEL_SIZE
 
 DESCRIPTION = """\
@@ -141,7 +142,15 @@ def run(args: argparse.Namespace) -> int:
     flocs = [(picture, region) for picture in pictures for region in picture.regions]
     several = len(options.radii) > 1
     entries = [
-        make_entry(picture.name, region, fit[radius], options.pixel_size, radius, several)
+        make_entry(
+            picture.name,
+            region,
+            fit[radius],
+            options.pixel_size,
+            radius,
+            several,
+            picture.measures[region.label],
+        )
         for radius in options.radii
         for (picture, region), fit in zip(flocs, fits, strict=True)
     ]
@@ -159,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
     write_file(summary, table, rule)
     if args.overlay is not None:
         lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1, beneath)
-    print(format_errors(entries))
+    print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:

@@ -118,6 +118,11 @@ def test_the_summary_lists_every_region(tmp_path, frame):
     assert [row["left_out_because"] for row in rows] == ["", "not among the largest", "too small"]
     (entry,) = read_library(tmp_path / "s.h5")
     assert float(rows[0]["r_eq_m"]) == pytest.approx(0.5e-6 * entry.equivalent_radius, rel=1e-3)
+    assert entry.measures is not None
+    for name in ("perimeter", "aspect_ratio", "circularity", "solidity", "feret_max", "feret_min"):
+        head = name if name in rows[0] else f"{name}_px"
+        assert float(rows[0][head]) == pytest.approx(getattr(entry.measures, name), rel=1e-4)
+        assert rows[1][head] != "" and rows[2][head] == ""
     for n in (1, 4, 8):
         error = float(rows[0][f"re_percent_r1_N{n}"])
         assert error == pytest.approx(entry.fits[n].relative_error, abs=1e-4)

@@ -18,6 +18,7 @@ from flocsim.io.terminal import Progress
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
+    from flocsim.geometry.shapes.measures import ShapeMeasures
     from flocsim.io.images.pictures import Region, Segmentation
 
 LOST = FlocsimError.exit_code
@@ -55,12 +56,14 @@ class Options:
 
 @attrs.frozen(eq=False)
 class Picture:
-    """One picture or mask, what was found in it, and the regions of that to be fitted."""
+    """One picture or mask, what was found in it, the regions of that to be fitted, and the measures
+    {label: ShapeMeasures} [px] of all its flocs."""
 
     path: Path
     name: str
     found: "Segmentation"
     regions: "tuple[Region, ...]"
+    measures: "dict[int, ShapeMeasures]"
 
 
 @attrs.frozen
@@ -195,6 +198,7 @@ def masked(path, name, options):
 
 def chosen(path, name, found, options):
     """A Picture of a Segmentation, corrected as the user wants it."""
+    from flocsim.io.images.measures import mask_measures
     from flocsim.io.images.regions import with_holes
 
     found = corrected(name, found, options.correction)
@@ -202,7 +206,8 @@ def chosen(path, name, found, options):
         opened = tuple(with_holes(each, found.holes) for each in found.regions)
         found = attrs.evolve(found, regions=opened)
     found = attrs.evolve(found, holes=None)
-    return Picture(path, name, found, largest(found.regions, options.max_flocs))
+    measures = {region.label: mask_measures(region.mask) for region in found.regions}
+    return Picture(path, name, found, largest(found.regions, options.max_flocs), measures)
 
 
 def largest(regions, count):
