@@ -233,7 +233,6 @@ class JournalReader:
     def read(self, path):
         """Take its rows and look at them."""
         from flocsim.ensembles.chunks import ROW
-        from flocsim.io.results.schema import SHAPE_COLUMNS
         from flocsim.ensembles.collision.failures import FAILURES
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
