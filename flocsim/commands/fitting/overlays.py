@@ -48,7 +48,7 @@ def pictures_beneath(name, paths, drawn):
 def grey_beneath(picture, beneath, options):
     """What the overlay of a picture is drawn over."""
     if not options.masks:
-        return read_grey(picture.path)
+        return read_grey(picture.path, picture.plane)
     mask = picture.found.foreground
     if picture.path not in beneath:
         return mask

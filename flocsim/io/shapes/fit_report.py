@@ -84,15 +84,13 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def summary_text(
-    pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]], pixel_size: float
-) -> str:
+def summary_text(pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]]) -> str:
     """The table of all regions as CSV: flocs with their shape measures and RE [%] for every r [px]
     and N, others with why.
 
-    pictures: with name, found (Segmentation), regions, the fitted ones of found.regions, and
-    measures {label: ShapeMeasures} of found.regions;
-    fits: {r: {N: Fit}} of these regions in their order; pixel_size [m].
+    pictures: with name, pixel_size [m], found (Segmentation), regions, the fitted ones of
+    found.regions, and measures {label: ShapeMeasures} of found.regions;
+    fits: {r: {N: Fit}} of these regions in their order.
     """
     radii = list(fits[0]) if fits else []
     pairs = [(radius, count) for radius in radii for count in fits[0][radius]]
@@ -104,13 +102,13 @@ def summary_text(
         fitted = {region.label: next(results) for region in picture.regions}
         for region in picture.found.regions:
             why = "" if region.label in fitted else "not among the largest"
-            row = [picture.name, region.label, why, *_facts(region, pixel_size),
+            row = [picture.name, region.label, why, *_facts(region, picture.pixel_size),
                    *_measures(picture.measures[region.label])]  # fmt: skip
             errors = [f"{fitted[region.label][r][n].relative_error:.4f}" for r, n in pairs
                       if region.label in fitted]  # fmt: skip
             table.writerow([*row, *(errors or [""] * len(pairs))])
         for region in picture.found.rejected:
-            row = [picture.name, region.label, region.reason, *_facts(region, pixel_size)]
+            row = [picture.name, region.label, region.reason, *_facts(region, picture.pixel_size)]
             table.writerow([*row, *[""] * (len(MEASURE_COLUMNS) + len(pairs))])
     return text.getvalue()
 
