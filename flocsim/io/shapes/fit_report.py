@@ -29,6 +29,8 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
         parts.append(f"rejected {' and '.join(reasons)}")
     if found.left_whole:
         parts.append(f"{found.left_whole} taken for fractal aggregates and not parted (--neck)")
+    if found.annotated:
+        parts.append("a scale bar or its writing left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
