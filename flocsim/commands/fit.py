@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.fitting.overlays import draw, expected_overlays, pictures_beneath
+from flocsim.commands.fitting.overlays import draw, draw_fits, expected_overlays, pictures_beneath
 from flocsim.commands.fitting.pictures import (
     LOST,
     Options,
@@ -80,6 +80,9 @@ def add_parser(subparsers: Any) -> None:
         help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
         "what is left out, with the reason; with several pictures, one file each: "
         "FILE-picture.png")  # fmt: skip
+    add("--fits", metavar="FOLDER",
+        help="draw every fit at the largest N: mask, core, the outline that the disk sweeps, and the "
+        "pixels that differ")  # fmt: skip
     add("--pictures", metavar="FOLDER",
         help="with --masks: where the pictures of the same names are, for the overlay to be drawn "
         "over them and not over the masks")  # fmt: skip
@@ -137,6 +140,8 @@ def run(args: argparse.Namespace) -> int:
     outputs = [Output(args.output, rule), Output(summary, rule)]
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
+    if args.fits is not None:
+        make_folder(args.fits, "--fits ")
     if args.masks_out is not None:
         make_folder(args.masks_out, "--masks-out ")
         made = label_paths(args.masks_out, titles_of(paths)).values()
@@ -183,6 +188,8 @@ def run(args: argparse.Namespace) -> int:
     write_file(summary, table, rule)
     if args.overlay is not None:
         lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1, beneath)
+    if args.fits is not None:
+        draw_fits(args.fits, pictures, fits, options, drawn)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")

@@ -546,3 +546,10 @@ def test_parts_that_a_picture_has_not_are_told(tmp_path, frame, capsys, words, s
     options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
     assert run(frame, *options, *words) == 2
     assert said in capsys.readouterr().err
+
+
+def test_every_fit_is_drawn(tmp_path, frame):
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(frame, *options, "--fits", tmp_path / "f") == 0
+    names = sorted(path.name for path in (tmp_path / "f").iterdir())
+    assert names == ["a.png-1.png", "a.png-2.png", "a.png-3.png"]

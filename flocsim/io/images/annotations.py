@@ -19,7 +19,7 @@ LONG, SLENDER = 16, 4.0
 """Least length [px], and times the width, of a bar."""
 
 BOXED = 0.02
-"""Least share of a rectangle that writing on it covers: a plain one, not slender, may be anything."""
+"""Least share of a rectangle that writing on it covers: a plain stout one may be anything."""
 
 LARGEST = 0.25
 """Share of the picture above which a rectangle of one grey is its background."""
