@@ -81,8 +81,8 @@ def add_parser(subparsers: Any) -> None:
         "what is left out, with the reason; with several pictures, one file each: "
         "FILE-picture.png")  # fmt: skip
     add("--fits", metavar="FOLDER",
-        help="draw every fit at the largest N: mask, core, the outline that the disk sweeps, and the "
-        "pixels that differ")  # fmt: skip
+        help="draw every fit at the largest N: mask, core, the outline that the disk sweeps, and "
+        "the pixels that differ")  # fmt: skip
     add("--pictures", metavar="FOLDER",
         help="with --masks: where the pictures of the same names are, for the overlay to be drawn "
         "over them and not over the masks")  # fmt: skip
