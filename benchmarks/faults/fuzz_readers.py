@@ -215,10 +215,13 @@ class JournalReader:
     def rows(self):
         """Two good rows."""
         from flocsim.ensembles.chunks import ROW
+        from flocsim.io.results.schema import SHAPE_COLUMNS
 
         rows = np.zeros(2, ROW)
         rows["inside"], rows["bond"], rows["floc_i"], rows["floc_j"] = 1, 1, -1, -1
         rows["r_i"], rows["r_j"], rows["D_0"] = 1e-5, 2e-5, 4e-5
+        for name in SHAPE_COLUMNS:
+            rows[name] = 1.0
         for name in ("outcome", "inside", "bond"):
             rows[f"checked_{name}"] = rows[name][0], 255
         return rows

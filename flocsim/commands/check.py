@@ -136,8 +136,7 @@ def methods(
     if given is not None:
         if not math.isfinite(method.tolerance) or exact_method(method) is None:
             raise UsageError(
-                f"--tolerance is for methods that have one, which {integrator.label} has not: "
-                "leave it out"
+                f"the method {integrator.label} has no tolerance: leave --tolerance out"
             )
         low, high = given
         made: Any = method

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.fitting.overlays import draw, expected_overlays, pictures_beneath
+from flocsim.commands.fitting.overlays import draw, draw_fits, expected_overlays, pictures_beneath
 from flocsim.commands.fitting.pictures import (
     LOST,
     Options,
@@ -20,10 +20,12 @@ from flocsim.fields.quantities import read_number
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
+from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
 from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
+from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.ranges import PIXEL_SIZE
 
 DESCRIPTION = """\
@@ -46,7 +48,14 @@ def add_parser(subparsers: Any) -> None:
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
     add("--pixel-size", metavar="LENGTH",
-        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6")  # fmt: skip
+        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default: that which "
+        "an OME-TIFF or ImageJ file gives)")  # fmt: skip
+    add("--page", metavar="LIST",
+        help="of a stack: these pages, from 1, with commas between them, or all")  # fmt: skip
+    add("--channel", metavar="K",
+        help="of several channels or colours, this one: its number from 1, or name")  # fmt: skip
+    add("--crop", metavar="X,Y,W,H",
+        help="use this part of every picture: left, top, width, height in pixels")  # fmt: skip
     add("--vertices", default="4,8,16,64", metavar="LIST",
         help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
     add("--radius", default="1", metavar="LIST",
@@ -71,6 +80,9 @@ def add_parser(subparsers: Any) -> None:
         help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
         "what is left out, with the reason; with several pictures, one file each: "
         "FILE-picture.png")  # fmt: skip
+    add("--fits", metavar="FOLDER",
+        help="draw every fit at the largest N: mask, core, the outline that the disk sweeps, and "
+        "the pixels that differ")  # fmt: skip
     add("--pictures", metavar="FOLDER",
         help="with --masks: where the pictures of the same names are, for the overlay to be drawn "
         "over them and not over the masks")  # fmt: skip
@@ -118,17 +130,24 @@ def run(args: argparse.Namespace) -> int:
     if args.overlay is not None:
         checked_format(args.overlay, "--overlay ")
     paths = list_pictures(args.images, options.masks)
+    if options.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):
+        raise UsageError(
+            "--pixel-size is missing: of pictures only OME-TIFF and ImageJ files tell how large a "
+            "pixel is; give the length of its side, for example --pixel-size '0.95 um'"
+        )
     beneath = pictures_beneath(args.pictures, paths, args.masks and args.overlay is not None)
     rule, drawn = data_rule(args.overwrite), figure_rule(args.overwrite)
     outputs = [Output(args.output, rule), Output(summary, rule)]
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]
+    if args.fits is not None:
+        make_folder(args.fits, "--fits ")
     if args.masks_out is not None:
         make_folder(args.masks_out, "--masks-out ")
         made = label_paths(args.masks_out, titles_of(paths)).values()
         outputs += [Output(path, rule) for path in made]
     check_outputs(outputs, [*paths, *beneath.values()])
-    doubt = PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
+    doubt = options.pixel_size and PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
     if doubt:
         report(f"warning: {doubt}")
     try:
@@ -136,16 +155,26 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
+    if options.pixel_size is None:
+        doubt = say_sizes(pictures)
     if args.masks_out is not None:
         write_labels(args.masks_out, pictures, titles_of(paths), rule)
     flocs = [(picture, region) for picture in pictures for region in picture.regions]
     several = len(options.radii) > 1
     entries = [
-        make_entry(picture.name, region, fit[radius], options.pixel_size, radius, several)
+        make_entry(
+            picture.name,
+            region,
+            fit[radius],
+            picture.pixel_size,
+            radius,
+            several,
+            picture.measures[region.label],
+        )
         for radius in options.radii
         for (picture, region), fit in zip(flocs, fits, strict=True)
     ]
-    table = summary_text(pictures, fits, options.pixel_size).encode()
+    table = summary_text(pictures, fits).encode()
     if not entries:
         if args.summary:
             write_file(summary, table, rule)
@@ -159,7 +188,9 @@ def run(args: argparse.Namespace) -> int:
     write_file(summary, table, rule)
     if args.overlay is not None:
         lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1, beneath)
-    print(format_errors(entries))
+    if args.fits is not None:
+        draw_fits(args.fits, pictures, fits, options, drawn)
+    print("\n".join([format_errors(entries), *population_lines(entries)]))
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:
@@ -170,11 +201,10 @@ def run(args: argparse.Namespace) -> int:
 
 def read_options(args):
     """Options from argparse's; UsageError for a number that does not make sense."""
-    if args.pixel_size is None:
-        raise UsageError(
-            "--pixel-size is missing: pictures do not tell how large a pixel is; give the length "
-            "of its side, for example --pixel-size '0.95 um'"
-        )
+    if args.masks and (args.page or args.channel or args.crop):
+        raise UsageError("--page, --channel and --crop are of pictures, not of --masks")
+    if args.page not in (None, "all"):
+        page_numbers(args.page)
     if args.inscribed and (args.preserve_area or args.method != "pattern"):
         raise UsageError(
             "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
@@ -202,7 +232,10 @@ def read_options(args):
         else number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
     }
     return Options(
-        pixel_size=length("--pixel-size", args.pixel_size),
+        pixel_size=args.pixel_size and length("--pixel-size", args.pixel_size),
+        pages=args.page,
+        channel=args.channel,
+        crop=args.crop and rectangle(args.crop),
         vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
         radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
         method=args.method,
@@ -244,6 +277,30 @@ def length(option, text):
             f"{option} takes a length above 0 such as '0.95 um', or in metres, found {text!r}{hint}"
         )
     return value
+
+
+def rectangle(text):
+    """(x, y, width, height) [px] of --crop."""
+    numbers = [each.strip() for each in text.split(",")]
+    if len(numbers) != 4 or not all(each.isdecimal() and each.isascii() for each in numbers):
+        raise UsageError(f"--crop takes X,Y,WIDTH,HEIGHT in pixels, found {text!r}")
+    x, y, width, height = map(int, numbers)
+    if not (width and height):
+        raise UsageError(f"--crop takes a width and a height above 0, found {text!r}")
+    return x, y, width, height
+
+
+def say_sizes(pictures):
+    """Print the sizes of pixels that files give; what is odd of them in words, or ""."""
+    names: dict[float, str] = {}
+    for picture in pictures:
+        names.setdefault(picture.pixel_size, picture.name)
+    for size, name in names.items():
+        print(f"pixel size {1e6 * size:.4g} um, as {name} says")
+    doubts = [PIXEL_SIZE.doubt(f"the pixel size of {name}", size) for size, name in names.items()]
+    for doubt in filter(None, doubts):
+        report(f"warning: {doubt}")
+    return "; ".join(filter(None, doubts))
 
 
 def whole(option, text):

@@ -1,6 +1,7 @@
 """`flocsim plot`: the paper's figures from a results file or a shape library."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,13 @@ from flocsim.io.files import make_folder
 from flocsim.io.journal.journal import journal_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.kernel import KERNEL_FIGURES
-from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.results import FIGURES, MOST_ROWS, OF_ROWS
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.strength import STRENGTH_FIGURES
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.plots.swarm import SWARM_FIGURES, write_swarm_animation
 from flocsim.io.plots.sweep import SWARM_SWEEP_FIGURES, SWEEP_FIGURES
+from flocsim.io.results.file import Results, with_rows
 
 STRIP_FRAMES = 7
 
@@ -95,6 +97,8 @@ def run(args: argparse.Namespace) -> int:
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     drawn = [*paths.values(), *animation_of(args, content)]
     check_outputs([Output(path, rule) for path in drawn], [args.results])
+    if OF_ROWS & paths.keys() and isinstance(content, Results) and not remark:
+        content = with_rows(args.results, content, MOST_ROWS if names is None else math.inf)
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:

@@ -13,7 +13,8 @@ from flocsim.io.contents import READERS, RESULTS, SWARM, content_of
 from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.own_mark import marked
-from flocsim.io.results.file import read_overview
+from flocsim.io.plots.results import MOST_ROWS
+from flocsim.io.results.file import read_overview, with_rows
 
 DESCRIPTION = """\
 Write one HTML page that needs no other file: the figures of flocsim plot, the probabilities with
@@ -48,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
         if not args.no_motion:
             examples = examples_of(open_results(source, args.folder))
         results, totals = found
+        results = with_rows(source, results, MOST_ROWS)
         page = report_page(str(args.results), results, totals, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:

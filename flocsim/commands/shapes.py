@@ -13,6 +13,7 @@ from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.shapes.fit_report import plural
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
+from flocsim.io.shapes.population import measures_in, population_lines
 
 DESCRIPTION = """\
   flocsim shapes list shapes.h5
@@ -20,9 +21,13 @@ DESCRIPTION = """\
   flocsim shapes select shapes.h5 --drop 023.png#7,025.png#1 -o good.h5
   flocsim shapes merge monday.h5 tuesday.h5 -o mud.h5
 
-r_eq is that of the floc as it was measured: its pixels times the size of a pixel."""
+r_eq is that of the floc as it was measured: its pixels times the size of a pixel.  list also prints
+the perimeter, the largest and least Feret diameter, aspect ratio, circularity 4 pi A/P^2 and
+solidity of every floc, D10, D50 and D90 of the diameters 2 r_eq by number and by volume, and the
+perimeter-based fractal dimension."""
 
 MICRO = 1e6
+MEASURES = ("perim um", "Feret um", "least um", "aspect", "circular", "solidity")
 
 
 def add_parser(subparsers: Any) -> None:
@@ -33,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    listed = actions.add_parser("list", help="print name, picture, r_eq and errors of every floc")
+    listed = actions.add_parser("list", help="print sizes, shape measures and errors of every floc")
     chosen = actions.add_parser("select", help="write the flocs that are asked for to a library")
     merged = actions.add_parser("merge", help="write the flocs of several libraries to one")
     for action, run in ((listed, run_list), (chosen, run_write), (merged, run_write)):
@@ -59,18 +64,30 @@ def run_list(args: argparse.Namespace) -> int:
     for library in args.libraries:
         entries = selected(read_library(library), args, library)
         counts = [count for count in entries[0].fits if count > 1] if entries else []
-        heads = ["r_eq um", "pixel um", "r px", *(f"RE% N={count}" for count in counts)]
+        heads = ["r_eq um", "pixel um", "r px", *MEASURES, *(f"RE% N={count}" for count in counts)]
         wide = max([len(visible(each.floc_id, keep="")) for each in entries] + [4])
         print(f"{library}: {plural(len(entries), 'floc')}")
         print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
         for each in entries:
             cells = [
                 f"{MICRO * each.measured_radius:8.4g}", f"{MICRO * each.pixel_size:8.4g}",
-                f"{each.spheroradius:8g}",
+                f"{each.spheroradius:8g}", *measure_cells(each),
                 *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
             ]  # fmt: skip
             print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
+        if entries:
+            print("\n".join(population_lines(entries)))
+        if any(each.measures is None for each in entries):
+            print("shape measures of the finest fit where the library has none of the picture")
     return 0
+
+
+def measure_cells(entry):
+    """What stands under the heads of MEASURES."""
+    found = measures_in(entry)
+    lengths = (found.perimeter, found.feret_max, found.feret_min)
+    shares = (found.aspect_ratio, found.circularity, found.solidity)
+    return [*(f"{MICRO * each:8.4g}" for each in lengths), *(f"{each:8.3f}" for each in shares)]
 
 
 def run_write(args: argparse.Namespace) -> int:

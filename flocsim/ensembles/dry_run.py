@@ -10,7 +10,13 @@ from flocsim.ensembles.collision.checking import EASILY, count_checks, exact_met
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.doubts import (
+    IMPLIED,
+    paper_weight,
+    said_doubts,
+    settling_facts,
+    study_doubts,
+)
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.kernels.study import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
@@ -284,7 +290,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
             for name, pair in sphere_pairs(config, measured)
             for line in scale_lines(pair.system)
         ),
-        *(f"warning: {line}" for line in study_doubts(config, measured)),
+        *([f"note: {IMPLIED}"] if paper_weight(config) else []),
+        *(f"warning: {line}" for line in said_doubts(config, study_doubts(config, measured))),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
         "nothing was run but the pilot (--dry-run)" if pilot else NOTHING_RUN,
     ]

@@ -19,6 +19,7 @@ from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.consent import kept_sources
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.doubts import said_doubts
 from flocsim.ensembles.estimates.stop_rule import borders
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
@@ -132,7 +133,8 @@ def run_to_file(
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
         doubts = kind_of(config).doubts(study)
-        for remark in [*remarks, *start.remarks, *(f"warning: {line}" for line in doubts)]:
+        said = (f"warning: {line}" for line in said_doubts(config, doubts))
+        for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
         ended = lead(study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):

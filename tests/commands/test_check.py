@@ -188,7 +188,7 @@ VERLET = ["--set", "integrator.name=velocity_verlet", "--set", "integrator.step=
         (["--stiffness", "5", "1"], "--stiffness must be two values above 0, LOW and HIGH"),
         (["--tolerance", "nm", "1"], "--tolerance: "),
         (["--size", "1 um", "2 kg"], "--size: "),
-        (["--tolerance", "1e-9", "1e-8", *VERLET], "--tolerance is for methods that have one"),
+        (["--tolerance", "1e-9", "1e-8", *VERLET], "has no tolerance: leave --tolerance out"),
         (["--set", "forces.contact=false"], "a collision needs a contact force"),
     ],
 )

@@ -118,6 +118,11 @@ def test_the_summary_lists_every_region(tmp_path, frame):
     assert [row["left_out_because"] for row in rows] == ["", "not among the largest", "too small"]
     (entry,) = read_library(tmp_path / "s.h5")
     assert float(rows[0]["r_eq_m"]) == pytest.approx(0.5e-6 * entry.equivalent_radius, rel=1e-3)
+    assert entry.measures is not None
+    for name in ("perimeter", "aspect_ratio", "circularity", "solidity", "feret_max", "feret_min"):
+        head = name if name in rows[0] else f"{name}_px"
+        assert float(rows[0][head]) == pytest.approx(getattr(entry.measures, name), rel=1e-4)
+        assert rows[1][head] != "" and rows[2][head] == ""
     for n in (1, 4, 8):
         error = float(rows[0][f"re_percent_r1_N{n}"])
         assert error == pytest.approx(entry.fits[n].relative_error, abs=1e-4)
@@ -490,3 +495,61 @@ def test_pictures_beneath_that_cannot_be_used_are_refused(
     (frame / "a.bmp").write_bytes(b"another of that name")
     with pytest.raises(UsageError, match=message):
         run(frame / "a.png", *QUICK, *options, "-o", tmp_path / "m.h5")
+
+
+def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, capsys):
+    import tifffile
+
+    y, x = np.mgrid[:160, :200]
+    pages = [
+        (200 * (np.hypot(x - 40, y - 40) < radius)).astype("u1") + np.uint8(20)
+        for radius in (10, 15, 20)
+    ]
+    path = tmp_path / "s.tif"
+    tifffile.imwrite(path, np.array(pages), imagej=True, resolution=(2.0, 2.0),
+                     metadata={"axes": "ZYX", "unit": "um"})  # fmt: skip
+    options = ("--vertices", "4", "-o", tmp_path / "s.h5", "--overwrite")
+    assert run(path, *options) == 2
+    assert "holds 3 pages; choose by --page 1, --page 1,3 or --page all" in capsys.readouterr().err
+    assert run(path, *options, "--page", "all", "--overlay", tmp_path / "o.png") == 0
+    assert "pixel size 0.5 um, as s.tif:1 says" in capsys.readouterr().out
+    entries = read_library(tmp_path / "s.h5")
+    assert [each.floc_id for each in entries] == ["s.tif:1#1", "s.tif:2#1", "s.tif:3#1"]
+    for entry, radius in zip(entries, (10, 15, 20), strict=True):
+        assert entry.measured_radius == pytest.approx(0.5e-6 * radius, rel=0.05)
+    assert len(list(tmp_path.glob("o-*.png"))) == 3
+    assert run(path, *options, "--page", "2", "--pixel-size", "1 um", "--crop", "5,5,70,70") == 0
+    (entry,) = read_library(tmp_path / "s.h5")
+    assert entry.measured_radius == pytest.approx(15e-6, rel=0.05)
+    assert entry.centroid == pytest.approx((35.0, 35.0), abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--crop", "1,2,3"), "--crop takes X,Y,WIDTH,HEIGHT in pixels"),
+        (("--crop", "0,0,0,5"), "--crop takes a width and a height above 0"),
+        (("--page", "x"), "--page takes numbers from 1"),
+        (("--masks", "--page", "1"), "--page, --channel and --crop are of pictures"),
+    ],
+)
+def test_what_names_no_part_of_a_picture_is_refused(tmp_path, frame, words, said):
+    with pytest.raises(UsageError, match=said):
+        run(frame, "--pixel-size", "1e-6", "-o", tmp_path / "s.h5", *words)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("--crop", "0,0,9999,5"), "reaches beyond its"), (("--channel", "2"), "has no channel 2")],
+)
+def test_parts_that_a_picture_has_not_are_told(tmp_path, frame, capsys, words, said):
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(frame, *options, *words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_every_fit_is_drawn(tmp_path, frame):
+    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
+    assert run(frame, *options, "--fits", tmp_path / "f") == 0
+    names = sorted(path.name for path in (tmp_path / "f").iterdir())
+    assert names == ["a.png-1.png", "a.png-2.png", "a.png-3.png"]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
+from flocsim.geometry.shapes.measures import ShapeMeasures
 from flocsim.io.shapes.library import (
     ShapeEntry,
     StoredFit,
@@ -47,9 +48,34 @@ def refused(capsys, *words):
 def test_all_flocs_are_listed_with_their_measured_size(libraries, capsys):
     assert main(["shapes", "list", "one.h5", "two.h5"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "one.h5: 3 flocs" and lines[5] == "two.h5: 2 flocs"
-    assert lines[3].split() == ["a.png#2", "10", "1", "1", "2.50"]
-    assert lines[7].split() == ["a.png#1", "12", "2", "1", "2.50"]
+    assert lines[0] == "one.h5: 3 flocs" and lines[9] == "two.h5: 2 flocs"
+    for line, expected in ((3, ["a.png#2", "10", "1", "1"]), (11, ["a.png#1", "12", "2", "1"])):
+        assert [*lines[line].split()[:4], lines[line].split()[-1]] == [*expected, "2.50"]
+
+
+def test_shape_measures_are_listed_and_what_is_published_of_a_population(libraries, capsys):
+    disc = ShapeMeasures(20 * np.pi, 1.0, 1.0, 1.0, 20.0, 20.0)
+    flocs = [attrs.evolve(entry(f"a.png#{k}", 10.0 * k), measures=disc) for k in (1, 2, 3)]
+    write_library("measured.h5", flocs)
+    assert main(["shapes", "list", "measured.h5"]) == 0
+    head, *rows, number, volume, dimension = capsys.readouterr().out.splitlines()[1:]
+    wanted = ["62.83", "20", "20", "1.000", "1.000", "1.000"]
+    assert all(row.split()[4:10] == wanted for row in rows) and "solidity" in head
+    assert number.startswith("diameters 2 r_eq by number: D10 20, D50 40, D90 60 um")
+    assert volume.startswith("diameters 2 r_eq by volume: D10 ") and "D50 5" in volume
+    assert dimension.startswith("perimeter-based fractal dimension D_f2 0.000 ±")
+
+
+def test_a_library_without_measures_is_listed_by_its_fits(libraries, capsys):
+    """Those that were written before have none; a merge of both keeps what there is."""
+    disc = ShapeMeasures(20 * np.pi, 1.0, 1.0, 1.0, 20.0, 20.0)
+    write_library("new.h5", [attrs.evolve(entry("n.png#1", 10.0), measures=disc)])
+    assert main(["shapes", "merge", "one.h5", "new.h5", "-o", "both.h5"]) == 0
+    assert [each.measures for each in read_library("both.h5")] == [None, None, None, disc]
+    assert main(["shapes", "list", "both.h5"]) == 0
+    *_, row, _, _, _, said = capsys.readouterr().out.splitlines()
+    assert row.split()[4] == "62.83"
+    assert said == "shape measures of the finest fit where the library has none of the picture"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import json
 
 from flocsim.commands.info import results_text
 from flocsim.ensembles import cli
-from flocsim.ensembles.doubts import settling_facts, study_doubts
+from flocsim.ensembles.doubts import said_doubts, settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.io.results.file import read_overview, read_results
@@ -42,6 +42,19 @@ def test_the_fastest_body_of_all_types_is_held_to_the_drag_law(tmp_path):
     assert "forces.drag takes law =" in line
     law = {"forces": {"drag": {"law": "schiller_naumann"}}}
     assert study_doubts(small_config(tmp_path, law)) == []
+
+
+def test_what_the_paper_preset_implies_is_said_once_and_calmly(tmp_path):
+    """By the dry run, in the place of a warning of every run; other weights are doubted still."""
+    config = small_config(tmp_path)
+    lines = study_doubts(config)
+    assert len(lines) == 1 and said_doubts(config, lines) == []
+    text = dry_run(config, 1)
+    assert text.count("note: preset tang2014 gives") == 1 and "warning:" not in text
+    heavier = small_config(tmp_path, {"bodies": {"surface_density": 3.0}})
+    assert said_doubts(heavier, study_doubts(heavier)) == study_doubts(heavier) != []
+    assert said_doubts(small_config(tmp_path, WILD), ["a"]) == ["a"]
+    assert "note: preset" not in dry_run(heavier, 1)
 
 
 OWN = """\
@@ -85,13 +98,14 @@ def test_a_dry_run_tells_numbers_and_doubts(tmp_path):
 
 def test_a_run_tells_them_once_and_keeps_them(folder, capsys):
     write_small(folder, name="small.toml", vertices="[1]", replicates=1, delta="[0.0]")
-    assert cli.main(["small.toml"]) == 0
+    assert cli.main(["small.toml", "--set", "bodies.surface_density=3"]) == 0
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith("flocsim: warning: a body of r_eq = 23.02 um settles at 84.58 mm/s")
+    assert line.startswith("flocsim: warning: a body of r_eq = 23.02 um settles at 126.9 mm/s")
     run = read_results(folder / "small.h5").run
     assert [f"flocsim: warning: {each}" for each in stored(run, "warnings")] == [line]
-    assert stored(run, "settling") == settling_facts(small_config(folder))
+    heavier = small_config(folder, {"bodies": {"surface_density": 3.0}})
+    assert stored(run, "settling") == settling_facts(heavier)
     assert json.loads(run["settling"])[1]["reynolds"] > 4.0
     text = results_text("small.h5", *read_overview(folder / "small.h5"))
     assert line.removeprefix("flocsim: ") in text.splitlines()
-    assert "I: i Re 2.2 St " in text
+    assert "I: i Re 3.3 St " in text

@@ -86,6 +86,11 @@ def make_results(
         "floc_i": rng.integers(0, 4, shape),
         "floc_j": rng.integers(0, 4, shape),
     }
+    for body in "ij":  # flocs of four shapes
+        rank = replicates[f"floc_{body}"] / 3
+        replicates[f"aspect_ratio_{body}"] = 1.0 + rank
+        replicates[f"circularity_{body}"] = 0.9 - 0.5 * rank**2
+        replicates[f"solidity_{body}"] = 0.8 + 0.1 * np.cos(3 * rank)
     run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
     table = tabulate(outcome, inside, bond, **again)
     return Results(types, vertices, delta, replicates, table, run, FAILURES)

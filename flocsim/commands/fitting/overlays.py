@@ -6,6 +6,7 @@ from flocsim.commands.fitting.pictures import MOST_NAMES, report, titles_of
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.reading import SUFFIXES, read_grey
 from flocsim.io.plots.overlay import draw_overlay
+from flocsim.io.plots.single_fit import single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.shapes.fit_report import plural
 
@@ -48,7 +49,7 @@ def pictures_beneath(name, paths, drawn):
 def grey_beneath(picture, beneath, options):
     """What the overlay of a picture is drawn over."""
     if not options.masks:
-        return read_grey(picture.path)
+        return read_grey(picture.path, picture.plane)
     mask = picture.found.foreground
     if picture.path not in beneath:
         return mask
@@ -82,6 +83,17 @@ def expected_overlays(overlay, paths):
     """The overlays that will be drawn, as far as it can be known before files are read."""
     names = list(zip(titles_of(paths), paths, strict=True))
     return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
+
+
+def draw_fits(folder, pictures, fits, options, rule):
+    """Write a picture of every fit at the largest N and the smallest spheroradius."""
+    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
+    for picture in pictures:
+        stem = picture.name.replace(":", "-").replace("/", "-")
+        for region in picture.regions:
+            figure = single_fit(region.mask, next(results)[radius][most],
+                                f"{picture.name}#{region.label}")  # fmt: skip
+            save(figure, Path(folder, f"{stem}-{region.label}.png"), rule)
 
 
 def draw(overlay, pictures, fits, options, rule, several, beneath):

@@ -18,7 +18,9 @@ from flocsim.io.terminal import Progress
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
+    from flocsim.geometry.shapes.measures import ShapeMeasures
     from flocsim.io.images.pictures import Region, Segmentation
+    from flocsim.io.images.stacks import Plane
 
 LOST = FlocsimError.exit_code
 """Exit code where pictures were lost; the library has the others."""
@@ -35,10 +37,11 @@ class Options:
     """What to look for and what to fit, ready to be handed to other processes.
 
     Radii, blur and saturation as in flocsim.io.images.pictures.segment; vertices with 1 among them;
-    radii: spheroradii [px], rising.
+    radii: spheroradii [px], rising; pixel_size [m], None: that of each file; pages, channel, crop:
+    which part of a file.
     """
 
-    pixel_size: float
+    pixel_size: float | None
     vertices: tuple[int, ...]
     radii: tuple[float, ...]
     method: str
@@ -51,16 +54,23 @@ class Options:
     jobs: int
     segmentation: dict[str, Any]
     correction: Correction
+    pages: str | None = None
+    channel: str | None = None
+    crop: tuple[int, int, int, int] | None = None
 
 
 @attrs.frozen(eq=False)
 class Picture:
-    """One picture or mask, what was found in it, and the regions of that to be fitted."""
+    """One picture or mask, what was found in it, the regions of that to be fitted, and the measures
+    {label: ShapeMeasures} [px] of all its flocs; pixel_size [m]; plane: where it is in the file."""
 
     path: Path
     name: str
     found: "Segmentation"
     regions: "tuple[Region, ...]"
+    measures: "dict[int, ShapeMeasures]"
+    pixel_size: float
+    plane: "Plane | None" = None
 
 
 @attrs.frozen
@@ -173,13 +183,40 @@ def find_flocs(task):
         from flocsim.io.images.reading import grey_of, read_pixels
         from flocsim.io.images.recognition import is_mask
 
-        pixels = read_pixels(path)
-        if is_mask(pixels):
-            return MaskFile(name)
-        found = segment(grey_of(pixels, path), background=background, **options.segmentation)
-        return [chosen(path, name, found, options)]
+        size, pictures = None, []
+        for page, plane in planes_in(path, options):
+            pixels = read_pixels(path, plane)
+            if is_mask(pixels):
+                return MaskFile(name)
+            size = size or known_size(path, options)
+            found = segment(grey_of(pixels, path), background=background, **options.segmentation)
+            pictures.append(chosen(path, name + page, found, options, size, plane))
+        return pictures
     except FlocsimError as error:
         return error
+
+
+def planes_in(path, options):
+    """[(what is put behind its name, Plane)] of the pictures of a file that are asked for."""
+    from flocsim.io.images.limits import check_file
+    from flocsim.io.images.stacks import planes_of, stack_of
+
+    check_file(path, "picture file")
+    return planes_of(path, stack_of(path), options.pages, options.channel, options.crop)
+
+
+def known_size(path, options):
+    """The size of a file's pixels [m]: the one that was given, or its own; ImageError for none."""
+    from flocsim.io.images.stacks import pixel_size_in, stack_of
+
+    if options.pixel_size is not None:
+        return options.pixel_size
+    if (found := pixel_size_in(path, stack_of(path))) is None:
+        raise ImageError(
+            f"{path}: does not say how large a pixel is, as OME-TIFF and ImageJ files do; give the "
+            "length of its side, for example --pixel-size '0.95 um'"
+        )
+    return found
 
 
 def masked(path, name, options):
@@ -189,12 +226,14 @@ def masked(path, name, options):
     pictures = []
     for inner, mask in read_masks(path):
         found = segment_mask(mask, **limits)
-        pictures.append(chosen(path, name + inner[len(path.name) :], found, options))
+        size = known_size(path, options)
+        pictures.append(chosen(path, name + inner[len(path.name) :], found, options, size))
     return pictures
 
 
-def chosen(path, name, found, options):
+def chosen(path, name, found, options, pixel_size, plane=None):
     """A Picture of a Segmentation, corrected as the user wants it."""
+    from flocsim.io.images.measures import mask_measures
     from flocsim.io.images.regions import with_holes
 
     found = corrected(name, found, options.correction)
@@ -202,7 +241,9 @@ def chosen(path, name, found, options):
         opened = tuple(with_holes(each, found.holes) for each in found.regions)
         found = attrs.evolve(found, regions=opened)
     found = attrs.evolve(found, holes=None)
-    return Picture(path, name, found, largest(found.regions, options.max_flocs))
+    measures = {region.label: mask_measures(region.mask) for region in found.regions}
+    regions = largest(found.regions, options.max_flocs)
+    return Picture(path, name, found, regions, measures, pixel_size, plane)
 
 
 def largest(regions, count):
@@ -266,9 +307,10 @@ def find_background(paths, options):
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
         # A file that cannot be read, or is a mask, is reported when its own turn comes.
         with contextlib.suppress(ImageError, MemoryError):
-            pixels = read_pixels(path)
-            if not is_mask(pixels):
-                frames.append(grey_of(pixels, path))
+            for _, plane in planes_in(path, options):
+                pixels = read_pixels(path, plane)
+                if not is_mask(pixels):
+                    frames.append(grey_of(pixels, path))
     shapes = {frame.shape for frame in frames}
     if len(frames) < FEWEST_FRAMES or len(shapes) > 1:
         sizes = ", ".join(f"{width} × {height}" for height, width in sorted(shapes))

@@ -68,6 +68,7 @@ class Draw:
         """The row of a Run that has ended so; failed where a force gives no number."""
         row = replicate_row(status, self.angles, run) | dict.fromkeys(CHECKED, NOT_APPLICABLE)
         row |= dict(zip(("floc_i", "floc_j"), self.flocs, strict=True))
+        row |= self.encounter.measures
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):
             row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
         return row

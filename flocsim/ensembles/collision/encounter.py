@@ -26,6 +26,7 @@ from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
+from flocsim.io.results.schema import SHAPE_MEASURES
 from flocsim.plausibility.settling import (
     largest_mobility,
     least_mobility,
@@ -119,6 +120,15 @@ class Encounter:
     @property
     def shapes(self) -> tuple[Shape, ...]:
         return tuple(body.shape for body in self.system.bodies)
+
+    @functools.cached_property
+    def measures(self) -> dict[str, float]:
+        """{column: value} of the shape measures of i and j."""
+        return {
+            f"{name}_{body}": getattr(shape.measures, name)
+            for body, shape in zip("ij", self.shapes, strict=True)
+            for name in SHAPE_MEASURES
+        }
 
     @property
     def rate(self) -> float | None:

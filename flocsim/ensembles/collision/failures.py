@@ -23,6 +23,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     OUTCOMES,
     REPLICATES,
+    SHAPE_COLUMNS,
 )
 
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
@@ -50,6 +51,8 @@ CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): 
 ALWAYS_FINITE = ("angle_i", "angle_j", "d_c_last", "t_end")
 """Columns that are numbers in every row of a replicate that has not failed."""
 
+DRAWN = ("r_i", "r_j", "D_0", "floc_i", "floc_j", *SHAPE_COLUMNS)
+"""Columns that are known of every replicate that was begun."""
 
 NO_FLOC = -1
 """In ``floc_i`` and ``floc_j``: a sphere."""
@@ -124,7 +127,7 @@ def run_safely(
         return None, None
     why = row.pop(WHY, "")
     if row["outcome"] != FAILED and not all(math.isfinite(row[name]) for name in ALWAYS_FINITE):
-        drawn = {name: row[name] for name in ("r_i", "r_j", "D_0", "floc_i", "floc_j")}
+        drawn = {name: row[name] for name in DRAWN}
         row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | drawn
     if row["outcome"] == FAILED:
         reason = FAILURES[row["failure"]] + (f": {why}" if why else "")

@@ -85,7 +85,7 @@ class Problems:
             lines = key_lines(self.text)
             located = [(self.line_of(place, lines), text) for place, text in self.found]
             located.sort(key=lambda item: item[0])
-            places = {-1: f"given over {self.file}", 0: self.file}
+            places = {-1: f"override of {self.file}", 0: self.file}
             shown = [
                 visible(f"{places.get(line, f'{self.file}:{line}')}: {text}", keep="")
                 for line, text in located[:MOST_SHOWN]

@@ -90,8 +90,8 @@ class StopConfig:
     With `half_width`, the rule looks at fixed numbers of replicates (`least`, then 5/4 as many
     each time), the same for any number of ranks, and the study ends at the first at which the 95 %
     interval of every estimate in every condition is narrow enough. A condition without events
-    holds nothing up. As any sequential rule, it makes intervals cover a little less often than
-    they say.
+    does not keep the study running. As any sequential rule, it makes intervals cover a little less
+    often than they say.
     """
 
     half_width: float | None = quantity(

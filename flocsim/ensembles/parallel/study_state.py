@@ -102,7 +102,8 @@ class StudyState:
         self.notes += result.notes[: MOST_NOTES - len(self.notes)]
         if self.failed > self.allowed:
             raise TooManyFailures(
-                f"{self.failed} replicates have failed, more than stop.failed allows; the first: "
+                f"{self.failed} replicate{'s' if self.failed > 1 else ''} failed, more than "
+                "stop.failed allows; the first: "
                 f"{describe_note(self.notes[0]) if self.notes else 'see the journal'}"
             )
         self.look_at_stages()

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.ensembles.config.consent import Consent, read_sources
@@ -33,7 +34,7 @@ from flocsim.io.contents import RESULTS, STRENGTH, SWARM, SWEEP, content_of
 from flocsim.io.files import held
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import figure_rule
-from flocsim.io.plots.results import FIGURES
+from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import read_results, read_row
 from flocsim.io.results.schema import GROUPS, Results
@@ -139,7 +140,10 @@ class StudyResults(Tables):
         """
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
-        drawn = FIGURES[figure](self.results)
+        results = self.results
+        if figure in OF_ROWS:
+            results = attrs.evolve(results, replicates=self.replicates)
+        drawn = FIGURES[figure](results)
         if file is not None:
             save(drawn, Path(file), figure_rule())
         return drawn

@@ -31,17 +31,34 @@ def require_simple(vertices: np.ndarray) -> None:
 def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np.ndarray]:
     """The outline of all parts, each core ⊕ disk, as closed rings [(k, 2), …] in metres: the outer
     ones first, the largest before others, then the rings of holes."""
+    whole = swept_geometry(parts, points_per_quadrant)
+    pieces = sorted(getattr(whole, "geoms", [whole]), key=lambda piece: -piece.area)
+    rings = [piece.exterior for piece in pieces]
+    rings += [hole for piece in pieces for hole in piece.interiors]
+    return [np.asarray(ring.coords) for ring in rings]
+
+
+MEASURED_QUADRANT = 64
+"""Chords in the place of a quarter of a circle where an outline is measured."""
+
+
+def outline_sizes(parts: Sequence[Part]) -> tuple[float, float, float, np.ndarray]:
+    """(area, perimeter, area of the convex hull, corners of the hull (k, 2)) of all parts, each
+    core ⊕ disk."""
+    whole = swept_geometry(parts, MEASURED_QUADRANT)
+    hull = whole.convex_hull
+    return whole.area, whole.length, hull.area, np.asarray(hull.exterior.coords)[:-1]
+
+
+def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
+    """All parts, each core ⊕ disk, as shapely has them."""
     import shapely
 
     swept = [
         core_geometry(part.rings).buffer(part.radius, quad_segs=points_per_quadrant)
         for part in parts
     ]
-    whole = swept[0] if len(swept) == 1 else shapely.union_all(swept)
-    pieces = sorted(getattr(whole, "geoms", [whole]), key=lambda piece: -piece.area)
-    rings = [piece.exterior for piece in pieces]
-    rings += [hole for piece in pieces for hole in piece.interiors]
-    return [np.asarray(ring.coords) for ring in rings]
+    return swept[0] if len(swept) == 1 else shapely.union_all(swept)
 
 
 def core_geometry(rings: Sequence[np.ndarray]) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from flocsim.errors import RangeError, ShapeError
 from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
+from flocsim.geometry.shapes.measures import ShapeMeasures, measures_of
 from flocsim.geometry.shapes.moments import all_moments
 from flocsim.geometry.shapes.outline import require_simple, swept_rings
 from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
@@ -134,6 +135,12 @@ class Shape:
         if self.is_compound:
             return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
         return float(np.hypot(*self.vertices.T).max() + self.radius)
+
+    @cached_property
+    def measures(self) -> ShapeMeasures:
+        """Perimeter and Feret diameters [m], aspect ratio, circularity and solidity [-] of the
+        outline."""
+        return measures_of(self.parts, self.elongation)
 
     def scaled(self, factor: float) -> "Shape":
         """The same outline, ``factor`` times as large: a Sphere, a SpheroPolygon or a Composite."""

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, UsageError
+from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
     find_threshold,
     light_surface,
@@ -31,7 +32,8 @@ class Segmentation:
     regions: the flocs; rejected: the others; flocs: "bright" or "dark"; threshold: the contrast,
     against the background, that separates the two (0 = background, 1 = full range); left_whole:
     regions with necks that were taken for fractal aggregates, and not parted; holes: (h, w) bool,
-    what was filled in the foreground, None where nobody asks any more.
+    what was filled in the foreground, None where nobody asks any more; annotated: whether a scale
+    bar or its writing was left out.
     """
 
     foreground: np.ndarray
@@ -41,6 +43,7 @@ class Segmentation:
     threshold: float
     left_whole: int = 0
     holes: np.ndarray | None = None
+    annotated: bool = False
 
     @property
     def foreground_share(self) -> float:
@@ -86,7 +89,7 @@ def segment(
     `background_degree`.  Returns a Segmentation; no floc is no error.  Raises ImageError for an
     array that is no picture, UsageError for a wrong option.
     """
-    grey = _checked(grey)
+    grey, burnt_in = without_annotations(_checked(grey))
     filters = Filters(min_radius, max_radius, max_blur, neck)
     _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
@@ -108,7 +111,8 @@ def segment(
     foreground = filled(seen)
     regions, rejected, whole = find_regions(foreground, contrast, filters)
     return Segmentation(
-        foreground, regions, rejected, flocs, threshold, whole, foreground & ~seen
+        foreground, regions, rejected, flocs, threshold, whole, foreground & ~seen,
+        bool(burnt_in.any()),
     )  # fmt: skip
 
 

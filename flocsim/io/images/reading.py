@@ -14,6 +14,7 @@ from flocsim.io.images.limits import (
     check_promise,
     check_shape,
 )
+from flocsim.io.images.stacks import Plane, stack_of
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 """Endings that are taken for pictures when a folder is given."""
@@ -24,19 +25,24 @@ FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
 PLAIN, DEFLATED = (1, 32773), (8, 32946)
 """How a TIFF may be packed that Pillow cannot read: not or by runs; deflated."""
 
+ONLY = Plane()
+"""The only picture of a file that has no other."""
+
+CHOOSE = "choose by --page and --channel, or save the one that you want as its own file"
+
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
 
 
-def read_grey(path: str | Path) -> np.ndarray:
+def read_grey(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
     """The luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float64 in [0, 1].
 
     The full range of the file's number type maps to [0, 1]; floating-point files must already lie
     there or are divided by their maximum.  Transparent pixels take the median grey of the opaque
     ones, so that they count as background.  Raises ImageError, naming the file, when it is
-    missing, damaged, no picture, or a stack of several.
+    missing, damaged, no picture, or a stack of several of which ``plane`` names none.
     """
-    return grey_of(read_pixels(path), path)
+    return grey_of(read_pixels(path, plane), path)
 
 
 def grey_of(pixels: np.ndarray, path: str | Path) -> np.ndarray:
@@ -44,11 +50,19 @@ def grey_of(pixels: np.ndarray, path: str | Path) -> np.ndarray:
     return _luminance(_to_unit_range(pixels, path), path)
 
 
-def read_pixels(path: str | Path) -> np.ndarray:
+def read_pixels(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
     """The pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
     path = Path(path)
     check_file(path, "picture file")
-    pixels = _decode(path)
+    stack = stack_of(path)
+    if plane is ONLY and stack.frame_count > 1:
+        raise ImageError(f"{path}: holds {stack.frame_count} pictures; {CHOOSE}")
+    # Pillow takes planes that are stored as colours for colours, and those of 16 bits wrongly.
+    pixels = (
+        _decode_with_tifffile(path, 0)[plane.frame]
+        if stack.planar else _decode(path, plane.frame)
+    )  # fmt: skip
+    pixels = _part(pixels, plane, path)
     if pixels.size == 0:
         raise ImageError(f"{path}: the picture is empty")
     check_shape(path, pixels.shape)
@@ -56,12 +70,30 @@ def read_pixels(path: str | Path) -> np.ndarray:
     return pixels
 
 
-def _decode(path):
+def _part(pixels, plane, path):
+    """The colour and the part of decoded pixels that a plane names."""
+    if plane.sample is not None:
+        count = pixels.shape[2] if pixels.ndim == 3 else 1
+        if not 0 <= plane.sample < count:
+            raise ImageError(f"{path}: has no channel {plane.sample + 1}, only {count}")
+        pixels = pixels if pixels.ndim == 2 else pixels[..., plane.sample]
+    if plane.crop is None:
+        return pixels
+    x, y, width, height = plane.crop
+    if x + width > pixels.shape[1] or y + height > pixels.shape[0]:
+        raise ImageError(
+            f"{path}: --crop {x},{y},{width},{height} reaches beyond its {pixels.shape[1]} × "
+            f"{pixels.shape[0]} pixels"
+        )
+    return pixels[y : y + height, x : x + width]
+
+
+def _decode(path, frame):
     try:
         with warnings.catch_warnings():
             # What a decoder only warns of, odd metadata, does not touch the pixels.
             warnings.simplefilter("ignore")
-            return _decode_with_pillow(path)
+            return _decode_with_pillow(path, frame)
     except ImageError:
         raise
     except Exception as problem:
@@ -72,24 +104,25 @@ def _decode(path):
             ) from problem
         # Decoders raise nearly anything on damaged files; all of it means one thing to the user.
         if path.suffix.lower() in (".tif", ".tiff"):
-            return _decode_with_tifffile(path)
+            return _decode_with_tifffile(path, frame)
         raise ImageError(
             f"{path}: cannot be read as a picture ({_one_line(problem)}); "
             "give an undamaged PNG, JPEG, TIFF or BMP"
         ) from problem
 
 
-def _decode_with_pillow(path):
+def _decode_with_pillow(path, frame):
     from PIL import Image, ImageOps
 
     # Only these: others run programs on what they read (EPS: Ghostscript).
     with Image.open(path, formats=FORMATS) as image:
         check_shape(path, (*image.size[::-1], len(image.getbands())))
         check_promise(path, image.width * image.height)
-        if getattr(image, "n_frames", 1) > 1:
-            raise ImageError(
-                f"{path}: holds {image.n_frames} pictures; save the wanted one as its own file"
-            )
+        if frame >= (count := getattr(image, "n_frames", 1)):
+            raise ImageError(f"{path}: has no picture {frame + 1}, only {count}")
+        image.seek(frame)
+        check_shape(path, (*image.size[::-1], len(image.getbands())))
+        check_promise(path, image.width * image.height)
         image.load()
         image = ImageOps.exif_transpose(image)
         if image.mode in ("P", "PA"):
@@ -99,13 +132,13 @@ def _decode_with_pillow(path):
         return np.asarray(image)
 
 
-def _decode_with_tifffile(path):
+def _decode_with_tifffile(path, frame):
     import tifffile
 
     try:
         with tifffile.TiffFile(path) as tiff:
-            check_tiff(path, tiff)
-            return np.asarray(tiff.asarray())
+            page = check_tiff(path, tiff, frame)
+            return np.asarray(page.asarray())
     except ImageError:
         raise
     except Exception as problem:
@@ -115,13 +148,12 @@ def _decode_with_tifffile(path):
         ) from problem
 
 
-def check_tiff(path, tiff):
-    """ImageError for a TIFF that is a stack, too large, or unpacks to more than its pixels."""
-    if len(tiff.pages) != 1:
-        raise ImageError(
-            f"{path}: holds {len(tiff.pages)} pictures; save the wanted one as its own file"
-        )
-    page = tiff.pages[0]
+def check_tiff(path, tiff, frame=0):
+    """The page of a TIFF; ImageError for one that is too large, or unpacks to more than its
+    pixels."""
+    if frame >= len(tiff.pages):
+        raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
+    page = tiff.pages[frame]
     check_shape(path, page.shape)
     check_promise(path, int(np.prod(page.shape[:2])))
     check_shape(path, (page.imagelength, page.imagewidth))
@@ -138,6 +170,7 @@ def check_tiff(path, tiff):
     if page.compression in DEFLATED:
         pieces = ((offset, length, wanted) for offset, length in places)
         check_deflated(path, tiff.filehandle, pieces)
+    return page
 
 
 def _one_line(problem):
@@ -167,7 +200,7 @@ def _luminance(pixels, path):
     if pixels.ndim != 3 or pixels.shape[2] > 4:
         raise ImageError(
             f"{path}: an array of shape {pixels.shape} is not one grey or colour picture; "
-            "save the wanted picture to its own file"
+            "save the picture that you want to its own file"
         )
     has_alpha = pixels.shape[2] in (2, 4)
     colours = pixels[..., :-1] if has_alpha else pixels

@@ -19,6 +19,7 @@ from flocsim.io.plots.outcomes import (
     shifted,
     words_of,
 )
+from flocsim.io.plots.shape_effects import shape_effects
 from flocsim.io.plots.style import (
     BOND_COLOURS,
     CLASS_COLOURS,
@@ -497,5 +498,12 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "efficiency": efficiencies,
     "outcomes": outcomes,
     "overview": overview,
+    "shape": shape_effects,
     "size": against_size,
 }
+
+OF_ROWS = frozenset({"shape"})
+"""Figures that are drawn of the table of replicates."""
+
+MOST_ROWS = 2**22
+"""Of which they are drawn unasked, from 1 GB."""

@@ -1,10 +1,11 @@
-"""Figures of fitted flocs: sizes (Fig. 2) and errors (Fig. 3) of a library.
+"""Figures of fitted flocs: sizes (Fig. 2), errors (Fig. 3) and shapes of a library.
 
 A figure of a shape library is a function of its entries that stands in POPULATION_FIGURES, under
 the name that `flocsim plot` gives it; the first line of its docstring is the command's help.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +18,34 @@ from flocsim.io.plots.style import (
 )
 from flocsim.io.shapes.fit_report import CLASS_LIMIT
 from flocsim.io.shapes.library import ShapeEntry
+from flocsim.io.shapes.population import (
+    SHARES,
+    diameters_at,
+    measures_in,
+    one_each,
+    perimeter_dimension,
+)
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
 DODGE = 0.06
 """Shift of the two classes against each other, in steps of the axis of N."""
 
+UNCROSSED: dict[str, Any] = {
+    "frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 1.0,
+}  # fmt: skip
+"""Of a legend that no line strikes through."""
+
 PANEL_SIZE = (2.6, 2.3)
 MARGIN = 0.75
+
+
+MEASURES = {
+    "aspect_ratio": "aspect ratio",
+    "circularity": r"circularity $4\pi A/P^2$",
+    "solidity": "solidity",
+}
+"""What is drawn of the shapes of flocs, and its label."""
 
 
 def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
@@ -32,13 +53,8 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
 
     Equal bins from 0, their width by Freedman and Diaconis, at least five of them.
     """
-    # A library may hold a floc at several spheroradii.
-    first = min(entry.spheroradius for entry in entries)
-    flocs = [entry for entry in entries if entry.spheroradius == first]
-    sizes = np.array([1e6 * entry.measured_radius for entry in flocs])
-    width = 2.0 * np.subtract(*np.percentile(sizes, [75, 25])) / len(sizes) ** (1 / 3)
-    count = int(np.clip(np.ceil(sizes.max() / width) if width > 0 else 5, 5, 60))
-    bins = np.linspace(0.0, 1.001 * sizes.max(), count + 1)
+    sizes = np.array([1e6 * entry.measured_radius for entry in one_each(entries)])
+    bins = bins_of(sizes, 0.0)
     with house_style():
         figure = new_figure(4.2, 2.8)
         axes = figure.subplots()
@@ -52,6 +68,70 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
         axes.set_title(f"{len(sizes)} flocs, {sizes.min():.3g} to {sizes.max():.3g} µm")
         axes.legend()
         return figure
+
+
+def bins_of(values, first):
+    """Edges of equal bins from ``first``, their width by Freedman and Diaconis, 5 to 60 of them."""
+    width = 2.0 * np.subtract(*np.percentile(values, [75, 25])) / len(values) ** (1 / 3)
+    span = values.max() - first
+    count = int(np.clip(np.ceil(span / width) if width > 0 else 5, 5, 60))
+    return np.linspace(first, first + 1.001 * span if span > 0 else first + 1.0, count + 1)
+
+
+def sizes(entries: Sequence[ShapeEntry]) -> Figure:
+    """Diameters 2 r_eq: shares of the flocs and of their volume, with D10, D50 and D90."""
+    found = np.array([2e6 * entry.measured_radius for entry in one_each(entries)])
+    bins = bins_of(found, 0.0)
+    with house_style():
+        figure = new_figure(6.4, 2.8)
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
+            weights = found**3 if by_volume else np.ones(found.size)
+            axes.hist(found, bins=bins, weights=weights / weights.sum(), color=BAR_COLOUR,
+                      edgecolor="white", linewidth=0.5)  # fmt: skip
+            marks = zip(diameters_at(found, by_volume), SHARES, (":", "--", "-."), strict=True)
+            for value, share, dashes in marks:
+                axes.axvline(value, color="0.25", linestyle=dashes,
+                             label=f"D{100 * share:.0f} = {value:.3g} µm")  # fmt: skip
+            axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
+            axes.set_xlim(left=0.0)
+            axes.legend(**UNCROSSED)
+        panels[0].set_ylabel("share")
+        return figure
+
+
+def shape(entries: Sequence[ShapeEntry]) -> Figure:
+    """Aspect ratio, circularity and solidity of the flocs, and perimeter against area with D_f2."""
+    flocs = one_each(entries)
+    found = [measures_in(entry) for entry in flocs]
+    areas = np.array([np.pi * (1e6 * entry.measured_radius) ** 2 for entry in flocs])
+    perimeters = np.array([1e6 * each.perimeter for each in found])
+    with house_style():
+        figure = new_figure(6.4, 4.8)
+        panels = figure.subplots(2, 2).ravel()
+        for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
+            values = np.array([getattr(each, name) for each in found])
+            axes.hist(values, bins=bins_of(values, values.min()), color=BAR_COLOUR,
+                      edgecolor="white", linewidth=0.5)  # fmt: skip
+            axes.axvline(np.median(values), color="0.25", linestyle="--",
+                         label=f"median {np.median(values):.3g}")  # fmt: skip
+            axes.set(xlabel=label, ylabel="number of flocs")
+            axes.legend()
+        draw_dimension(panels[3], areas, perimeters)
+        return figure
+
+
+def draw_dimension(axes, areas, perimeters):
+    """Perimeter against area, a disc's, and the line of D_f2."""
+    axes.plot(areas, perimeters, "o", color="#0072B2", ms=2.5)
+    ends = np.array([areas.min(), areas.max()])
+    axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.6", linewidth=0.8, label="disc")
+    if (slope := perimeter_dimension(areas, perimeters)) is not None:
+        middle = np.exp(np.log(perimeters).mean() - 0.5 * slope.value * np.log(areas).mean())
+        label = f"$D_{{f2}}$ = {slope.value:.2f} ± {slope.error:.2f}"
+        axes.plot(ends, middle * ends ** (0.5 * slope.value), color="#D55E00", label=label)
+    axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
+    axes.legend()
 
 
 def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
@@ -71,9 +151,7 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
         panels[0].set_ylabel("relative error RE [%]")
         panels[0].set_ylim(bottom=0.0)
         title = "mean ± standard deviation\ndashed: circle of equal area"
-        # Not struck through by the dashed lines.
-        panels[0].legend(title=title, alignment="left", loc="upper left", frameon=True,
-                         facecolor="white", edgecolor="none", framealpha=1.0)  # fmt: skip
+        panels[0].legend(title=title, alignment="left", loc="upper left", **UNCROSSED)
         return figure
 
 
@@ -99,4 +177,6 @@ def draw_errors(axes, entries):
 POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
     "2": figure_2,
     "3": figure_3,
+    "sizes": sizes,
+    "shape": shape,
 }

@@ -185,7 +185,7 @@ def set_share_axis(axes):
 
 def set_probability_axis(axes):
     axes.set_ylim(-0.03, 1.03)
-    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", ".25", ".5", ".75", "1"])
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0], labels=["0", "0.25", "0.5", "0.75", "1"])
     axes.grid(axis="y", color="0.9", linewidth=0.6)
 
 

@@ -22,6 +22,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     OUTCOMES,
     RADII,
+    SHAPE_COLUMNS,
     TABLE,
     WORDS,
     Results,
@@ -152,7 +153,7 @@ def check_rows(
     ended = outcome != FAILED
     for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
         refuse_row(ended & ~np.isfinite(column(name)), name)
-    for name in {"r_i", "r_j", "D_0"} - lacking:
+    for name in {"r_i", "r_j", "D_0", *SHAPE_COLUMNS} - lacking:
         values = column(name)
         refuse_row(ended & ~((values > 0.0) & np.isfinite(values)), name)
     touched = ended & (inside != NOT_APPLICABLE)

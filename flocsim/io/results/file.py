@@ -68,6 +68,7 @@ __all__ = [
     "read_results",
     "read_row",
     "same_data",
+    "with_rows",
     "write_results",
 ]
 
@@ -112,6 +113,13 @@ def read_overview(path: str | os.PathLike) -> tuple[Results, "Totals"]:
     with opened(path) as file:
         results = results_in(file, replicates=False)
         return results, totals_in(file["replicates"], len(results.failures))
+
+
+def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -> Results:
+    """The Results in a file with their table of replicates, unless that has more than ``most``
+    rows."""
+    rows = int(np.prod(results.shape)) * results.count
+    return read_results(path) if results.replicates is None and rows <= most else results
 
 
 def results_in(file, replicates):

@@ -33,6 +33,7 @@ from flocsim.io.results.schema import (
     PROBABILITIES,
     RADII,
     REPLICATES,
+    SHAPE_COLUMNS,
     TABLE,
     Results,
     tail_of,
@@ -83,6 +84,10 @@ ADDED = {
     5: Addition(
         {"probabilities": frozenset({"n_held"})},
         "pairs that rest apart without touching are not told from those that miss",
+    ),
+    6: Addition(
+        {"replicates": frozenset(SHAPE_COLUMNS)},
+        "they do not have the shape measures of the bodies",
     ),
 }  # fmt: skip
 """Version → what it added to that before it."""

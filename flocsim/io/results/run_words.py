@@ -1,12 +1,14 @@
 """What the group ``run`` of a results file says as JSON, in words."""
 
+import re
 from collections.abc import Sequence
 
 
 def describe_note(note: dict) -> str:
     """A failed replicate for messages, with the words that run it again."""
+    why = re.sub("^too deep", "overlap exceeded half the summed spheroradii", note["why"])
     return (
-        f"{note['why']} (flocsim trajectory CONFIG --scene "
+        f"{why} (flocsim trajectory CONFIG --scene "
         f"{note['type']},{note['vertices']},{note['delta']!r} --replicate {note['replicate']})"
     )
 

@@ -28,6 +28,14 @@ NOT_APPLICABLE = 255
 
 AXES = ("type", "vertices", "delta")
 
+SHAPE_MEASURES = {
+    "aspect_ratio": "aspect ratio",
+    "circularity": "circularity 4 pi A/P^2",
+    "solidity": "solidity, the share of the convex hull,",
+}
+"""Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.measures`)."""
+SHAPE_COLUMNS = tuple(f"{name}_{body}" for name in SHAPE_MEASURES for body in "ij")
+
 REPLICATES = {  # name: (dtype, units, long name)
     "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
     "angle_j": ("f8", "rad", "orientation drawn for the approaching body j"),
@@ -53,7 +61,11 @@ REPLICATES = {  # name: (dtype, units, long name)
     "failure": ("u1", "1", "reason of an undecided or failed outcome"),
     "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
     "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
-}
+} | {
+    f"{name}_{body}": ("f8", "1", f"{text} of body {body}, as run")
+    for name, text in SHAPE_MEASURES.items()
+    for body in "ij"
+}  # fmt: skip
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
 

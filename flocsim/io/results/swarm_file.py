@@ -48,7 +48,7 @@ COUNTS = {
     "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
     "removed": ("f8", "1", "bodies that have left the box for good"),
     "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
-    "median_error": ("f8", "m", "stated error of position that half of the bodies keep below"),
+    "median_error": ("f8", "m", "median over bodies of the stated error of position"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }  # fmt: skip
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""

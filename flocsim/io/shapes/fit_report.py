@@ -9,7 +9,7 @@ from typing import Any
 from flocsim.errors import visible
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
-from flocsim.io.shapes.library import ShapeEntry
+from flocsim.io.shapes.library import MEASURE_COLUMNS, ShapeEntry
 
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
@@ -29,6 +29,8 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
         parts.append(f"rejected {' and '.join(reasons)}")
     if found.left_whole:
         parts.append(f"{found.left_whole} taken for fractal aggregates and not parted (--neck)")
+    if found.annotated:
+        parts.append("a scale bar or its writing left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
@@ -78,17 +80,19 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
 
 
 COLUMNS = (
-    "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m", "blur_px"
+    "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
+    "blur_px",
+    "perimeter_px", "aspect_ratio", "circularity", "solidity", "feret_max_px", "feret_min_px",
 )  # fmt: skip
 
 
-def summary_text(
-    pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]], pixel_size: float
-) -> str:
-    """The table of all regions as CSV: flocs with RE [%] for every r [px] and N, others with why.
+def summary_text(pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]]) -> str:
+    """The table of all regions as CSV: flocs with their shape measures and RE [%] for every r [px]
+    and N, others with why.
 
-    pictures: with name, found (Segmentation) and regions, the fitted ones of found.regions;
-    fits: {r: {N: Fit}} of these regions in their order; pixel_size [m].
+    pictures: with name, pixel_size [m], found (Segmentation), regions, the fitted ones of
+    found.regions, and measures {label: ShapeMeasures} of found.regions;
+    fits: {r: {N: Fit}} of these regions in their order.
     """
     radii = list(fits[0]) if fits else []
     pairs = [(radius, count) for radius in radii for count in fits[0][radius]]
@@ -100,14 +104,19 @@ def summary_text(
         fitted = {region.label: next(results) for region in picture.regions}
         for region in picture.found.regions:
             why = "" if region.label in fitted else "not among the largest"
-            row = [picture.name, region.label, why, *_facts(region, pixel_size)]
+            row = [picture.name, region.label, why, *_facts(region, picture.pixel_size),
+                   *_measures(picture.measures[region.label])]  # fmt: skip
             errors = [f"{fitted[region.label][r][n].relative_error:.4f}" for r, n in pairs
                       if region.label in fitted]  # fmt: skip
             table.writerow([*row, *(errors or [""] * len(pairs))])
         for region in picture.found.rejected:
-            row = [picture.name, region.label, region.reason, *_facts(region, pixel_size)]
-            table.writerow([*row, *[""] * len(pairs)])
+            row = [picture.name, region.label, region.reason, *_facts(region, picture.pixel_size)]
+            table.writerow([*row, *[""] * (len(MEASURE_COLUMNS) + len(pairs))])
     return text.getvalue()
+
+
+def _measures(found):
+    return (f"{getattr(found, name):.5g}" for name in MEASURE_COLUMNS)
 
 
 def _facts(region, pixel_size):

@@ -22,7 +22,12 @@ and, in version 2, where flocs have holes or several parts:
     /fits/N/ring            (n, N) its ring in there: 0 the outline, from 1 holes
     /fits/N/point_radius    (n, N) [m] spheroradius of its part
 
-for every N, so that between conditions nothing changes but N.  Every dataset has the attributes
+for every N, so that between conditions nothing changes but N; where the flocs have been measured
+
+    /measures/perimeter     (n) [px] of the mask, as are feret_max and feret_min; aspect_ratio,
+                            circularity and solidity [-]; NaN for a floc without
+
+Every dataset has the attributes
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
 
@@ -37,6 +42,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
+from flocsim.geometry.shapes.measures import ShapeMeasures
 from flocsim.geometry.shapes.parts import Part, PointTable, is_compound, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
@@ -91,6 +97,21 @@ POINT_COLUMNS = {
     "point_radius": ("f8", "m", "spheroradius of the part"),
 }
 
+MEASURE_COLUMNS = declared(
+    {
+        "perimeter": ("f8", "px", "length of the outline"),
+        "aspect_ratio": ("f8", "1", "long over short axis of the ellipse of equal moments"),
+        "circularity": ("f8", "1", "4 pi area / perimeter^2"),
+        "solidity": ("f8", "1", "area over that of the convex hull"),
+        "feret_max": ("f8", "px", "largest distance of two parallel tangents"),
+        "feret_min": ("f8", "px", "smallest distance of two parallel tangents"),
+    },
+    ("floc",),
+)
+"""The measures of the masks; a library may lack them."""
+
+UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
+
 ATTRIBUTES = {
     "id": "floc_id", "part": "points.part", "ring": "points.ring",
     "point_radius": "points.radius",
@@ -137,7 +158,7 @@ class ShapeEntry:
     """One floc: where it comes from, its size in the picture, and its fits {N: StoredFit}.
 
     floc_id: text such as "023.png#7"; pixel_size [m]; centroid (x, y) [px, y down]; area [px];
-    equivalent_radius and spheroradius [px].
+    equivalent_radius and spheroradius [px]; measures [px] of its mask, None where nobody took them.
     """
 
     floc_id: str
@@ -148,6 +169,7 @@ class ShapeEntry:
     equivalent_radius: float
     spheroradius: float
     fits: dict[int, StoredFit]
+    measures: ShapeMeasures | None = None
 
     @property
     def measured_radius(self) -> float:
@@ -162,6 +184,7 @@ def make_entry(
     pixel_size: float,
     spheroradius: float,
     name_radius: bool = False,
+    measures: ShapeMeasures | None = None,
 ) -> ShapeEntry:
     """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
 
@@ -174,7 +197,7 @@ def make_entry(
     floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     return ShapeEntry(
         floc_id, image, float(pixel_size), region.centroid, region.area,
-        region.equivalent_radius, float(spheroradius), stored,
+        region.equivalent_radius, float(spheroradius), stored, measures,
     )  # fmt: skip
 
 
@@ -223,6 +246,9 @@ def write_library(
     for count in sorted(entries[0].fits):
         fits = [entry.fits[count] for entry in entries]
         groups[f"fits/{count}"] = labelled(fits_at(count, compound), fits)
+    if any(entry.measures for entry in entries):
+        measured = [entry.measures or UNMEASURED for entry in entries]
+        groups["measures"] = labelled(MEASURE_COLUMNS, measured)
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
     attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
     write_groups(path, attributes, groups, rule=rule)
@@ -295,7 +321,7 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
                 raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
-    lengths = hold_against(nodes, groups, groups)
+    lengths = hold_against(nodes, groups | {"measures": MEASURE_COLUMNS}, groups)
     if lengths["floc"] < 1 or len(groups) < 3:
         raise ValueError("there are no flocs")
     for name, (kind, shape) in nodes[""].attributes.items():
@@ -318,6 +344,7 @@ def _entries(file):
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have one id")
+    flocs["measures"] = _measures(file, len(flocs["floc_id"]))
     fits = {int(count): _fits(int(count), group) for count, group in file["fits"].items()}
     entries = []
     for row in range(len(flocs["floc_id"])):
@@ -328,6 +355,20 @@ def _entries(file):
         values = {attribute: column[row] for attribute, column in flocs.items()}
         entries.append(ShapeEntry(**values, fits=stored))
     return entries
+
+
+def _measures(file, count):
+    """The ShapeMeasures of all flocs, None for those without; ValueError for values that cannot
+    be."""
+    if "measures" not in file:
+        return [None] * count
+    columns = {name: file["measures"][name][()] for name in MEASURE_COLUMNS}
+    table = np.stack(list(columns.values()))
+    known = np.isfinite(table) & (table > 0.0)
+    if not np.all(known.all(axis=0) | np.isnan(table).all(axis=0)):
+        raise ValueError("measures holds values that are no numbers of a floc's")
+    rows = table.T.tolist()
+    return [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]
 
 
 def _fits(count, group):

@@ -91,7 +91,7 @@ def test_overrides_lie_over_the_file(tmp_path):
 
 def test_wrong_overrides_are_told_apart(tmp_path):
     assert problem_lines(tmp_path, VALID, {"seed": -1}) == [
-        "given over study.toml: seed must be an integer from 0 to 9223372036854775807, found -1"
+        "override of study.toml: seed must be an integer from 0 to 9223372036854775807, found -1"
     ]
 
 

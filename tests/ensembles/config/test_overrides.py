@@ -49,7 +49,7 @@ def test_settings_lie_over_the_file_and_are_kept(tmp_path):
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        ("seed=x", "given over small.toml: seed must be an integer"),
+        ("seed=x", "override of small.toml: seed must be an integer"),
         ("scene.detla=[0.0]", "scene.detla: unknown key (did you mean 'delta'?)"),
         ("bogus", "write KEY=VALUE"),
         ("stop.half_width=0.7", "stop.half_width must be a finite number above 0 and at most 0.5"),

@@ -72,6 +72,6 @@ def test_what_is_not_done_is_handed_out_again():
 def test_too_many_failures_end_the_study_after_what_came_was_written():
     state = make_state(allowed=1)
     state.take_in(result_of(state.next_chunk(), failed=1))
-    with pytest.raises(TooManyFailures, match=r"2 replicates have failed, .* stalled"):
+    with pytest.raises(TooManyFailures, match=r"2 replicates failed, .* stalled"):
         state.take_in(result_of(state.next_chunk(), failed=1))
     assert (state.computed, len(state.notes)) == (2, 2)

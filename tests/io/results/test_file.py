@@ -21,6 +21,7 @@ from flocsim.io.results.file import (
     same_data,
     write_results,
 )
+from flocsim.io.results.layout import SCHEMA_VERSION
 from tests.helpers.synthetic_results import FAILURES, make_results
 
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
@@ -238,7 +239,7 @@ def test_cut_and_damaged_files_are_refused(written):
             read_results(path)
 
 
-@pytest.mark.parametrize("version", [0, 1, 6, "1.5"])
+@pytest.mark.parametrize("version", [0, 1, SCHEMA_VERSION + 1, "1.5"])
 def test_other_versions_are_refused(written, version):
     path, _ = written
     reseal(path, lambda file: file.attrs.create("schema_version", version))

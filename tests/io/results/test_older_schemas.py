@@ -59,7 +59,9 @@ def test_what_is_written_now_is_what_the_file_of_this_version_has(stored, tmp_pa
         k: v for k, v in found[1].items() if not k.startswith("flocs/")
     }
     assert found[0].keys() - found[1].keys() <= {
-        each for each in found[0] if each.startswith(("pooled/", "differences/", "flocs/"))
+        each
+        for each in found[0]
+        if each.startswith(("pooled/", "differences/", "numerics/", "flocs/"))
     }
 
 

@@ -44,6 +44,21 @@ def entries():
     ]
 
 
+def test_measures_survive_the_file_and_have_to_be_numbers_of_a_floc(tmp_path, entries):
+    from flocsim.io.images.measures import mask_measures
+
+    region = segment(picture(), noise_scale=0).regions[0]
+    measured = attrs.evolve(entries[0], measures=mask_measures(region.mask))
+    write_library(tmp_path / "s.h5", [measured, entries[1]])
+    assert [each.measures for each in read_library(tmp_path / "s.h5")] == [measured.measures, None]
+    (tmp_path / "t.h5").write_bytes(read_sealed(tmp_path / "s.h5"))
+    with h5py.File(tmp_path / "t.h5", "r+") as file:
+        file["measures/solidity"][0] = np.nan
+    (tmp_path / "t.h5").write_bytes(seal((tmp_path / "t.h5").read_bytes()))
+    with pytest.raises(FileError, match="measures holds values that are no numbers"):
+        read_library(tmp_path / "t.h5")
+
+
 def test_entries_survive_the_file(tmp_path, entries):
     write_library(tmp_path / "s.h5", entries)
     read = read_library(tmp_path / "s.h5")

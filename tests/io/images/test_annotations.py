@@ -1,0 +1,78 @@
+"""Scale bars and their writing are found and left out, and nothing else is."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw, ImageFont
+
+from flocsim.io.images.annotations import without_annotations
+from flocsim.io.images.pictures import segment
+from flocsim.io.images.reading import read_grey
+from tests.helpers.real_images import real_image
+
+SIZE = (320, 420)
+
+
+def flocs(dark, noise=0.02, seed=0):
+    """Grey of six flocs in the upper half."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    grey = np.full(SIZE, 0.75 if dark else 0.15)
+    for k, (cx, cy) in enumerate((60 + 60 * k, 70 + 30 * (k % 2)) for k in range(6)):
+        angle = np.arctan2(y - cy, x - cx)
+        near = np.hypot(x - cx, y - cy) < (9 + k) * (1 + 0.2 * np.cos(3 * angle))
+        grey[near] += -0.4 if dark else 0.4
+    return np.clip(grey + np.random.default_rng(seed).normal(0, noise, SIZE), 0, 1)
+
+
+def with_bar(grey, colour, place, size, text, boxed, jpeg):
+    picture = Image.fromarray((255 * grey).astype("u1"))
+    draw = ImageDraw.Draw(picture)
+    (x, y), (length, width) = place, size
+    if boxed:
+        draw.rectangle([x - 8, y - 30, x + length + 8, y + width + 6], fill=255 - colour)
+    draw.rectangle([x, y, x + length, y + width], fill=colour)
+    if text:
+        draw.text((x + 5, y - 26), "50 µm", fill=colour, font=ImageFont.load_default(18))
+    if jpeg:
+        packed = io.BytesIO()
+        picture.save(packed, "JPEG", quality=90)
+        picture = Image.open(packed)
+    return np.asarray(picture) / 255.0
+
+
+@pytest.mark.parametrize("number", range(48))
+def test_bars_are_no_flocs_and_flocs_stay(number):
+    dark, white, text, boxed = (bool(number >> k & 1) for k in range(4))
+    place = ((12, 295), (290, 300), (150, 250))[number % 3]
+    size = ((60, 3), (110, 8), (85, 12))[number // 16]
+    plain = flocs(dark, seed=number)
+    grey = with_bar(plain, 255 * white, place, size, text, boxed, jpeg=number % 5 == 0)
+    replaced = without_annotations(grey)[1]
+    assert replaced[place[1] : place[1] + size[1], place[0] : place[0] + size[0]].all()
+    found, before = segment(grey), segment(plain)
+    assert found.annotated and not before.annotated
+    assert len(before.regions) == len(found.regions) == 6
+    for one, other in zip(found.regions, before.regions, strict=True):
+        assert one.equivalent_radius == pytest.approx(other.equivalent_radius, rel=0.03)
+
+
+@pytest.mark.parametrize("dark", [True, False])
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_pictures_without_a_bar_stay_as_they_are(dark, noise):
+    grey = flocs(dark, noise)
+    same, replaced = without_annotations(grey)
+    assert same is grey and not replaced.any()
+
+
+@pytest.mark.parametrize(
+    "name", ["flocpy/023.png", "safas/clayflocs.png", "soot_tem/201805A_A6_004_half.png"]
+)
+def test_nothing_of_real_pictures_is_taken_for_a_bar(name):
+    assert not without_annotations(read_grey(real_image(name)))[1].any()
+
+
+def test_a_square_and_a_saturated_background_are_no_bars():
+    grey = np.full((60, 80), 1.0)
+    grey[20:40, 20:40] = 0.0
+    assert not without_annotations(grey)[1].any()
