@@ -19,7 +19,10 @@ def exceptions_figure(study, entries, vertices=64):
     in how many of the contradicting pairs it is, of how many.
     """
     counts, pairs = flocs_against(study)
-    known = {entry.floc_id: entry for entry in entries if vertices in entry.fits}
+    least = min(entry.spheroradius for entry in entries)
+    # A library of several spheroradii has them in the names.
+    known = {entry.floc_id.partition(" r=")[0]: entry for entry in entries
+             if vertices in entry.fits and entry.spheroradius == least}  # fmt: skip
     shown = [(name, times) for name, times in counts.most_common() if name in known][:MOST]
     if not shown:
         return None

@@ -71,7 +71,7 @@ def test_the_outlines_of_flocs_that_contradict_are_drawn(example):
 
     exceptions = example("exceptions")
     entries = paper_fits(radii=(1.0,))
-    names = tuple(entry.floc_id for entry in entries)
+    names = tuple(entry.floc_id.partition(" r=")[0] for entry in entries)
     clean = relabelled(paper_results(), flocs=names)
     assert exceptions.exceptions_figure(clean, entries) is None
     study = relabelled(paper_results(outside), flocs=names)
