@@ -41,6 +41,20 @@ def rim(mask):
     return mask & ~binary_erosion(mask)
 
 
+def slope_of(contrast, blur):
+    """|∇c| of a contrast that is blurred by so many pixels."""
+    from scipy.ndimage import gaussian_filter
+
+    if min(contrast.shape) < 2:
+        return np.zeros_like(contrast)
+    smooth = gaussian_filter(contrast, blur, mode="nearest") if blur else contrast
+    down, across = np.gradient(smooth)
+    down *= down
+    across *= across
+    down += across
+    return np.sqrt(down, out=down)
+
+
 class Focus:
     """The slopes of a piece of a picture, more and more blurred.
 
@@ -49,18 +63,29 @@ class Focus:
     """
 
     def __init__(self, contrast: np.ndarray, noise: float, scale: float):
-        self.contrast, self.noise, self.scale = contrast, noise, max(scale, 1.0)
+        self.contrast = contrast.astype(np.float32)
+        self.noise, self.scale = noise, max(scale, 1.0)
         self.slopes: dict[float, np.ndarray] = {}
 
     def slope(self, blur: float) -> np.ndarray:
         """|∇c| (h, w) of the contrast blurred by so many pixels more."""
-        from scipy.ndimage import gaussian_filter
-
         if blur not in self.slopes:
-            smooth = gaussian_filter(self.contrast, blur, mode="nearest") if blur else self.contrast
-            slopes = np.gradient(smooth) if min(smooth.shape) > 1 else [np.zeros_like(smooth)]
-            self.slopes[blur] = np.sqrt(sum(each * each for each in slopes))
+            self.slopes[blur] = slope_of(self.contrast, blur)
         return self.slopes[blur]
+
+    def slope_in(self, blur: float, box: tuple[slice, slice]) -> np.ndarray:
+        """The same in a box of it, which is computed alone where it is small."""
+        from math import prod
+
+        size = prod(s.stop - s.start for s in box)
+        if blur in self.slopes or 2 * size > self.contrast.size:
+            return self.slope(blur)[box]
+        margin = int(4.0 * blur) + 2
+        wide = tuple(slice(max(s.start - margin, 0), s.stop + margin) for s in box)
+        inner = tuple(
+            slice(s.start - w.start, s.stop - w.start) for s, w in zip(box, wide, strict=True)
+        )
+        return slope_of(self.contrast[wide], blur)[inner]
 
     def noise_slope(self, blur: float) -> float:
         """Root mean square slope of the noise after so much more blur: ∝ 1/(scale² + blur²)."""
@@ -78,13 +103,13 @@ class Focus:
             if blur > WIDEST * radius:
                 break
             noise, more = self.noise_slope(blur), float(np.hypot(blur, step))
-            slope = maximum_filter(self.slope(blur)[box], 3)[edge]
+            slope = maximum_filter(self.slope_in(blur, box), 3)[edge]
             if np.median(slope) <= CLEAR * noise:
                 continue
             # Of noise alone, the steepest of nine pixels has some √2 times its slope.
             clean = np.sqrt(np.maximum(slope**2 - 2.0 * noise**2, 0.0))
             ratio = np.median(
-                clean / np.maximum(maximum_filter(self.slope(more)[box], 3)[edge], 1e-12)
+                clean / np.maximum(maximum_filter(self.slope_in(more, box), 3)[edge], 1e-12)
             )
             before, after = (disk_slope(radius, np.hypot(SPREADS, s)) for s in (blur, more))
             return float(np.interp(-ratio, -before / after, SPREADS))
