@@ -163,6 +163,7 @@ def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
     order = within_limits(scene, flocs)
     chosen = np.array([flocs[place].measured_size for place in order.tolist()])
     weights = (chosen / chosen.max()) ** EXPONENTS[scene.weight or "number"]
+    weights = weights * np.array([flocs[place].weight for place in order.tolist()])
     if isinstance(scene.classes, tuple):
         number = np.searchsorted(scene.classes, chosen, side="right")
     else:

@@ -38,6 +38,12 @@ LARGE = 0.15
 FLOOR = 3.0
 """Times the noise above which there are islands."""
 
+QUIET = 0.02
+"""Noise beside which thin layers of a contrast of .15 can still be followed."""
+
+MOST_BLUR = 2.5
+"""More blur than this [px] against noise would take small flocs with it."""
+
 LEAST = 0.01
 """Contrast below which nothing is looked for: about two levels of 8 bits."""
 
@@ -125,6 +131,20 @@ def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[f
     square = (down * down + across * across)[np.abs(contrast) < FLOOR * noise]
     # The square of two normal numbers of deviation s has the median 2 ln 2 s².
     return noise, float(np.median(square) / np.log(2.0)) if square.size else 0.0
+
+
+def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndarray, float]:
+    """The contrast with so much more blur that the noise is QUIET, and the blur that it has then.
+
+    A blur of s more leaves scale/√(scale² + s²) of the noise.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    there = max(scale, 1.0)
+    more = min(there * float(np.sqrt(max((noise / QUIET) ** 2 - 1.0, 0.0))), MOST_BLUR)
+    if more == 0.0:
+        return contrast, scale
+    return gaussian_filter(contrast, more, mode="nearest"), float(np.hypot(there, more))
 
 
 class Search:

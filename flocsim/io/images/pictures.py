@@ -11,7 +11,7 @@ from flocsim.io.images.background import (
     smooth_surface,
 )
 from flocsim.io.images.focus import Focus
-from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at
+from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at, quietened
 from flocsim.io.images.reading import read_grey
 from flocsim.io.images.regions import Filters, Region, Rejection, find_regions
 
@@ -140,7 +140,10 @@ def segment(
     contrast, fine = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
     noise, slope = background_noise(contrast, fine, noise_scale)
     if threshold is None:
-        search = Search(contrast, noise, slope, noise_scale, min_radius, max_blur, saturated)
+        quiet, scale = quietened(contrast, noise, noise_scale)
+        if quiet is not contrast:
+            contrast, (noise, slope) = quiet, background_noise(quiet, 0.0, scale)
+        search = Search(contrast, noise, slope, scale, min_radius, max_blur, saturated)
         outlines = search.outlines()
     else:
         outlines = outlines_at(contrast, threshold, Focus(contrast, slope, noise_scale))

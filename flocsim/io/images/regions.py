@@ -38,7 +38,8 @@ class Region:
     (`Focus.softness`), level: contrast at which it was cut, base: contrast around it, all NaN for a
     mask that came without a picture; parted: the confidence that it is a floc apart from one that
     it touched, NaN for all others; band: masks as it would have been cut at a higher and at a lower
-    level, in the bbox widened by the same on every side, None where it is not known.
+    level, in the bbox widened by the same on every side, None where it is not known; weight: for
+    how many flocs it stands, of which the filters kept it alone (selection.weighed).
     """
 
     label: int
@@ -52,6 +53,7 @@ class Region:
     base: float = NAN
     parted: float = NAN
     band: tuple[np.ndarray, np.ndarray] | None = None
+    weight: float = 1.0
 
     @property
     def radius_band(self) -> tuple[float, float]:

@@ -85,7 +85,7 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
 
 COLUMNS = (
     "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
-    "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted",
+    "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted", "weight",
 )  # fmt: skip
 
 
@@ -125,4 +125,4 @@ def _facts(region, pixel_size):
             for value, digits in ((region.blur, 3), (region.level, 4)))  # fmt: skip
     parted = "" if region.parted != region.parted else f"{region.parted:.2f}"
     size = region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}"
-    return f"{x:.2f}", f"{y:.2f}", *size, *told, low, high, parted
+    return f"{x:.2f}", f"{y:.2f}", *size, *told, low, high, parted, f"{region.weight:.4g}"
