@@ -99,22 +99,23 @@ def add_parser(subparsers: Any) -> None:
     add("--threshold", metavar="CONTRAST",
         help="contrast from which a pixel belongs to a floc, above 0 to 1: of dark flocs the share "
         "of the light that they take, of bright ones the grey above the background, white being 1 "
-        "(default: found for each picture, and printed)")  # fmt: skip
+        "(default: found for each floc, and their median printed)")  # fmt: skip
     add("--noise-scale", default="1", metavar="PX",
         help="detail finer than this is noise (default: %(default)s)")  # fmt: skip
     add("--saturated", default="0.001", metavar="SHARE",
-        help="share of pixels above the upper threshold of the contrast stretch "
+        help="share of a floc's pixels whose contrast is too high to count for its level "
         "(default: %(default)s)")  # fmt: skip
     add("--min-radius", default="4", metavar="PX",
         help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
     add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
     add("--max-blur", default="0.25", metavar="SHARE",
         help="softness, as a share of r_eq, that half of an outline has to stay below, or the "
-        "region is out of focus; inf: keep all (default: %(default)s)")  # fmt: skip
+        "region is out of focus, unless it is below 3.5 px; inf: keep all "
+        "(default: %(default)s)")  # fmt: skip
     add("--neck", metavar="SHARE",
         help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
-        "never (default: 0.5, but never in a picture of fractal aggregates, where most regions "
-        "with necks would become four flocs or more)")  # fmt: skip
+        "never (default: 0.5, where the parts are so compact that they are surely two flocs, and "
+        "never in a picture of fractal aggregates)")  # fmt: skip
     add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
     add("--drop", metavar="LIST",
         help="flocs to leave out, by the numbers of the overlay and the table: 3,5 with one "

@@ -115,6 +115,7 @@ def fit_pictures(
                 warn_of_coarse(picture.name, picture.regions, options.radii)
                 pictures.append(picture)
         report_masks(masks_found)
+        pictures = pictures if options.masks else weighted(pictures, options)
         check_names(options.correction, [(each.name, each.found) for each in pictures])
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
@@ -129,6 +130,18 @@ def fit_pictures(
             lose(name, fit)
     fits = [fit for (name, _), fit in zip(regions, fits, strict=True) if name not in lost]
     return [each for each in pictures if each.name not in lost], fits, list(lost)
+
+
+def weighted(pictures, options):
+    """The Pictures with the weights of their flocs among all of them."""
+    from flocsim.io.images.selection import weighed
+
+    max_blur = options.segmentation["max_blur"]
+    found = weighed([each.found for each in pictures], max_blur)
+    return [
+        attrs.evolve(each, found=one, regions=largest(one.regions, options.max_flocs))
+        for each, one in zip(pictures, found, strict=True)
+    ]
 
 
 def titles_of(paths: Sequence[Path]) -> list[str]:

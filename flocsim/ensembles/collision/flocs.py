@@ -34,7 +34,8 @@ class Floc:
     """One floc at several numbers of vertices: ``shapes`` {N: Shape}, in a unit of its own.
 
     ``ratio`` is r_eq/r, ``errors`` {N: RE [%]} of the fits. ``size``: the measured r_eq [m], for
-    which the shapes are in metres; None where nothing was measured. ``own`` where the shape is the
+    which the shapes are in metres; None where nothing was measured. ``weight``: how many flocs it
+    stands for among those of its pictures. ``own`` where the shape is the
     user's: it keeps its form at any size, its radius grows with it.
     """
 
@@ -44,6 +45,7 @@ class Floc:
     errors: dict[int, float] = attrs.Factory(dict)
     size: float | None = None
     own: bool = False
+    weight: float = 1.0
 
     def resized(self, vertices: int, equivalent_radius: float, radius: float) -> Shape:
         """The shape of N vertices with r_eq [m], and with the spheroradius [m] if not ``own``."""
@@ -124,6 +126,7 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
                 {n: entry.fits[n].shape for n in kept},
                 {n: entry.fits[n].relative_error for n in kept},
                 entry.measured_radius,
+                weight=entry.weight,
             )
         )
     if shapes.size == "own" and len({floc.size for floc in flocs}) < 2:

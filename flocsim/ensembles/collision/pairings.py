@@ -158,11 +158,18 @@ def within_limits(scene: Any, flocs: Sequence[Floc]) -> np.ndarray:
     return found
 
 
+def drawing_weights(scene: Any, flocs: Sequence[Floc]) -> np.ndarray:
+    """How often measured flocs are drawn: for as many as each stands for, by number or size."""
+    sizes = np.array([floc.measured_size for floc in flocs])
+    counts = np.array([floc.weight for floc in flocs])
+    return counts * (sizes / sizes.max()) ** EXPONENTS[scene.weight or "number"]
+
+
 def size_classes(scene: PairScene, flocs: Sequence[Floc]) -> list[SizeClass]:
     """The classes of ``[scene] pairs = "measured"``; ConfigError for one without flocs."""
     order = within_limits(scene, flocs)
     chosen = np.array([flocs[place].measured_size for place in order.tolist()])
-    weights = (chosen / chosen.max()) ** EXPONENTS[scene.weight or "number"]
+    weights = drawing_weights(scene, [flocs[place] for place in order.tolist()])
     if isinstance(scene.classes, tuple):
         number = np.searchsorted(scene.classes, chosen, side="right")
     else:

@@ -72,8 +72,8 @@ WEIGHT: Any = choice(
     default=of_measured("number"),
     shown='"number"',
     only_for=("pairs", MEASURED),
-    help="how often a measured floc is drawn: number, each alike; area, in proportion to its "
-    "area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
+    help="how often a measured floc is drawn: number, as in its pictures; area, in proportion to "
+    "its area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
     "laser diffraction and Coulter counters give it",
 )
 CLASSES: Any = read_by(

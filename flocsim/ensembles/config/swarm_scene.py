@@ -84,7 +84,7 @@ class SwarmScene:
         "area",
         "volume",
         default="number",
-        help="how often a measured floc is drawn: number, each alike; area or volume, in "
+        help="how often a measured floc is drawn: number, as in its pictures; area or volume, in "
         "proportion to r_eq² or r_eq³",
     )
     min_radius: float | None = size_limit("least")

@@ -162,6 +162,9 @@ def floc_facts(study):
         facts[f"flocs.{n}"] = digest(np.concatenate(parts))
     if study.floc_pool.own_size:
         facts["flocs.size"] = digest(np.array([floc.size for floc in study.flocs]))
+        weights = np.array([floc.weight for floc in study.flocs])
+        if np.any(weights != 1.0):
+            facts["flocs.weight"] = digest(weights)
     return facts | own_shape_facts(study)
 
 

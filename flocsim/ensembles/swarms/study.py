@@ -10,7 +10,7 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
-from flocsim.ensembles.collision.pairings import EXPONENTS, quantile, within_limits
+from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
@@ -218,8 +218,7 @@ class SwarmStudy(StudyKind):
     def draw_measured(self, numbers: np.ndarray) -> list[int]:
         """Places of measured flocs, each with its weight."""
         places = self.choosable
-        sizes = np.array([self.flocs[each].measured_size for each in places])
-        weights = (sizes / sizes.max()) ** EXPONENTS[self.scene.weight]
+        weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
         return [int(places[quantile(weights, number)]) for number in numbers.tolist()]
 
     def floc_for(self, radius: float, number: float) -> int:

@@ -1,4 +1,4 @@
-"""Noise, uneven light, and the threshold: what parts a picture's flocs from their background."""
+"""Noise and uneven light: what a picture would show without flocs."""
 
 from collections.abc import Sequence
 
@@ -18,15 +18,6 @@ NOISE_SAMPLES = 500
 
 DARKEST = 0.01
 """Added before taking logarithms: about the black level of 8-bit cameras."""
-
-NOISE_MARGIN = 5.0
-"""A floc stands out by this many standard deviations of the noise, or it is not one."""
-
-LEVELS = 48
-"""Levels of contrast at which the steepness of edges is looked at."""
-
-STEEPER = 1.25
-"""A lower level is taken if edges are steeper there by this factor."""
 
 
 def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
@@ -95,48 +86,3 @@ def _reweighted_fit(basis, values):
         deviation = robust_deviation(residual) + 1e-3
         weights = 1.0 / (1.0 + ((residual - np.median(residual)) / (1.5 * deviation)) ** 2) ** 2
     return solution
-
-
-def find_threshold(contrast: np.ndarray, noise: float, saturated: float) -> float:
-    """Otsu's level of the contrast stretched between two thresholds, or the steepest below it.
-
-    The thresholds are the median and the top `saturated` share (paper, section 2.1: imadjust, then
-    graythresh).  Where flocs are partly more than one layer thick, Otsu's level parts the layers
-    instead; the edge of a single layer then is steeper, and its level is taken.
-    """
-    from skimage.filters import threshold_otsu
-
-    low = np.median(contrast)
-    high = np.quantile(contrast, 1.0 - saturated)
-    if high <= low:
-        high = contrast.max()
-    if high <= low:
-        return float(low)
-    stretched = np.clip((contrast - low) / (high - low), 0.0, 1.0)
-    otsu = low + threshold_otsu(stretched) * (high - low)
-    floor = low + NOISE_MARGIN * noise
-    return float(steepest_level(contrast, floor, otsu) if otsu > floor else floor)
-
-
-def steepest_level(contrast, floor, otsu):
-    """The level from `floor` to `otsu` with the steepest edges, `otsu` unless clearly so."""
-    levels = np.linspace(floor, otsu, LEVELS + 1)
-    steepness = mean_gradients(contrast, levels)
-    best = int(np.argmax(steepness))
-    if steepness[best] < STEEPER * steepness[-1]:
-        return otsu
-    return 0.5 * (levels[best] + levels[best + 1])
-
-
-def mean_gradients(contrast, levels):
-    """Mean gradient [1/px] of the pixels between each two levels, smoothed over three of them."""
-    inner = contrast[1:-1, 1:-1]
-    rows, columns = np.nonzero((inner >= levels[0]) & (inner < levels[-1]))
-    across = contrast[rows + 1, columns + 2] - contrast[rows + 1, columns]
-    down = contrast[rows + 2, columns + 1] - contrast[rows, columns + 1]
-    width = (levels[-1] - levels[0]) / LEVELS
-    bins = np.minimum(((inner[rows, columns] - levels[0]) / width).astype(int), LEVELS - 1)
-    count = np.bincount(bins, minlength=LEVELS)
-    total = np.bincount(bins, 0.5 * np.hypot(across, down), minlength=LEVELS)
-    three = np.ones(3)
-    return np.convolve(total, three, "same") / np.maximum(np.convolve(count, three, "same"), 1)

@@ -16,10 +16,11 @@ from flocsim.io.images.limits import (
     check_spread,
     read_array,
 )
+from flocsim.io.images.outlines import EIGHT, Outline, filled, pieces
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import SUFFIXES, read_pixels
 from flocsim.io.images.recognition import check_halves, check_labels
-from flocsim.io.images.regions import EIGHT, Filters, filled, sorted_out
+from flocsim.io.images.regions import NAN, Filters, sorted_out
 
 ARRAYS = (".npy", ".npz")
 MOST_BYTES = 8 * MOST_PIXELS
@@ -153,25 +154,12 @@ def segment_mask(
     found, numbers, spare = [], [], max(values, default=0)
     for place, box in enumerate(find_objects(labels), start=1):
         others = (labels[box] != place) & (labels[box] > 0)
-        pieces = list(_pieces(filled(labels[box] == place) & ~others, box))
-        found += pieces
-        numbers += [values[place - 1], *range(spare + 1, spare + len(pieces))]
-        spare += len(pieces) - 1
+        parts = list(pieces(filled(labels[box] == place) & ~others, box))
+        found += [Outline(where, part, NAN, NAN, NAN, NAN) for part, where in parts]
+        numbers += [values[place - 1], *range(spare + 1, spare + len(parts))]
+        spare += len(parts) - 1
     filters = Filters(min_radius, max_radius, clear_of_border=False)
-    regions, rejected = sorted_out(found, None, filters, numbers)
+    regions, rejected = sorted_out(found, mask.shape, filters, numbers)
     seen = mask > 0
     holes = filled(seen) & ~seen
     return Segmentation(labels > 0, regions, rejected, "masked", float("nan"), holes=holes)
-
-
-def _pieces(mask, box):
-    """The connected parts of one label, each with its box: a label may be in several places."""
-    from scipy.ndimage import find_objects, label
-
-    parts = label(mask, EIGHT)[0]
-    for number, inner in enumerate(find_objects(parts), start=1):
-        place = tuple(
-            slice(outer.start + part.start, outer.start + part.stop)
-            for outer, part in zip(box, inner, strict=True)
-        )
-        yield parts[inner] == number, place

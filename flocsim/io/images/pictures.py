@@ -6,19 +6,28 @@ import numpy as np
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
-    find_threshold,
     light_surface,
     low_pass,
     noise_deviation,
     smooth_surface,
 )
+from flocsim.io.images.focus import Focus
+from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at, quietened
 from flocsim.io.images.reading import read_grey
-from flocsim.io.images.regions import Filters, Region, Rejection, filled, find_regions
+from flocsim.io.images.regions import Filters, Region, Rejection, find_regions
 
 __all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
+
+MANY_PIECES, APART = 4, 3
+"""Regions for one body, pieces no farther from each other than twice so many pixels, from which a
+picture counts as broken up."""
+
+UNDECIDED = 0.5
+"""Share of the area of flocs between their bands' inner and outer outlines, from which levels
+disagree: twice what a lens of a tenth of r_eq makes of it."""
 
 COARSE = 4
 """Every fourth pixel tells whether flocs are dark or bright."""
@@ -30,7 +39,8 @@ class Segmentation:
 
     foreground: (h, w) bool, everything past the threshold, holes filled, rejected regions too;
     regions: the flocs; rejected: the others; flocs: "bright" or "dark"; threshold: the contrast,
-    against the background, that separates the two (0 = background, 1 = full range); left_whole:
+    against the background, that separates the two (0 = background, 1 = full range), the median of
+    those of all flocs where each has its own; left_whole:
     regions with necks that were taken for fractal aggregates, and not parted; holes: (h, w) bool,
     what was filled in the foreground, None where nobody asks any more; annotated: whether a scale
     bar or its writing was left out.
@@ -48,6 +58,32 @@ class Segmentation:
     @property
     def foreground_share(self) -> float:
         return float(self.foreground.mean())
+
+    @property
+    def alarms(self) -> list[str]:
+        """What speaks against the outlines, each in a few words; empty where nothing does."""
+        found = []
+        kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
+        if left > kept:
+            found.append(f"{100 * left / (kept + left):.0f} % of the area is left out")
+        pieces = len(self.regions) + len(self.rejected)
+        if pieces >= MANY_PIECES:
+            bodies = self._bodies()
+            if pieces >= MANY_PIECES * bodies:
+                found.append(f"{pieces} pieces lie as if broken from {bodies}")
+        bands = [each.band for each in self.regions if each.band is not None]
+        undecided = sum(int(outer.sum()) - int(inner.sum()) for inner, outer in bands)
+        if bands and undecided > UNDECIDED * kept:
+            found.append(
+                f"outlines are undecided over {100 * undecided / kept:.0f} % of their area"
+            )
+        return found
+
+    def _bodies(self):
+        """The number of bodies if gaps of up to 2 APART pixels are none."""
+        from scipy.ndimage import binary_dilation, label
+
+        return int(label(binary_dilation(self.foreground, iterations=APART))[1])
 
     def rejected_by_reason(self) -> dict[str, int]:
         """{reason: number of regions}, reasons in alphabetical order."""
@@ -71,18 +107,18 @@ def segment(
 ) -> Segmentation:
     """Separate the flocs of a grey picture from its background.
 
-    In the paper's order (section 2.1): removal of noise finer than `noise_scale` [px] in Fourier
-    space, and of the background; contrast stretch between two thresholds, the median and the top
-    `saturated` share; Otsu's threshold, or a lower one where edges are clearly steeper
-    (find_threshold); or `threshold`, a contrast above 0 and to 1.  Dark flocs:
+    After the paper's section 2.1: removal of noise finer than `noise_scale` [px] in Fourier space,
+    and of the background; then each floc is cut at a level of its own, that at which its outline is
+    steepest, counted from outside (outlines.Search), without its `saturated` share of pixels; or
+    all at one `threshold`, a contrast above 0 and to 1.  Dark flocs:
     contrast = 1 − grey/background (light is lost by a factor);
     bright flocs: contrast = grey − background.
 
     Regions are 8-connected with holes filled, parted at necks of up to `neck` times the width of
-    the smaller part (0: never; None: 0.5, but never where the picture is one of fractal
-    aggregates, `split_touching`).  Rejected are those that touch the border, with r_eq = √(area/π)
-    below `min_radius` or above `max_radius` [px], or softer than `max_blur`·r_eq along more
-    than half of the outline (out of focus; inf: none).
+    the smaller part (0: never; None: 0.5, where it is sure that they are two flocs,
+    `split_touching`).  Rejected are those that touch the border, with r_eq = √(area/π)
+    below `min_radius` or above `max_radius` [px], or softer than `max_blur`·r_eq and 3.5 px along
+    half of the outline (out of focus; inf: none).
 
     grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast);
     background: (h, w), for example the median of many frames, or None for a polynomial surface of
@@ -104,12 +140,24 @@ def segment(
         light = low_pass(background, noise_scale)
     if flocs == "auto":
         flocs = _guess_polarity(smooth, light)
-    contrast, noise = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
+    contrast, fine = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
+    noise, slope = background_noise(contrast, fine, noise_scale)
     if threshold is None:
-        threshold = find_threshold(contrast, noise, saturated)
-    seen = contrast > threshold
+        quiet, scale = quietened(contrast, noise, noise_scale)
+        if quiet is not contrast:
+            contrast, (noise, slope) = quiet, background_noise(quiet, 0.0, scale)
+        search = Search(contrast, noise, slope, scale, min_radius, max_blur, saturated)
+        outlines = search.outlines()
+    else:
+        outlines = outlines_at(contrast, threshold, Focus(contrast, slope, noise_scale))
+    seen = np.zeros(grey.shape, bool)
+    for each in outlines:
+        seen[each.box] |= each.mask
+    regions, rejected, whole = find_regions(outlines, contrast, filters)
     foreground = filled(seen)
-    regions, rejected, whole = find_regions(foreground, contrast, filters)
+    if threshold is None:
+        levels = [each.level for each in regions or rejected]
+        threshold = float(np.median(levels)) if levels else float("nan")
     return Segmentation(
         foreground, regions, rejected, flocs, threshold, whole, foreground & ~seen,
         bool(burnt_in.any()),

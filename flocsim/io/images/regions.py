@@ -1,24 +1,29 @@
-"""From a foreground to flocs: holes, labels, necks, filters; a region left out has a reason."""
+"""From outlines to flocs: necks, filters, bands; a region that is left out has a reason."""
 
 import attrs
 import numpy as np
 
-EIGHT = np.ones((3, 3), int)
-"""Diagonal pixels belong together."""
-
-SHARP = 2.0
-"""An edge this soft [px] can be the lens and the pixels alone: no floc is left out for it."""
-
-NEAR, REACH = 0.5, (2, 40)
-"""Share of r_eq within which a floc's contrast counts for a place of its outline, and limits [px]
-of that."""
+from flocsim.io.images.focus import rim
+from flocsim.io.images.outlines import (
+    BAND,
+    PIXEL,
+    SHARP,
+    filled,
+    pieces,
+    widened,
+)
 
 NECK = 0.5
+SURE = 0.65
+"""Least confidence with which flocs are parted unasked."""
+
 MANY_PARTS = 4
 """Flocs that touch by chance are two, rarely three; an aggregate of beads has more necks."""
 
 STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
+
+NAN = float("nan")
 
 
 @attrs.frozen(eq=False)
@@ -30,7 +35,11 @@ class Region:
     x right and y *down*, the first pixel's centre at (0, 0); bbox: (top, left, bottom, right)
     [px], bottom and right exclusive; area [px]; equivalent_radius = √(area/π) [px]; mask: bool
     array of the bbox widened by one pixel on every side; blur: softness of its outline [px]
-    (`blur_of`), NaN for a mask that came without a picture.
+    (`Focus.softness`), level: contrast at which it was cut, base: contrast around it, all NaN for a
+    mask that came without a picture; parted: the confidence that it is a floc apart from one that
+    it touched, NaN for all others; band: masks as it would have been cut at a higher and at a lower
+    level, in the bbox widened by the same on every side, None where it is not known; weight: for
+    how many flocs it stands, of which the filters kept it alone (selection.weighed).
     """
 
     label: int
@@ -39,7 +48,20 @@ class Region:
     area: int
     equivalent_radius: float
     mask: np.ndarray
-    blur: float = float("nan")
+    blur: float = NAN
+    level: float = NAN
+    base: float = NAN
+    parted: float = NAN
+    band: tuple[np.ndarray, np.ndarray] | None = None
+    weight: float = 1.0
+
+    @property
+    def radius_band(self) -> tuple[float, float]:
+        """r_eq [px] of the two masks of its band, of its own mask twice where there is none."""
+        if self.band is None:
+            return self.equivalent_radius, self.equivalent_radius
+        inner, outer = (float(np.sqrt(mask.sum() / np.pi)) for mask in self.band)
+        return inner, outer
 
 
 @attrs.frozen(eq=False)
@@ -64,48 +86,36 @@ class Filters:
     clear_of_border: bool = True
 
 
-def filled(foreground):
-    """The foreground with its holes filled: background that no way leads to from the border."""
-    from scipy.ndimage import label
+def find_regions(outlines, contrast, filters):
+    """(Regions, Rejections, number of regions with necks that were left whole) of Outlines.
 
-    outside = label(np.pad(~foreground, 1, constant_values=True))[0]
-    return (outside != outside[0, 0])[1:-1, 1:-1]
-
-
-def find_regions(foreground, contrast, filters):
-    """(Regions, Rejections, number of regions with necks that were left whole) of a bool array.
-
-    `contrast`, of its shape, tells how sharp they are.
+    contrast: (h, w), of which they are.
     """
-    from scipy.ndimage import find_objects, label
-
-    labels, count = label(foreground, EIGHT)
     whole = 0
+    closed = [attrs.evolve(each, mask=filled(each.mask)) for each in outlines]
     if filters.neck != 0:
-        count, whole = split_touching(labels, find_objects(labels), filters.neck,
-                                      filters.min_radius)  # fmt: skip
-    boxes = list(enumerate(find_objects(labels, count), start=1))
-    boxes.sort(key=lambda found: (found[1][0].start, found[1][1].start))
-    masks = [(labels[box] == number, box) for number, box in boxes]
-    return *sorted_out(masks, contrast, filters), whole
+        closed, whole = split_touching(closed, filters.neck, filters.min_radius)
+    closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
+    regions, rejected = sorted_out(closed, contrast.shape, filters)
+    return with_bands(regions, rejected, contrast), rejected, whole
 
 
-def sorted_out(masks, contrast, filters, numbers=None):
-    """(Regions, Rejections) of pairs (bool array, its box in the picture).
+def sorted_out(outlines, shape, filters, numbers=None):
+    """(Regions, Rejections) of Outlines in a picture of a shape.
 
     numbers: of each the label; otherwise the flocs are counted, and then what is left out.
     """
     accepted, rejected = [], []
-    shape = None if contrast is None else contrast.shape
-    for place, (mask, box) in enumerate(masks):
-        blur = float("nan") if contrast is None else blur_of(mask, box, contrast)
+    for place, each in enumerate(outlines):
+        mask, box = each.mask, each.box
         size = int(mask.sum()), float(np.sqrt(mask.sum() / np.pi))
-        reason = reason_to_reject(box, shape, size[1], blur, filters)
+        reason = reason_to_reject(box, shape, size[1], each.softness, filters)
         bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
         number = len(accepted) + 1 if numbers is None else numbers[place]
-        about = (number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), blur)
+        about = (number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), each.softness,
+                 each.level, each.base, each.parted)  # fmt: skip
         if reason:
-            rejected.append(Rejection(*about, reason))
+            rejected.append(Rejection(*about, reason=reason))
         else:
             accepted.append(Region(*about))
     if numbers is None:
@@ -128,6 +138,56 @@ def reason_to_reject(box, shape, radius, blur, filters):
     return None
 
 
+def with_bands(regions, rejected, contrast):
+    """The Regions with their bands, which do not reach into other regions.
+
+    A level is uncertain by BAND of the step at the edge, and by what it changes over PIXEL.
+    """
+    taken = np.zeros(contrast.shape, bool)
+    for each in (*regions, *rejected):
+        top, left, bottom, right = each.bbox
+        taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
+    return tuple(with_band(each, taken, contrast) for each in regions)
+
+
+def with_band(region, taken, contrast):
+    """The Region with its band."""
+    top, left, bottom, right = region.bbox
+    box = slice(top, bottom), slice(left, right)
+    mask = region.mask[1:-1, 1:-1]
+    reach = int(np.ceil(2.0 + region.blur)) if np.isfinite(region.blur) else 2
+    wide, place = widened(mask, box, reach, contrast.shape)
+    near = contrast[place]
+    edge = rim(wide)
+    slope = float(np.median(np.hypot(*np.gradient(near))[edge]))
+    change = np.hypot(BAND * (region.level - region.base), PIXEL * slope)
+    inner = largest_piece(filled(wide & (near > region.level + change)), wide)
+    around = within(wide, reach) & ~(taken[place] & ~wide)
+    outer = largest_piece(filled(wide | (around & (near > region.level - change))), wide)
+    # What the picture's edge has cut off is given back, so that the margin is the same all around.
+    lost = [(reach - (s.start - p.start), reach - (p.stop - s.stop))
+            for s, p in zip(box, place, strict=True)]  # fmt: skip
+    return attrs.evolve(region, band=(np.pad(inner, lost), np.pad(outer, lost)))
+
+
+def within(mask, reach):
+    """The pixels no farther than `reach` from a mask's."""
+    from scipy.ndimage import distance_transform_edt
+
+    return distance_transform_edt(~mask) <= reach
+
+
+def largest_piece(mask, otherwise):
+    """The largest 8-connected part of a mask; the other one where there is none."""
+    here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
+    best = max(pieces(mask, here), key=lambda part: part[0].sum(), default=None)
+    if best is None:
+        return otherwise
+    alone = np.zeros_like(mask)
+    alone[best[1]] = best[0]
+    return alone
+
+
 def with_holes(region: Region, holes: np.ndarray) -> Region:
     """The Region without those of its pixels that are ``holes`` (h, w) of the picture; its softness
     stays that of its outline."""
@@ -147,63 +207,57 @@ def centroid_of(mask, box):
     return float(columns.mean() + box[1].start), float(rows.mean() + box[0].start)
 
 
-def blur_of(mask, box, contrast):
-    """Softness [px] that half of a region's outline does not exceed: the median of σ along it.
-
-    σ = step / (√(2π) · gradient), the deviation of the Gaussian that would make a step so soft.
-    The step is the greatest contrast of the region within NEAR r_eq of the outline's pixel, the
-    gradient the greatest among its neighbours: both local, so that a sharp speck in a soft halo
-    counts for the part of the outline that it makes, and no more.
-    """
-    from scipy.ndimage import binary_erosion, maximum_filter
-
-    reach = int(np.clip(round(NEAR * np.sqrt(mask.sum() / np.pi)), *REACH))
-    wide = tuple(
-        slice(max(side.start - 2, 0), min(side.stop + 2, size))
-        for side, size in zip(box, contrast.shape, strict=True)
-    )
-    near = contrast[wide]
-    if min(near.shape) < 2:
-        return 0.0
-    top, left = (side.start - out.start for side, out in zip(box, wide, strict=True))
-    edge = mask & ~binary_erosion(mask)
-    steepest = maximum_filter(np.hypot(*np.gradient(near)), size=3)
-    slope = steepest[top:, left:][: mask.shape[0], : mask.shape[1]][edge]
-    inside = np.where(mask, contrast[box], 0.0)
-    step = maximum_filter(inside, size=2 * reach + 1, mode="constant")[edge]
-    return float(np.median(step / np.maximum(np.sqrt(2.0 * np.pi) * slope, 1e-12)))
-
-
-def split_touching(labels, boxes, neck, min_radius):
-    """Part the regions of `labels`, in place, at their necks: (highest label, regions left whole).
+def split_touching(outlines, neck, min_radius):
+    """(Outlines, those of them that touch parted at their necks; number of those left whole).
 
     A neck parts two bodies if it is at most `neck` times as wide as the largest circle in the
-    smaller of them, and neither would be smaller than `min_radius` [px]. For a neck of None the
-    regions stay whole if most of the area with necks is in those that would become MANY_PARTS or
-    more: then these are fractal aggregates, and so are the smaller ones of the same picture.
+    smaller of them, and neither would be smaller than `min_radius` [px]. For a neck of None it also
+    takes a `confidence` of SURE, and nothing is parted if most of the area with necks is in what
+    would become MANY_PARTS or more: then these are fractal aggregates, and so are the smaller ones
+    of the same picture.
     """
-    parted = []
-    for number, box in enumerate(boxes, start=1):
-        mask = labels[box] == number
-        if mask.sum() < 2.0 * np.pi * min_radius**2:
+    cut = {}
+    for place, each in enumerate(outlines):
+        if each.mask.sum() >= 2.0 * np.pi * min_radius**2:
+            parts, width = bodies(each.mask, NECK if neck is None else neck, min_radius)
+            if parts.max() > 1:
+                cut[place] = parts, confidence(parts, width)
+    areas = [np.count_nonzero(parts) for parts, _ in cut.values()]
+    many = [parts.max() >= MANY_PARTS for parts, _ in cut.values()]
+    fractal = 2 * np.dot(areas, many) > sum(areas)
+    kept = [k for k, (_, sure) in cut.items() if neck is None and (fractal or sure < SURE)]
+    found = []
+    for place, each in enumerate(outlines):
+        if place not in cut or place in kept:
+            found.append(each)
             continue
-        parts = bodies(mask, NECK if neck is None else neck, min_radius)
-        if parts.max() > 1:
-            parted.append((box, parts))
-    areas = [np.count_nonzero(parts) for _, parts in parted]
-    many = [parts.max() >= MANY_PARTS for _, parts in parted]
-    if neck is None and 2 * np.dot(areas, many) > sum(areas):
-        return len(boxes), len(parted)
-    highest = len(boxes)
-    for box, parts in parted:
-        for part in range(2, parts.max() + 1):
-            highest += 1
-            labels[box][parts == part] = highest
-    return highest, 0
+        parts, sure = cut[place]
+        for part in range(1, parts.max() + 1):
+            for mask, box in pieces(parts == part, each.box):
+                found.append(attrs.evolve(each, box=box, mask=mask, parted=sure))
+    return found, len(kept)
+
+
+def confidence(parts, width):
+    """From 0 to 1, how sure it is that a region's parts are flocs that touch, and not arms of one.
+
+    (1 − width²) × the least solidity of the parts; width: the widest neck's share of the smaller
+    part's width.  Flocs that touch by chance are whole bodies with a thin neck; what a cut leaves
+    of an aggregate is as ragged as the whole.
+    """
+    from scipy.ndimage import find_objects
+    from skimage.morphology import convex_hull_image
+
+    least = 1.0
+    for number, box in enumerate(find_objects(parts), start=1):
+        mask = parts[box] == number
+        least = min(least, mask.sum() / convex_hull_image(mask).sum())
+    return float((1.0 - width * width) * least)
 
 
 def bodies(mask, neck, min_radius):
-    """The mask's pixels numbered by body, from 1; 0 outside."""
+    """The mask's pixels numbered by body, from 1, 0 outside; and the width of the widest neck that
+    is cut, as a share of the smaller body's."""
     from scipy.ndimage import distance_transform_edt
     from skimage.feature import peak_local_max
     from skimage.segmentation import watershed
@@ -214,7 +268,7 @@ def bodies(mask, neck, min_radius):
         exclude_border=False,
     )  # fmt: skip
     if len(peaks) < 2:
-        return mask.astype(int)
+        return mask.astype(int), 1.0
     markers = np.zeros(mask.shape, int)
     markers[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
     basins = watershed(-depth, markers, connectivity=2, mask=mask)
@@ -237,7 +291,8 @@ def passes(basins, depth):
 
 
 def joined(basins, depth, neck, min_radius):
-    """Basins renumbered from 1, those joined that no neck parts: the widest passes first."""
+    """Basins renumbered from 1, those joined that no neck parts, the widest passes first; and the
+    widest neck that is left, as a share of the smaller basin's depth."""
     count = basins.max() + 1
     deepest, least = passes(basins, depth), np.pi * min_radius**2
     peak = np.array([depth[basins == k].max(initial=0.0) for k in range(count)])
@@ -255,4 +310,6 @@ def joined(basins, depth, neck, min_radius):
         deepest[a] = deepest[:, a] = np.maximum(deepest[a], deepest[b])
         deepest[b], deepest[:, b], deepest[a, a] = 0.0, 0.0, 0.0
     numbers = np.unique(owner[1:], return_inverse=True)[1] + 1
-    return np.concatenate([[0], numbers])[basins]
+    left = np.unique(owner[1:])
+    share = deepest[np.ix_(left, left)] / np.minimum.outer(peak[left], peak[left])
+    return np.concatenate([[0], numbers])[basins], float(share.max())

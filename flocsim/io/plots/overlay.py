@@ -73,7 +73,10 @@ def draw_overlay(
             for ring in swept_rings(fit.parts):
                 axes.plot(*(ring * (1.0, -1.0) + (first_column - 1, first_row - 1)).T,
                           color=FLOC_COLOUR, linewidth=0.8)  # fmt: skip
-            labels.put(str(region.label), region.bbox, FLOC_COLOUR, 7)
+            sure = "" if region.parted != region.parted else f" parted, {region.parted:.2f}"
+            labels.put(f"{region.label}{sure}", region.bbox, FLOC_COLOUR, 7)
+            for mask in region.band or ():
+                draw_mask(axes, mask, region.bbox, FLOC_COLOUR, linewidths=0.3)
         reasons = [each.reason for each in rejected]
         for reason in dict.fromkeys(sorted(reasons)):
             colour = REASON_COLOURS.get(reason, OTHER_COLOUR)
@@ -110,10 +113,16 @@ def stretched(grey: np.ndarray) -> np.ndarray:
 
 def draw_outline(axes, region, colour):
     """The outline of a region's pixels, dashed."""
-    top, left, bottom, right = region.bbox
-    columns, rows = np.arange(left - 1, right + 1), np.arange(top - 1, bottom + 1)
-    axes.contour(columns, rows, region.mask.astype(float), levels=[0.5], colors=[colour],
-                 linewidths=0.7, linestyles=[DASHES])  # fmt: skip
+    draw_mask(axes, region.mask, region.bbox, colour, linewidths=0.7, linestyles=[DASHES])
+
+
+def draw_mask(axes, mask, bbox, colour, **style):
+    """The outline of a mask around a bbox, with the same margin on every side."""
+    top, left, bottom, right = bbox
+    margin = (mask.shape[0] - (bottom - top)) // 2
+    columns = np.arange(left - margin, right + margin)
+    rows = np.arange(top - margin, bottom + margin)
+    axes.contour(columns, rows, mask.astype(float), levels=[0.5], colors=[colour], **style)
 
 
 class Labels:

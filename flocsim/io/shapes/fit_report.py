@@ -28,13 +28,19 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
     if found.left_whole:
-        parts.append(f"{found.left_whole} taken for fractal aggregates and not parted (--neck)")
+        parts.append(f"{found.left_whole} with necks not parted (--neck)")
+    sure = [each.parted for each in found.regions if each.parted == each.parted]
+    if sure:
+        low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
+        how = low if low == high else f"{low} to {high}"
+        parts.append(f"{len(sure)} parted at necks, confidence {how} (--neck 0 joins them)")
     if found.annotated:
         parts.append("a scale bar or its writing left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
-    return f"{visible(name, keep='')}: {', '.join(parts)}; {about}"
+    alarms = "".join(f"; CHECK THE OVERLAY: {alarm}" for alarm in found.alarms)
+    return f"{visible(name, keep='')}: {', '.join(parts)}; {about}{alarms}"
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
@@ -81,7 +87,7 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
 
 COLUMNS = (
     "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
-    "blur_px",
+    "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted", "weight",
     "perimeter_px", "aspect_ratio", "circularity", "solidity", "feret_max_px", "feret_min_px",
 )  # fmt: skip
 
@@ -122,5 +128,9 @@ def _measures(found):
 def _facts(region, pixel_size):
     x, y = region.centroid
     radius = region.equivalent_radius
-    blur = "" if region.blur != region.blur else f"{region.blur:.2f}"
-    return f"{x:.2f}", f"{y:.2f}", region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}", blur
+    low, high = ("", "") if region.band is None else (f"{r:.3f}" for r in region.radius_band)
+    told = ("" if value != value else f"{value:.{digits}g}"
+            for value, digits in ((region.blur, 3), (region.level, 4)))  # fmt: skip
+    parted = "" if region.parted != region.parted else f"{region.parted:.2f}"
+    size = region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}"
+    return f"{x:.2f}", f"{y:.2f}", *size, *told, low, high, parted, f"{region.weight:.4g}"

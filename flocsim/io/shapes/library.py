@@ -27,6 +27,12 @@ for every N, so that between conditions nothing changes but N; where the flocs h
     /measures/perimeter     (n) [px] of the mask, as are feret_max and feret_min; aspect_ratio,
                             circularity and solidity [-]; NaN for a floc without
 
+and of flocs from pictures
+
+    /population/weight      (n) how many flocs each stands for, of which the filters kept it alone
+    /population/radius_low  (n) [px], r_eq as it would have been cut closer
+    /population/radius_high (n) [px], and wider
+
 Every dataset has the attributes
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
@@ -112,6 +118,16 @@ MEASURE_COLUMNS = declared(
 
 UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
 
+POPULATION_COLUMNS = declared(
+    {
+        "weight": ("f8", "1", "flocs that it stands for, of which the filters kept it alone"),
+        "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
+        "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
+    },
+    ("floc",),
+)
+"""What the picture leaves open; a library may lack them."""
+
 ATTRIBUTES = {
     "id": "floc_id", "part": "points.part", "ring": "points.ring",
     "point_radius": "points.radius",
@@ -153,12 +169,18 @@ class StoredFit:
         return table_of((Part((self.vertices,), self.radius),))
 
 
+def own_radius(entry):
+    return entry.equivalent_radius
+
+
 @attrs.frozen(eq=False)
 class ShapeEntry:
     """One floc: where it comes from, its size in the picture, and its fits {N: StoredFit}.
 
     floc_id: text such as "023.png#7"; pixel_size [m]; centroid (x, y) [px, y down]; area [px];
-    equivalent_radius and spheroradius [px]; measures [px] of its mask, None where nobody took them.
+    equivalent_radius and spheroradius [px]; measures [px] of its mask, None where nobody took them;
+    weight: that of Region; radius_low, radius_high: r_eq [px] at the ends of its band, its own
+    where nothing is known.
     """
 
     floc_id: str
@@ -170,6 +192,13 @@ class ShapeEntry:
     spheroradius: float
     fits: dict[int, StoredFit]
     measures: ShapeMeasures | None = None
+    weight: float = 1.0
+    radius_low: float = attrs.field(
+        kw_only=True, default=attrs.Factory(own_radius, takes_self=True)
+    )
+    radius_high: float = attrs.field(
+        kw_only=True, default=attrs.Factory(own_radius, takes_self=True)
+    )
 
     @property
     def measured_radius(self) -> float:
@@ -195,9 +224,11 @@ def make_entry(
     centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
     stored = {int(count): stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
     floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
+    low, high = region.radius_band
     return ShapeEntry(
         floc_id, image, float(pixel_size), region.centroid, region.area,
-        region.equivalent_radius, float(spheroradius), stored, measures,
+        region.equivalent_radius, float(spheroradius), stored, measures, weight=region.weight,
+        radius_low=low, radius_high=high,
     )  # fmt: skip
 
 
@@ -249,6 +280,8 @@ def write_library(
     if any(entry.measures for entry in entries):
         measured = [entry.measures or UNMEASURED for entry in entries]
         groups["measures"] = labelled(MEASURE_COLUMNS, measured)
+    if any(entry.radius_low < entry.radius_high or entry.weight != 1.0 for entry in entries):
+        groups["population"] = labelled(POPULATION_COLUMNS, entries)
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
     attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
     write_groups(path, attributes, groups, rule=rule)
@@ -321,7 +354,8 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
                 raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
-    lengths = hold_against(nodes, groups | {"measures": MEASURE_COLUMNS}, groups)
+    optional = {"measures": MEASURE_COLUMNS, "population": POPULATION_COLUMNS}
+    lengths = hold_against(nodes, groups | optional, groups)
     if lengths["floc"] < 1 or len(groups) < 3:
         raise ValueError("there are no flocs")
     for name, (kind, shape) in nodes[""].attributes.items():
@@ -345,6 +379,8 @@ def _entries(file):
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have one id")
     flocs["measures"] = _measures(file, len(flocs["floc_id"]))
+    if "population" in file:
+        flocs |= {name: column_values(file, name).tolist() for name in POPULATION_COLUMNS}
     fits = {int(count): _fits(int(count), group) for count, group in file["fits"].items()}
     entries = []
     for row in range(len(flocs["floc_id"])):
@@ -369,6 +405,14 @@ def _measures(file, count):
         raise ValueError("measures holds values that are no numbers of a floc's")
     rows = table.T.tolist()
     return [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]
+
+
+def column_values(file, name):
+    """What the group "population" holds of all flocs; ValueError for values that cannot be."""
+    values = file["population"][name][()]
+    if not np.all((values > 0.0) & (values <= MOST_PIXELS)):
+        raise ValueError(f"population/{name} holds values that are no numbers of a floc's")
+    return values
 
 
 def _fits(count, group):

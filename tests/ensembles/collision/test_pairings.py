@@ -1,5 +1,6 @@
 """Who meets whom: pairs drawn from the measured distribution, by size classes."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -128,3 +129,10 @@ def test_types_of_measured_sizes_span_the_flocs_that_are_drawn():
     assert pair.spans == ((4e-6, 9e-6), (9e-6, 12e-6))
     resized = TwoSizes("I", (4e-6, 9e-6), FlocPool([], 1e-6, 2))
     assert resized.fastest == resized.largest == (4e-6, 9e-6)
+
+
+def test_a_floc_counts_for_as_many_as_its_pictures_have_hidden():
+    flocs = [attrs.evolve(each, weight=k + 1.0) for k, each in enumerate(flocs_of(SIZES))]
+    (alone,) = size_classes(SettlingScene(pairs="measured"), flocs)
+    expected = [flocs[place].weight for place in alone.places]
+    assert np.allclose(alone.weights, np.array(expected) / sum(expected))

@@ -42,7 +42,7 @@ def test_what_was_left_out_is_outlined_and_named_inside_the_frame(tmp_path):
         box = text.get_window_extent()
         assert frame.x0 - 1 <= box.x0 and box.x1 <= frame.x1 + 1
         assert frame.y0 - 1 <= box.y0 and box.y1 <= frame.y1 + 1
-    assert len(picture.collections) == len(found.rejected)
+    assert len(picture.collections) == len(found.rejected) + 2  # and the two of its band
     assert texts["3 too small"].get_color() == REASON_COLOURS["too small"]
     key = [entry.get_text() for entry in figure.legends[0].get_texts()]
     assert key == ["1 fitted", "3 at the border", "1 too small"]

@@ -252,3 +252,20 @@ def test_rings_that_cannot_be_are_refused(tmp_path, change):
     changed(path, change)
     with pytest.raises(FileError, match="is not a complete shape library"):
         read_library(path)
+
+
+def test_weights_and_bands_are_kept_and_bad_ones_refused(tmp_path, entries):
+    assert all(e.radius_low <= e.equivalent_radius <= e.radius_high for e in entries)
+    entries = [
+        attrs.evolve(each, weight=1.5, radius_low=0.9 * each.equivalent_radius,
+                     radius_high=1.2 * each.equivalent_radius)
+        for each in entries
+    ]  # fmt: skip
+    write_library(tmp_path / "a.h5", entries)
+    for before, after in zip(entries, read_library(tmp_path / "a.h5"), strict=True):
+        assert (after.weight, after.radius_low, after.radius_high) == (
+            before.weight, before.radius_low, before.radius_high,
+        )  # fmt: skip
+    write_library(tmp_path / "b.h5", [attrs.evolve(each, weight=-1.0) for each in entries])
+    with pytest.raises(FileError, match="population/weight"):
+        read_library(tmp_path / "b.h5")

@@ -1,0 +1,139 @@
+"""Pictures whose flocs are known: layers under noise, blur that may select, bands, necks.
+
+    python -m benchmarks.accuracy.drawn_pictures [--quick] [--markdown] [--images ../shared/images]
+
+Layered: aggregates of overlapping discs, each of which takes a share of the light; IoU of the
+foreground, regions for bodies. Blurred: real silhouettes of 4 to 20 px under one blur: kept of
+put, mean r_eq kept over put, r_eq found over known, share of known sizes within the bands.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, label
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.speed.fit import IMAGES, silhouettes
+from flocsim.io.images.outlines import EIGHT, filled
+from flocsim.io.images.pictures import read_grey, segment
+
+SOOT = "soot_tem/201805A_A6_004_half"
+FRAME = (600, 800)
+BLURS = (0.0, 1.0, 1.5, 2.0, 2.5, 3.0)
+NOISES = (0.0, 0.02, 0.04, 0.06, 0.1)
+
+
+def aggregate(rng, discs, radius, spread):
+    """Centres (n, 2) of discs that overlap, each with one before it."""
+    places = [(0.0, 0.0)]
+    while len(places) < discs:
+        y, x = places[rng.integers(len(places))]
+        angle, away = rng.uniform(0.0, 2.0 * np.pi), 2.0 * radius * rng.uniform(0.55, spread)
+        places.append((y + away * np.cos(angle), x + away * np.sin(angle)))
+    found = np.array(places)
+    return found - 0.5 * (found.min(axis=0) + found.max(axis=0))
+
+
+def layered(seed, absorbed, noise, spread=0.9):
+    """(grey, true mask) of six aggregates under a vignette."""
+    rng = np.random.default_rng(seed)
+    row, column = np.mgrid[: FRAME[0], : FRAME[1]]
+    layers = np.zeros(FRAME)
+    for cell in range(6):
+        centre = np.array([(cell // 3 + 0.5) * FRAME[0] / 2, (cell % 3 + 0.5) * FRAME[1] / 3])
+        radius = rng.uniform(8.0, 16.0)
+        places = aggregate(rng, int(rng.integers(4, 25)), radius, spread)
+        inside = np.abs(places).max(axis=1) + radius < FRAME[1] / 6 - 12
+        for y, x in places[inside] + centre:
+            layers += np.hypot(row - y, column - x) < radius
+    down, across = np.mgrid[-1 : 1 : FRAME[0] * 1j, -1 : 1 : FRAME[1] * 1j]
+    light = 0.8 * (1.0 - 0.15 * (down**2 + across**2))
+    grey = light * gaussian_filter((1.0 - absorbed) ** layers, 1.0)
+    return np.clip(grey + noise * rng.standard_normal(FRAME), 0.0, 1.0), filled(layers > 0)
+
+
+def agreement(found, true):
+    return (found & true).sum() / (found | true).sum()
+
+
+def layered_table(seeds):
+    """IoU and counts by the share of light that a layer takes, and noise."""
+    columns = ("taken by a layer", "noise", "least IoU", "mean IoU", "bodies", "regions", "parted")
+    table = Table("Layered aggregates", columns)
+    for absorbed in (0.18, 0.35):
+        for noise in NOISES:
+            pairs = [layered(seed, absorbed, noise) for seed in seeds]
+            found = [segment(grey) for grey, _ in pairs]
+            shares = [agreement(f.foreground, t) for f, (_, t) in zip(found, pairs, strict=True)]
+            bodies = sum(label(true, EIGHT)[1] for _, true in pairs)
+            regions = [region for each in found for region in each.regions]
+            parted = sum(region.parted == region.parted for region in regions)
+            table.add(absorbed, noise, min(shares), np.mean(shares), bodies, len(regions), parted)
+    return table
+
+
+def blurred_frame(masks, blur, noise, vignette):
+    """(grey, labels) of masks in rows on a frame of 1000 × 1000."""
+    labels, x, y, lowest = np.zeros((1000, 1000), int), 40, 40, 0
+    for number, mask in enumerate(masks, start=1):
+        height, width = mask.shape
+        if x + width + 40 > 1000:
+            x, y, lowest = 40, y + lowest + 40, 0
+        if y + height + 40 > 1000:
+            break
+        labels[y : y + height, x : x + width][mask] = number
+        x, lowest = x + width + 40, max(lowest, height)
+    down, across = np.mgrid[-1:1:1000j, -1:1:1000j]
+    light = 0.8 * (1.0 - 0.5 * vignette * (down**2 + across**2))
+    grey = light * (1.0 - 0.6 * gaussian_filter((labels > 0).astype(float), blur))
+    grey += noise * np.random.default_rng(1).standard_normal(grey.shape)
+    return np.clip(grey, 0.0, 1.0), labels
+
+
+def blurred_table(masks):
+    """What is kept of flocs of all sizes under one blur, and how large it comes out."""
+    columns = ("blur px", "noise", "vignette", "put", "kept", "mean r_eq kept/put",
+               "r_eq found/known", "deviation", "within bands %")  # fmt: skip
+    table = Table("Silhouettes of 4 to 20 px under one blur", columns)
+    for blur in BLURS:
+        for noise, vignette in ((0.0, 0.0), (0.02, 0.6), (0.05, 0.6)):
+            grey, labels = blurred_frame(masks, blur, noise, vignette)
+            areas = np.bincount(labels.ravel())[1:]
+            put, kept = np.sqrt(areas / np.pi), []
+            for region in segment(grey).regions:
+                top, left, bottom, right = region.bbox
+                under = labels[top:bottom, left:right][region.mask[1:-1, 1:-1]]
+                if under.any():
+                    known = put[np.bincount(under[under > 0]).argmax() - 1]
+                    kept.append((known, region.equivalent_radius, *region.radius_band))
+            known, found, low, high = np.array(kept).T
+            ratio = found / known
+            within = 100 * np.mean((low <= known) & (known <= high))
+            table.add(blur, noise, vignette, len(put), len(known), known.mean() / put.mean(),
+                      ratio.mean(), ratio.std(), within)  # fmt: skip
+    return table
+
+
+def soot_table(images):
+    """A real aggregate of many layers against a human's mask."""
+    table = Table("Soot against a human's mask", ("noise scale", "IoU", "regions"))
+    grey, human = read_grey(images / f"{SOOT}.png"), read_grey(images / f"{SOOT}_mask.png") > 0.5
+    for scale in (1, 2, 3, 4):
+        found = segment(grey, noise_scale=scale)
+        table.add(scale, agreement(found.foreground, human), len(found.regions))
+    return table
+
+
+def main():
+    """Print the tables."""
+    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    print_heading(["scikit-image"])
+    images = Path(arguments.images)
+    soot_table(images).print(arguments.markdown)
+    layered_table(range(2 if arguments.quick else 8)).print(arguments.markdown)
+    masks = [mask for mask, _ in silhouettes(images) if max(mask.shape) < 72][:80]
+    blurred_table(masks).print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,336 @@
+"""Where flocs end: for each its own level, chosen among all at which it could be cut.
+
+Above the noise a picture falls apart into islands.  In each, the level is where the outline is as
+steep as it gets, counted from outside: a layer over another one, however dark, lies within the rim
+of the first.  An island that is out of focus at its own level is looked into, level by level, as a
+component tree is walked from its root: what is sharp in there is a floc before or behind a halo.
+"""
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from flocsim.io.images.focus import Focus, rim
+
+EIGHT = np.ones((3, 3), int)
+"""Diagonal pixels belong together."""
+
+SHARP = 3.5
+"""An edge this soft [px] leaves even sizes of 4 px right within 2 % in the mean: none is left out
+for it, or small ones would be missing where large ones are kept."""
+
+TOO_SHARP = 0.75
+"""Share of the blur that all of a picture has: nothing but noise is sharper."""
+
+CORE = 2.0
+"""The same for what lies within a soft region: softer ones are the cores of its halo."""
+
+AROUND = 4
+"""Pixels around one of several parts of an island that tell its own level."""
+
+CUT_OFF = 0.1
+"""Share of an outline that may lie where its zone ends."""
+
+LARGE = 0.15
+"""Share of an island that has to stand above the level of its outline: specks tell nothing."""
+
+FLOOR = 3.0
+"""Times the noise above which there are islands."""
+
+QUIET = 0.02
+"""Noise beside which thin layers of a contrast of .15 can still be followed."""
+
+MOST_BLUR = 2.5
+"""More blur than this [px] against noise would take small flocs with it."""
+
+LEAST = 0.01
+"""Contrast below which nothing is looked for: about two levels of 8 bits."""
+
+RATIO = 1.12
+"""Between two levels that are looked at, above the base."""
+
+STEEP = 0.8
+"""Share of the greatest steepness from which an outline is at its edge.  A step blurred by a
+Gaussian is that steep from .25 to .75 of its height: the middle of these levels is its half."""
+
+SPAN = 3.0
+"""The ratio of these two levels: what is steep beyond is another layer."""
+
+DEEPER = 1.2
+"""Ratio of levels at which a soft island is looked into."""
+
+BAND = 0.3
+"""Levels by so much lower and higher, above the base, would have been taken by another hand."""
+
+PIXEL = 0.25
+"""How far [px] a level leaves an outline undecided, at least."""
+
+SMALLEST = 0.25
+"""Share of the least area below which a piece is no region, not even one that is left out."""
+
+FAINT = 0.25
+"""Share of the typical contrast below which a region is not of what the picture shows."""
+
+Box = tuple[slice, slice]
+
+
+@attrs.frozen(eq=False)
+class Outline:
+    """A region as it is cut: box in the picture, mask (bool array of the box, holes as they are),
+    level [contrast], base: the contrast around it, softness [px], contrast: the mean inside less
+    the base, parted: that of Region."""
+
+    box: Box
+    mask: np.ndarray
+    level: float
+    base: float
+    softness: float
+    contrast: float
+    parted: float = float("nan")
+
+    @property
+    def excess(self) -> float:
+        """What it adds to the contrast around it, summed over its pixels."""
+        return float(self.contrast * self.mask.sum())
+
+
+def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
+    """The 8-connected parts of a mask, each with its box in the picture."""
+    from scipy.ndimage import find_objects, label
+
+    parts = label(mask, EIGHT)[0]
+    for number, inner in enumerate(find_objects(parts), start=1):
+        place = [slice(out.start + s.start, out.start + s.stop)
+                 for out, s in zip(box, inner, strict=True)]  # fmt: skip
+        yield parts[inner] == number, (place[0], place[1])
+
+
+def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
+    """A mask in a box that is wider by some pixels, as far as the picture goes."""
+    room = [(min(by, s.start), min(by, n - s.stop)) for s, n in zip(box, shape, strict=True)]
+    wide = [slice(s.start - a, s.stop + b) for s, (a, b) in zip(box, room, strict=True)]
+    return np.pad(mask, room), (wide[0], wide[1])
+
+
+def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
+    """Standard deviation of the background, and its mean square slope [1/px²].
+
+    fine: the deviation that white noise would leave; grain, which is coarser, is told by what goes
+    with a little more blur.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    from flocsim.io.images.background import noise_deviation
+
+    grain = noise_deviation(contrast - gaussian_filter(contrast, scale + 2.0))
+    noise = max(fine, grain)
+    if min(contrast.shape) < 2:
+        return noise, 0.0
+    down, across = np.gradient(contrast)
+    square = (down * down + across * across)[np.abs(contrast) < FLOOR * noise]
+    # The square of two normal numbers of deviation s has the median 2 ln 2 s².
+    return noise, float(np.median(square) / np.log(2.0)) if square.size else 0.0
+
+
+def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndarray, float]:
+    """The contrast with so much more blur that the noise is QUIET, and the blur that it has then.
+
+    A blur of s more leaves scale/√(scale² + s²) of the noise.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    there = max(scale, 1.0)
+    more = min(there * float(np.sqrt(max((noise / QUIET) ** 2 - 1.0, 0.0))), MOST_BLUR)
+    if more == 0.0:
+        return contrast, scale
+    return gaussian_filter(contrast, more, mode="nearest"), float(np.hypot(there, more))
+
+
+class Search:
+    """The outlines of a contrast (h, w).
+
+    noise, slope: of `background_noise`; scale: blur that is there already [px]; min_radius [px];
+    max_blur: share of r_eq up to which an outline is in focus; saturated: share of an island's
+    pixels whose contrast is too high to count.
+    """
+
+    def __init__(self, contrast, noise, slope, scale, min_radius, max_blur, saturated=0.0):
+        self.contrast, self.slope, self.scale = contrast, slope, scale
+        self.noise, self.floor = noise, max(FLOOR * noise, LEAST)
+        self.area, self.max_blur, self.saturated = np.pi * min_radius**2, max_blur, saturated
+
+    def outlines(self) -> list[Outline]:
+        """All regions, in focus or not, that are not fainter than a share of the typical one."""
+        from scipy.ndimage import find_objects, label
+
+        labels = label(self.contrast > self.floor, EIGHT)[0]
+        large = np.bincount(labels.ravel()) >= max(SMALLEST * self.area, 1.0)
+        found: list[Outline] = []
+        for number, box in enumerate(find_objects(labels), start=1):
+            if large[number]:
+                found += self.island(labels[box] == number, box)
+        return without_faint(found, self.in_focus)
+
+    def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
+        """Whether an outline is no softer than its size, or `sharp` [px], allows."""
+        radius = np.sqrt(outline.mask.sum() / np.pi)
+        return outline.softness <= max(sharp, self.max_blur * radius)
+
+    def island(self, mask, box):
+        """The outlines in a region of the floor."""
+        mask, box = widened(mask, box, 12, self.contrast.shape)
+        near = self.contrast[box]
+        if near[mask].max() < 2.0 * self.floor:
+            return []
+        focus = Focus(near, self.slope, self.scale)
+        here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
+        offset = box[0].start, box[1].start
+        return [
+            attrs.evolve(each, box=tuple(
+                slice(s.start + o, s.stop + o) for s, o in zip(each.box, offset, strict=True)
+            ))
+            for each in self.walk(focus, mask, here, 0.0)
+        ]  # fmt: skip
+
+    def walk(self, focus, mask, box, base):
+        """The outlines in a component that stands above a base, boxes in the island."""
+        mask, box = widened(mask, box, 2, focus.contrast.shape)
+        level = max(self.level(focus, mask, box, base), self.floor)
+        parts = self.cut(focus, mask, box, level)
+        found = []
+        if len(parts) > 1:  # each has a level of its own
+            parts = [
+                each
+                for part in parts
+                for each in self.cut_alone(focus, mask, box, base, part, parts)
+            ]
+        for part, place, level in parts:
+            whole, wide = widened(filled(part), place, 1, focus.contrast.shape)
+            softness = focus.softness(whole, wide)
+            if softness < TOO_SHARP * self.scale:
+                continue
+            mean = float(focus.contrast[place][part].mean()) - base
+            outline = Outline(place, part, level, base, softness, mean)
+            inside = [] if self.in_focus(outline) else self.inside(focus, outline)
+            found += inside or [outline]
+        return found
+
+    def cut(self, focus, mask, box, level):
+        """[(part, its box, level)] of what of a mask stands above a level."""
+        least = max(SMALLEST * self.area, 1.0)
+        return [
+            (part, place, level)
+            for part, place in pieces(mask & (focus.contrast[box] > level), box)
+            if part.sum() >= least
+        ]
+
+    def cut_alone(self, focus, mask, box, base, part, parts):
+        """One of several parts of a mask as it is cut at a level of its own."""
+        zone, place = widened(part[0], part[1], AROUND, focus.contrast.shape)
+        from scipy.ndimage import binary_dilation
+
+        zone = binary_dilation(zone, EIGHT, AROUND)
+        for other, where, _ in parts:
+            if where is not part[1]:
+                here, there = overlap(place, where)
+                zone[here] &= ~other[there]
+        here, there = overlap(place, box)
+        own = np.zeros_like(zone)
+        own[here] = mask[there]
+        beyond = binary_dilation(own & ~zone, EIGHT)
+        zone &= own
+        level = max(self.level(focus, zone, place, base), self.floor)
+        alone = self.cut(focus, zone, place, level)
+        for each, where, _ in alone:
+            here, there = overlap(where, place)
+            edge = rim(each)
+            if (edge[here] & beyond[there]).sum() > CUT_OFF * edge.sum():
+                return [part]  # its zone would be its outline
+        return alone or [part]
+
+    def inside(self, focus, outline):
+        """What is sharp within a region that is not."""
+        near = focus.contrast[outline.box]
+        level = max(DEEPER * outline.level, outline.level + self.noise)
+        found = []
+        for part, place in pieces(outline.mask & (near > level), outline.box):
+            if part.sum() >= self.area:
+                found += [each for each in self.walk(focus, part, place, level)
+                          if self.in_focus(each, CORE)]  # fmt: skip
+        return found
+
+    def level(self, focus, mask, box, base):
+        """The level in the middle of the lowest ones at which the outline is steep."""
+        from scipy.ndimage import binary_dilation
+
+        near = binary_dilation(mask, iterations=2)
+        values = focus.contrast[box][near] - base
+        top = float(np.quantile(values, 1.0 - self.saturated)) if self.saturated else values.max()
+        least = max(1e-3, 0.01 * top)
+        if top <= least:
+            return base
+        edges = np.geomspace(least, top, int(np.log(top / least) / np.log(RATIO)) + 2)
+        place, size = np.searchsorted(edges, values), len(edges) + 1
+        pixels = np.bincount(place, minlength=size)[1:-1]
+        squares = np.bincount(place, focus.slope(0.0)[box][near] ** 2, minlength=size)[1:-1]
+        few = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
+        count = np.maximum(smoothed(pixels, few), 1.0)
+        steep = np.sqrt(np.maximum(smoothed(squares, few) / count - focus.noise, 0.0))
+        above = np.cumsum(pixels[::-1])[::-1]
+        greatest = steep[above >= LARGE * mask.sum()].max(initial=0.0)
+        if greatest <= 0.0:
+            return base
+        at_edge = steep >= STEEP * greatest
+        first = int(np.argmax(at_edge))
+        behind = np.flatnonzero(~at_edge[first:])
+        last = first + int(behind[0]) - 1 if behind.size else len(steep) - 1
+        middles = np.sqrt(edges[1:] * edges[:-1])
+        return base + 0.5 * float(middles[first] + min(middles[last], SPAN * middles[first]))
+
+
+def overlap(box, other):
+    """The places, in each of two boxes, of what they share."""
+    shared = [(max(a.start, b.start), min(a.stop, b.stop)) for a, b in zip(box, other, strict=True)]
+    return tuple(
+        tuple(slice(start - s.start, max(stop, start) - s.start)
+              for (start, stop), s in zip(shared, within, strict=True))
+        for within in (box, other)
+    )  # fmt: skip
+
+
+def smoothed(values, weights):
+    """Weighted sums over neighbours, of the length of `values`."""
+    reach = len(weights) // 2
+    return np.convolve(values, weights)[reach : reach + len(values)]
+
+
+def without_faint(found, in_focus):
+    """The outlines of no less than FAINT of the typical contrast: its median, weighted by what each
+    takes from the light, over those that are in focus, or all."""
+    told = [each for each in found if in_focus(each)] or found
+    if not told:
+        return []
+    order = sorted(told, key=lambda each: each.contrast)
+    sums = np.cumsum([each.excess for each in order])
+    typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
+    return [each for each in found if each.contrast >= FAINT * typical]
+
+
+def filled(foreground: np.ndarray) -> np.ndarray:
+    """The foreground with its holes filled: background that no way leads to from the border."""
+    from scipy.ndimage import label
+
+    outside = label(np.pad(~foreground, 1, constant_values=True))[0]
+    return (outside != outside[0, 0])[1:-1, 1:-1]
+
+
+def outlines_at(contrast: np.ndarray, threshold: float, focus: Focus) -> list[Outline]:
+    """The Outlines of all that stands above one level; focus: of the whole contrast."""
+    here = slice(0, contrast.shape[0]), slice(0, contrast.shape[1])
+    found = []
+    for mask, box in pieces(contrast > threshold, here):
+        softness = focus.softness(*widened(filled(mask), box, 1, contrast.shape))
+        mean = float(contrast[box][mask].mean())
+        found.append(Outline(box, mask, threshold, 0.0, softness, mean))
+    return found
