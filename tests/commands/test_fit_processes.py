@@ -29,7 +29,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "frames").mkdir()
     for number, name in enumerate("abc"):
-        grey = np.full((60, 60), 200, np.uint8)
+        grey = np.full((120, 120), 200, np.uint8)
         grey[20 : 40 + number, 15:45] = 40
         Image.fromarray(grey).save(tmp_path / f"frames/{name}.png")
     return tmp_path
