@@ -13,6 +13,7 @@ from flocsim.errors import RangeError, UsageError
 from flocsim.fields import flag, in_unit, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.surfaces.pieces import pieces_of_bodies
 from flocsim.laws import LAWS
 
 NO_LAWS = (None,) * len(LAWS)
@@ -20,6 +21,9 @@ NO_LAWS = (None,) * len(LAWS)
 
 NO_SMOOTHING = (1.0, 0.0, 0.0)
 """``Scene.smoothing`` of a scene without surface forces."""
+
+NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
+"""``Scene.outlines`` of a scene without forces between outlines."""
 
 NO_BOX = (math.inf, math.inf)
 """``Scene.box`` where nothing repeats."""
@@ -162,6 +166,7 @@ def scene_of(
     laws: Any = NO_LAWS,
     surface_reach: float = -1.0,
     centre_reach: float = -1.0,
+    outlines: tuple[float, float, float, float] = NO_OUTLINES,
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
     box: tuple[float, float] = NO_BOX,
@@ -186,10 +191,12 @@ def scene_of(
     return Scene(
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
         **outlines_of(shapes)._asdict(),
+        **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),
         centre_reach=float(centre_reach),
+        outlines=outlines,
         smoothing=smoothing,
         events=int(events),
         box=box,
