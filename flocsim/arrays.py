@@ -406,7 +406,9 @@ class Scene(NamedTuple):
     first: np.ndarray  # (n + 1,): where a body's core points begin
     vertices: np.ndarray  # (points, 2 or more): geometry.contact.circle_tree.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
-    pieces: Annotated[np.ndarray, ("pieces", PIECE_COLUMNS)]  # see PLACE_X; none if nothing reads it
+    pieces: Annotated[
+        np.ndarray, ("pieces", PIECE_COLUMNS)
+    ]  # see PLACE_X; none if nothing reads it
     first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws

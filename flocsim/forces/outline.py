@@ -1,12 +1,31 @@
 """What forces between outlines make of a scene beside their law: how far to look, and how deep."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from flocsim.body import NO_OUTLINES, Fluid
 from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import UsageError
-from flocsim.forces.base import PairForce
+from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import fields_read, reach_of, sample_points
+
+
+def act_along_outlines(forces: Iterable[Force]) -> bool:
+    """Whether any of some forces acts all along two outlines."""
+    return any(
+        isinstance(force, PairForce) and force.acts_on == "outlines" and not force.absent
+        for force in forces
+    )
+
+
+def refuse_outlines(forces: Iterable[Force], what: str) -> None:
+    """UsageError where a force acts all along two outlines, of ``what`` cannot have such."""
+    for force in forces:
+        if act_along_outlines([force]):
+            raise UsageError(
+                f"{type(force).__name__} acts along outlines, and {what} has forces between "
+                'spheres or nearest points alone: give gap = "surface" in the place of '
+                'law = "outline"'
+            )
 
 
 def outlines_of_forces(

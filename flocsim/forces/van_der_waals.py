@@ -36,13 +36,11 @@ def cut_at(cut: float | None, reach: float) -> float:
 
 
 LAW_HELP = (
-    "spheres: between the equivalent spheres, along the gap of `gap`; outline: between the outlines "
-    "as they are, all along them"
+    "spheres: as strong as between the equivalent spheres, over the gap of `gap`; outline: the sum "
+    "over both bodies as they are (pairs that settle)"
 )
 
-DEPTH_HELP = (
-    'of the bodies along the third direction, of law = "outline"; "sphere" = 4/3 r_eq of the smaller'
-)
+DEPTH_HELP = 'thickness of the bodies of law = "outline"; "sphere" = 4/3 r_eq of the smaller one'
 
 
 @attrs.frozen

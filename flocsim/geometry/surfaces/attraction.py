@@ -7,7 +7,8 @@ n being outward, p = n·(x − y) and s along a segment. (H/8π) S is the energy
 and −4/(3 h³) the sum over a plane at the distance h.
 
 Of an arc of radius R, x being p outside of its circle and q = R + p from its centre, ρ² = p² + u²
-with u = 2 √(R q) sin(φ/2), φ from the direction of x on. In v = u/ρ what is singular is a polynomial,
+with u = 2 √(R q) sin(φ/2), φ from the direction of x on. In v = u/ρ what is singular is a
+polynomial,
 
     p⁻⁴ ∫ (1 − v²) (−p + u²/(2R)) √(R/q) (1 − u²/(4 R q))^{−1/2} dv,
 

@@ -37,8 +37,10 @@ class Placed(NamedTuple):
 def piece_at(pieces, row):
     """A piece in the frame of its own body."""
     return Placed(
-        pieces[row, at.PLACE_X], pieces[row, at.PLACE_Y], pieces[row, at.WAY_X], pieces[row, at.WAY_Y],
-        pieces[row, at.SIZE], pieces[row, at.BEND], pieces[row, at.MIDDLE_X], pieces[row, at.MIDDLE_Y],
+        pieces[row, at.PLACE_X], pieces[row, at.PLACE_Y],
+        pieces[row, at.WAY_X], pieces[row, at.WAY_Y],
+        pieces[row, at.SIZE], pieces[row, at.BEND],
+        pieces[row, at.MIDDLE_X], pieces[row, at.MIDDLE_Y],
         pieces[row, at.EXTENT], pieces[row, at.INWARD],
     )  # fmt: skip
 

@@ -1,24 +1,15 @@
 """Where to look at one outline for what another does to it: nodes along its pieces.
 
 What the other does peaks where it is near, at feet, and falls off over a length of its own from
-there. So a piece is cut between its feet, and on each side of one a place s from it is
-s = a z/(1 − z²), a being where the gap has grown by as much as it is: even in z the peak is as wide
-as what lies beside it.
+there. So a piece is cut between its feet; on each side of one Gauss's rule takes what lies nearer
+than the length a over which the gap grows by twice itself, and once more what lies beyond it, by
+the logarithm of the way.
 """
 
 import math
 
 from flocsim.geometry.surfaces.distances import between_cores
 
-TWELVE = (
-    (0.009219682876640378, 0.02358766819325591), (0.047941371814762573, 0.05346966299765922),
-    (0.11504866290284766, 0.08003916427167311), (0.20634102285669126, 0.10158371336153296),
-    (0.31608425050090994, 0.11674626826917740), (0.43738329574426555, 0.12457352290670139),
-    (0.5626167042557344, 0.12457352290670139), (0.6839157494990901, 0.11674626826917740),
-    (0.7936589771433087, 0.10158371336153296), (0.8849513371852323, 0.08003916427167311),
-    (0.9520586281852374, 0.05346966299765922), (0.9907803171233596, 0.02358766819325591),
-)  # fmt: skip
-"""Gauss's rule of twelve nodes on [0, 1]."""
 
 def ends_of(piece):
     """The parameters at both ends of a piece: metres along a segment, tan(φ/2) along an arc."""
@@ -36,32 +27,25 @@ def at_parameter(piece, parameter):
     return piece.x + piece.bend * nx, piece.y + piece.bend * ny, nx, ny, 2.0 * piece.bend / grown
 
 
+def parameter_beside(piece, x, y):
+    """The parameter at which the normal of a piece, or of the line or circle that it is part of,
+    leads to a point."""
+    dx, dy = x - piece.x, y - piece.y
+    ahead = dx * piece.way_x + dy * piece.way_y
+    if piece.bend == 0.0:
+        return ahead
+    aside = dy * piece.way_x - dx * piece.way_y
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance + ahead <= 1e-9 * distance:
+        return math.inf if aside >= 0.0 else -math.inf
+    return aside / (distance + ahead)
+
+
 def foot_of(piece, other):
     """(parameter, gap): where a piece is nearest to another, and how far [m]; the parameter may lie
     beyond its ends."""
     squared, x, y, x_2, y_2 = between_cores(piece, other)
-    distance = math.sqrt(squared)
-    gap = distance - piece.inward - other.inward
+    gap = math.sqrt(squared) - piece.inward - other.inward
     if piece.bend == 0.0:
         return (x - piece.x) * piece.way_x + (y - piece.y) * piece.way_y, gap
-    dx, dy = x_2 - piece.x, y_2 - piece.y
-    ahead = dx * piece.way_x + dy * piece.way_y
-    aside = dy * piece.way_x - dx * piece.way_y
-    below = distance + ahead
-    if below <= 1e-9 * distance:
-        return math.copysign(math.inf, aside), gap
-    return aside / below, gap
-
-
-def stretched(z, scale):
-    """s = a z/(1 − z²) and ds/dz [m]."""
-    left = 1.0 - z * z
-    return scale * z / left, scale * (1.0 + z * z) / (left * left)
-
-
-def stretch_of(length, scale):
-    """The z at which s comes to a length."""
-    share = length / scale
-    if share < 1e-6:
-        return share
-    return (math.sqrt(1.0 + 4.0 * share * share) - 1.0) / (2.0 * share)
+    return parameter_beside(piece, x_2, y_2), gap

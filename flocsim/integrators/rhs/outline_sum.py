@@ -11,7 +11,7 @@ import flocsim.arrays as at
 from flocsim.arrays import MOST_FEET, OutlineView
 from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.separation import length_of, separation
-from flocsim.geometry.surfaces.attraction import piece_at_point
+from flocsim.geometry.surfaces.attraction import EIGHT, piece_at_point
 from flocsim.geometry.surfaces.distances import (
     Pose,
     apart_at_least,
@@ -20,14 +20,7 @@ from flocsim.geometry.surfaces.distances import (
     piece_at,
     placed,
 )
-from flocsim.geometry.surfaces.nodes import (
-    TWELVE,
-    at_parameter,
-    ends_of,
-    foot_of,
-    stretch_of,
-    stretched,
-)
+from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.laws import outline_pressure
 
@@ -157,22 +150,36 @@ def scale_from(scene, work, piece, foot, end, inset, lens):
 
 def add_side(scene, work, total, piece, foot, end, numbers):
     """(fx, fy, torque about the origin) of a piece from a foot to an end, added to a total."""
-    fx, fy, torque = total
-    inset, lens, view = numbers
+    inset, lens, _ = numbers
     reach, scale = scale_from(scene, work, piece, foot, end, inset, lens)
     if reach == 0.0:
         return total
-    furthest = stretch_of(abs(reach), abs(scale))
-    for node, weight in TWELVE:
-        s, growth = stretched(furthest * node, scale)
-        x, y, nx, ny, metres = at_parameter(piece, foot + s)
-        gap, attraction = look_from(scene, work, x, y, inset, lens)
-        if gap < lens:
-            pressure = outline_pressure(scene, seen_at(view, gap, attraction, lens))
-            size = -pressure * weight * furthest * abs(growth) * metres
-            fx, fy = fx + size * nx, fy + size * ny
-            torque += size * (x * ny - y * nx)
-    return fx, fy, torque
+    near = abs(scale) < abs(reach)
+    for node, weight in EIGHT:
+        share = 0.5 * (1.0 + node)
+        part = 0.5 * abs(scale) * weight
+        total = add_node(scene, work, total, piece, foot + share * scale, part, numbers)
+    if not near:
+        return total
+    log = math.log(reach / scale)
+    for node, weight in EIGHT:
+        way = scale * math.exp(0.5 * log * (1.0 + node))
+        total = add_node(
+            scene, work, total, piece, foot + way, 0.5 * log * abs(way) * weight, numbers
+        )
+    return total
+
+
+def add_node(scene, work, total, piece, parameter, weight, numbers):
+    """What acts on a piece at a parameter, over so much of it, added to a total."""
+    inset, lens, view = numbers
+    x, y, nx, ny, metres = at_parameter(piece, parameter)
+    gap, attraction = look_from(scene, work, x, y, inset, lens)
+    if not gap < lens:
+        return total
+    fx, fy, torque = total
+    size = -outline_pressure(scene, seen_at(view, gap, attraction, lens)) * weight * metres
+    return fx + size * nx, fy + size * ny, torque + size * (x * ny - y * nx)
 
 
 def seen_at(view, gap, attraction, lens):
@@ -189,11 +196,20 @@ def seen_at(view, gap, attraction, lens):
     )  # fmt: skip
 
 
+def radii_of(scene, a, b):
+    """The equivalent radii of two bodies [m]."""
+    return scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS]
+
+
 def depth_of(scene, a, b):
     """The depth along which two bodies act on each other [m]."""
     if scene.outlines[2] > 0.0:
         return scene.outlines[2]
-    return 4.0 / 3.0 * min(scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS])
+    return (
+        4.0
+        / 3.0
+        * min(scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS])
+    )
 
 
 @apart
@@ -210,7 +226,10 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     lens = max(LENS * math.sqrt((least + inset) * floor), steady)
     list_near(scene, work, a, b, pose, lens)
     depth = depth_of(scene, a, b)
-    radius_a, radius_b = scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS]
+    radius_a, radius_b = (
+        scene.bodies[a, at.EQUIVALENT_RADIUS],
+        scene.bodies[b, at.EQUIVALENT_RADIUS],
+    )
     view = OutlineView(
         time, least, least, depth, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
