@@ -65,6 +65,35 @@ def read_by(read: Reader, allowed: str, *, default: Any = attrs.NOTHING, **metad
     return attrs.field(default=default, validator=check, metadata=metadata)
 
 
+def number_or_table(unit: str, kind: type, allowed: str) -> Reader:
+    """A reader of a number above 0 in a unit, or of a table of all the fields of an attrs class."""
+    fields = attrs.fields_dict(kind)
+    of_number = number(unit, *number_range(above=0.0))
+
+    def read(value):
+        if isinstance(value, kind):
+            return value
+        if not isinstance(value, dict):
+            return of_number(value)
+        findings, values = [], {}
+        for key, each in value.items():
+            if key not in fields:
+                text = f"is no key{suggestion(key, fields)}; known: {list_words(fields)}"
+                findings.append(("." + key, text))
+                continue
+            try:
+                values[key] = reader_of(fields[key])(each)
+            except Misfit as error:
+                findings += [("." + key + place, text) for place, text in error.findings]
+        if findings:
+            raise Misfit(*findings)
+        if lacking := [key for key in fields if key not in values]:
+            raise misfit(allowed, value, f" without {list_words(lacking)}")
+        return kind(**values)
+
+    return read
+
+
 def whole_field(at_least: int, at_most: int, **more: Any) -> Any:
     allowed = f"an integer from {at_least} to {at_most}"
     return read_by(whole(at_least, at_most), allowed, **more)
