@@ -12,7 +12,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.problems import Misfit, misfit, suggestion
+from flocsim.ensembles.config.problems import Misfit, dotted, misfit, suggestion
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
 from flocsim.fields.quantities import kind_of, read_quantity
@@ -79,7 +79,7 @@ def number_or_table(unit: str, kind: type, allowed: str) -> Reader:
         for key, each in value.items():
             if key not in fields:
                 text = f"is no key{suggestion(key, fields)}; known: {list_words(fields)}"
-                findings.append(("." + key, text))
+                findings.append(("." + dotted([key]), text))
                 continue
             try:
                 values[key] = reader_of(fields[key])(each)

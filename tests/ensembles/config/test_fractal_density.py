@@ -54,6 +54,7 @@ def test_settling_speeds_grow_as_d_to_the_power_of_n_minus_one(tmp_path, dimensi
         ('{law = "fractal", primary = "4 s", dimension = 2.1, solid = 2650}', "primary"),
         ('{law = "fractal", primry = "4 um", dimension = 2.1, solid = 2650}', "primry"),
         ('{law = "fractal", primary = "4 um", dimension = 2.1, solid = 900}', "does not sink"),
+        ('{"\\u0001\\u009f" = 1}', "is no key"),
         ('"heavy"', "must be"),
         ("-5.0", "must be"),
     ],
@@ -65,3 +66,4 @@ def test_a_wrong_density_is_told_in_one_line(tmp_path, table, words):
     [line] = str(caught.value).splitlines()
     assert words in line
     assert "density" in line
+    assert line.isprintable()
