@@ -127,7 +127,7 @@ def slab(length):
     ("wavelength", "share"), [(None, 1.0), ("100 nm", (1 + 1.5 * 0.266) / 1.266**2)]
 )
 def test_a_face_of_five_micrometres(wavelength, share):
-    """H/(6πd³) for each square metre, and 4,244 times what (5) gives of equal spheres."""
+    """H/(6πd³) for each square metre, over what retardation divides by."""
     gap, length = 5e-9, 2.5e-6
     plate = slab(length)
     y = 0.2 * length + 2e-7 + gap
