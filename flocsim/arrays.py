@@ -191,6 +191,21 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     GRAZES,  # borne by a share of it (flocsim.integrators.rhs.grazing)
 ) = range(3)
 
+# Columns of ``Scene.pieces``: segments and arcs of an outline, in the frame of its body.
+(
+    PLACE_X,  # of a segment its middle, of an arc the centre of its circle [m]
+    PLACE_Y,
+    WAY_X,  # of a segment its unit tangent, the body on its left; of an arc the outward …
+    WAY_Y,  # … direction of its middle
+    SIZE,  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
+    BEND,  # the radius of an arc [m], 0 of a segment
+    MIDDLE_X,  # the centre of a circle that holds the piece [m]
+    MIDDLE_Y,
+    EXTENT,  # and its radius [m]
+    INWARD,  # how far behind the piece the core lies that it is the offset of [m]
+    PIECE_COLUMNS,
+) = range(11)
+
 # Columns of ``Work.pairs``: two bodies that may come near each other.
 (
     LATER,  # the body of the larger number
@@ -350,6 +365,24 @@ class PairView(NamedTuple):
     effective_mass: float
 
 
+class OutlineView(NamedTuple):
+    """A point of one outline beside another, as an OutlineForce kernel sees it.
+
+    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it; ``plate_gap``
+    that of two plates which van der Waals forces pull at as strongly there; ``depth`` [m] that of
+    the bodies along the third direction; radii are equivalent radii of both.
+    """
+
+    time: float
+    gap: float
+    plate_gap: float
+    depth: float
+    radius_i: float
+    radius_j: float
+    reduced_radius: float
+    effective_mass: float
+
+
 class ContactView(NamedTuple):
     """One contact point, as a ContactForce kernel sees it.
 
@@ -373,10 +406,15 @@ class Scene(NamedTuple):
     first: np.ndarray  # (n + 1,): where a body's core points begin
     vertices: np.ndarray  # (points, 2 or more): geometry.contact.circle_tree.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
+    pieces: Annotated[
+        np.ndarray, ("pieces", PIECE_COLUMNS)
+    ]  # see PLACE_X; none if nothing reads it
+    first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws
     surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
     centre_reach: float  # the same of centre forces [m]
+    outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
     smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
     events: int  # how many the contact forces have
     box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
@@ -417,6 +455,8 @@ class Work(NamedTuple):
     candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]  # see VERTEX_BODY
     geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]  # see NORMAL_X
     kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
+    near: np.ndarray  # rows of pieces of two bodies: rhs.outline_sum
+    feet: np.ndarray  # scratch of the same
     pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
     discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
@@ -428,6 +468,9 @@ class Work(NamedTuple):
 ALL_PAIRS = 12
 """Of so many bodies at most, all pairs that count are watched; of more, those that may come
 near."""
+
+MOST_FEET = 16
+"""Feet on one piece at most (rhs.outline_sum); more are left out, with nodes further apart."""
 
 DENSE = 6
 """Of so many bodies at most, the linear systems are dense."""
@@ -506,6 +549,8 @@ def work_of(
         candidates=np.zeros((capacity, CANDIDATE_COLUMNS), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
+        near=np.zeros(2 * len(scene.pieces) + 2, dtype=np.int64),
+        feet=np.zeros(MOST_FEET),
         pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
         budget=np.full(pairs, -1.0),
         discs=np.zeros((n, 8)),

@@ -10,9 +10,10 @@ import numpy as np
 from flocsim.arrays import Scene
 from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import RangeError, UsageError
-from flocsim.fields import flag, in_unit, quantity, word_or_quantity
+from flocsim.fields import choice, flag, in_unit, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.surfaces.pieces import pieces_of_bodies
 from flocsim.laws import LAWS
 
 NO_LAWS = (None,) * len(LAWS)
@@ -20,6 +21,9 @@ NO_LAWS = (None,) * len(LAWS)
 
 NO_SMOOTHING = (1.0, 0.0, 0.0)
 """``Scene.smoothing`` of a scene without surface forces."""
+
+NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
+"""``Scene.outlines`` of a scene without forces between outlines."""
 
 NO_BOX = (math.inf, math.inf)
 """``Scene.box`` where nothing repeats."""
@@ -86,6 +90,26 @@ class Fluid:
     def flow(self) -> tuple[float, ...]:
         """Velocity and gradient as the parameters (u_x, u_y, g_xx, g_xy, g_yx, g_yy)."""
         return (*self.velocity, *self.gradient)
+
+
+@attrs.frozen
+class FractalDensity:
+    """ρ(D) = ρ_w + (ρ_p − ρ_w)(D_p/D)^(3 − n_f) of a floc of the diameter D = 2 r_eq.
+
+    Parameters: ``primary``, the diameter D_p of the primary particles [m]; ``dimension`` n_f;
+    ``solid``, their density ρ_p [kg/m³]. A floc below D_p is solid. Source: Kranenburg (1994),
+    Estuarine, Coastal and Shelf Science 39, 451.
+    """
+
+    law: str = choice("fractal")
+    primary: float = quantity("m", above=0.0)
+    dimension: float = quantity("", above=1.0, at_most=3.0)
+    solid: float = quantity("kg/m^3", above=0.0)
+
+    def at(self, radius: float, water: float) -> float:
+        """ρ [kg/m³] of a floc of an equivalent radius [m] in water of a density [kg/m³]."""
+        thinned = min(0.5 * self.primary / radius, 1.0) ** (3.0 - self.dimension)
+        return water + (self.solid - water) * thinned
 
 
 def check_shape(instance: object, attribute: attrs.Attribute, value: Any) -> None:
@@ -162,6 +186,7 @@ def scene_of(
     laws: Any = NO_LAWS,
     surface_reach: float = -1.0,
     centre_reach: float = -1.0,
+    outlines: tuple[float, float, float, float] = NO_OUTLINES,
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
     box: tuple[float, float] = NO_BOX,
@@ -186,10 +211,12 @@ def scene_of(
     return Scene(
         bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
         **outlines_of(shapes)._asdict(),
+        **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),
         centre_reach=float(centre_reach),
+        outlines=outlines,
         smoothing=smoothing,
         events=int(events),
         box=box,

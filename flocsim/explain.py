@@ -112,6 +112,8 @@ def about(system, force, implicit):
     else:
         centres = force.acts_on == "centres"
         place = "along the line of centres" if centres else "between the outlines"
+        if force.acts_on == "outlines":
+            place = "all along the outlines"
         parts = [f"{place}, {reach_words(system, force)}"]
         derivative = pair_derivative(system, force)
     parts += force.remarks(system.fluid)
@@ -134,6 +136,8 @@ def body_derivative(system, force):
 
 
 def pair_derivative(system, force):
+    if force.acts_on == "outlines":
+        return "derivatives from differences of its sum"
     samples = sample_pairs(force.reach)
     damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
@@ -237,7 +241,7 @@ def exerts_torque(system, force):
     if not counting(system.bodies):
         return False
     if isinstance(force, PairForce):
-        return force.acts_on == "surfaces" and not system.spheres_only
+        return force.acts_on != "centres" and not system.spheres_only
     sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)
     return not system.spheres_only or any(result[1] != 0.0 for result in sideways)
 

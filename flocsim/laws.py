@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.arrays import BodyView, ContactView, OutlineView, PairView
 from flocsim.compiler.composer import compile_law
 from flocsim.compiler.constants import Intrinsic
 from flocsim.hooks import hook
@@ -24,6 +24,7 @@ LAWS = (
     "body_force", "velocity_derivatives", "position_derivatives",
     "centre_force", "centre_derivatives", "surface_force", "surface_derivatives",
     "contact_force", "contact_derivatives", "slip_limit", "contact_event",
+    "outline_pressure",
 )  # fmt: skip
 """Names of the laws, in the order of ``scene.laws``."""
 
@@ -31,6 +32,7 @@ LAWS = (
     BODY_FORCE, VELOCITY_DERIVATIVES, POSITION_DERIVATIVES,
     CENTRE_FORCE, CENTRE_DERIVATIVES, SURFACE_FORCE, SURFACE_DERIVATIVES,
     CONTACT_FORCE, CONTACT_DERIVATIVES, SLIP_LIMIT, CONTACT_EVENT,
+    OUTLINE_PRESSURE,
 ) = range(len(LAWS))  # fmt: skip
 
 
@@ -110,10 +112,16 @@ def contact_event(scene, view, which):
     return scene.laws[CONTACT_EVENT](view, scene.parameters, which)
 
 
-VIEWS = (BodyView,) * 3 + (PairView,) * 4 + (ContactView,) * 4
+@hook
+def outline_pressure(scene, view):
+    """What pushes the outlines of two bodies apart at the point of an OutlineView [Pa]."""
+    return scene.laws[OUTLINE_PRESSURE](view, scene.parameters)
+
+
+VIEWS = (BodyView,) * 3 + (PairView,) * 4 + (ContactView,) * 4 + (OutlineView,)
 """What each law is given, beside the parameters."""
 
-NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1
+NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1
 """How many numbers each law returns."""
 
 

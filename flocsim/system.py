@@ -154,7 +154,8 @@ class System:
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
             laws=self.laws(jit=jit),
-            surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach, 
+            surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
+            outlines=pieces.outlines,
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),

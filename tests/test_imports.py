@@ -44,7 +44,7 @@ INNER_ROWS = {
         ["constants", "numba_internals"],
         ["by_pointer", "disk_cache", "object_code", "processor", "reads", "waiting"],
     ],
-    "geometry": [["fit"], ["contact"], ["shapes"]],
+    "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],
     "swarms": [
         ["swarm"],
         ["trajectory"],

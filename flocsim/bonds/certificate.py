@@ -24,8 +24,9 @@ from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, spee
 from flocsim.compiler.composer import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
+from flocsim.integrators.rhs.outline_sum import outlines_apart
 from flocsim.integrators.rhs.views import effective_mass, pair_view
-from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, OUTLINE_PRESSURE, centre_force, has, surface_force
 
 SAFETY = 3.0
 """Factor by which attraction must outweigh the load."""
@@ -41,7 +42,7 @@ FINER = 0.125
 """A step about the highest place of the way out, over one of the whole way."""
 
 
-def attraction_at(scene, time, bond, way):
+def attraction_at(scene, work, time, bond, way):
     """(between centres, between outlines) [N] at rest, both gaps wider by a way [m]."""
     centres, surfaces = 0.0, 0.0
     distance, gap = bond.distance + way, bond.surface_gap + way
@@ -51,18 +52,20 @@ def attraction_at(scene, time, bond, way):
         centres = -centre_force(scene, view)
     if scene.surface_reach > gap:
         surfaces = -surface_force(scene, pair_view(scene, time, bond.j, bond.i, gap, 0.0, distance))
+    if has(scene, OUTLINE_PRESSURE):
+        surfaces -= outlines_apart(scene, work, time, bond.j, bond.i, way)
     return centres, surfaces
 
 
 @apart
-def most_between(scene, time, bond, start, end, near, share):
+def most_between(scene, work, time, bond, start, end, near, share):
     """What the attraction comes to at most over the ways from ``start`` to ``end`` [N], as capacity
     has it, and the way at which all of it is most [m]; ``share``: steps over the gap there."""
     sizes, best = radii_of(scene, bond), start
     all_of_it, follows, pries = 0.0, 0.0, 0.0
     way = start
     while way < end:
-        centres, surfaces = attraction_at(scene, time, bond, way)
+        centres, surfaces = attraction_at(scene, work, time, bond, way)
         if centres + surfaces > all_of_it:
             all_of_it, best = centres + surfaces, way
         follows = max(follows, surfaces + min(centres, 0.0))
@@ -74,29 +77,35 @@ def most_between(scene, time, bond, start, end, near, share):
             left = min(left, abs(bond.distance + way - sizes))
         if scene.surface_reach > 0.0:
             left = min(left, abs(bond.surface_gap + way))
+        if bond.gap + way < scene.outlines[0]:
+            left = min(left, max(bond.gap + way, scene.outlines[1]))
         way += max(share * left, LEAST_RUNG)
     return all_of_it, follows, pries, best
 
 
 @apart
-def lets_out(scene, time, bond, pull, needed):
+def lets_out(scene, work, time, bond, pull, needed):
     """Whether less than an energy [J] leads out of the attraction, a pull [N] helping."""
-    return can_climb(scene, time, bond.j, bond.i, bond.distance, bond.surface_gap, pull, needed)
+    known = scene, work, time, bond.j, bond.i
+    return can_climb(*known, bond.distance, bond.surface_gap, pull, needed)
 
 
-def capacity(scene, time, bond, near):
+def capacity(scene, work, time, bond, near):
     """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
     a repulsion of centres; that of centres alone, over a way ``near`` [m])."""
-    if not has(scene, CENTRE_FORCE) and not scene.surface_reach > bond.surface_gap:
+    between = scene.surface_reach > bond.surface_gap or scene.outlines[0] > bond.gap
+    if not has(scene, CENTRE_FORCE) and not between:
         return 0.0, 0.0, 0.0
     sizes = radii_of(scene, bond)
     end = 2.0 * sizes + max(-bond.surface_gap, sizes - bond.distance, 0.0)
-    most, follows, pries, best = most_between(scene, time, bond, 0.0, end, near, RUNG)
+    most, follows, pries, best = most_between(scene, work, time, bond, 0.0, end, near, RUNG)
     # Once more about the highest place, which may be a cusp.
     around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
+    if scene.outlines[0] > 0.0:
+        around = min(around, RUNG * max(bond.gap + best, scene.outlines[1]))
     if has(scene, CENTRE_FORCE):
         around = min(around, RUNG * abs(bond.distance + best - sizes))
-    known = scene, time, bond, max(best - around, 0.0), best + around, near, FINER * RUNG
+    known = scene, work, time, bond, max(best - around, 0.0), best + around, near, FINER * RUNG
     finer, follows_finer, pries_finer, _ = most_between(*known)
     return max(most, finer), max(follows, follows_finer), max(pries, pries_finer)
 
@@ -130,7 +139,7 @@ def is_held(scene, work, time, bond, load):
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)
     near = LEANING * bond.distance / (ratio * ratio)
-    all_of_it, follows, pries = capacity(scene, time, bond, near)
+    all_of_it, follows, pries = capacity(scene, work, time, bond, near)
     if not all_of_it > needed:
         return False
     pried = shear < CALM * load.drift and pries > needed * ratio
@@ -138,21 +147,21 @@ def is_held(scene, work, time, bond, load):
         return False
     # In a well, which they might still be leaving.
     moving = 0.5 * mass * along * along
-    return bond.gap < 0.0 or not lets_out(scene, time, bond, load.force, moving)
+    return bond.gap < 0.0 or not lets_out(scene, work, time, bond, load.force, moving)
 
 
 def is_trapped(scene, work, time, bond, load):
     """Whether the two have too little energy to leave each other's attraction between centres, in
     which they lie, against the load: its work out of it is more than SAFETY times their energy."""
     inside = has(scene, CENTRE_FORCE) and bond.distance < radii_of(scene, bond)
-    if not inside or scene.surface_reach > 0.0 or load.alone == 0.0:
+    if not inside or max(scene.surface_reach, scene.outlines[0]) > 0.0 or load.alone == 0.0:
         return False
     pull = SAFETY * load.force
-    centres, _ = attraction_at(scene, time, bond, 0.0)
+    centres, _ = attraction_at(scene, work, time, bond, 0.0)
     if not centres > pull:
         return False
     needed = SAFETY * energy_of(scene, work, bond)
-    return not lets_out(scene, time, bond, pull, needed)
+    return not lets_out(scene, work, time, bond, pull, needed)
 
 
 def is_certain(scene, work, time, bond, load):
@@ -164,8 +173,8 @@ def is_certain_in_kicks(scene, work, time, bond, load):
     """Whether neither a later load nor kicks can open the bond."""
     pull = SAFETY * load.force
     if pull > 0.0 and not are_spheres(scene, bond):
-        _, follows, _ = capacity(scene, time, bond, 0.0)
+        _, follows, _ = capacity(scene, work, time, bond, 0.0)
         if not follows > pull:
             pull *= leverage(work, bond, load.lever)
     needed = BARRIER * load.kicks + energy_of(scene, work, bond)
-    return not lets_out(scene, time, bond, pull, needed)
+    return not lets_out(scene, work, time, bond, pull, needed)

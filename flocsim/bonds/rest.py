@@ -52,20 +52,20 @@ def has_shown(scene, bond, load, rested):
     return bond.gap < 0.0 and hangs and rested >= 1.0
 
 
-def outlasts_kicks(scene, time, bond, load):
+def outlasts_kicks(scene, work, time, bond, load):
     """Whether kicks let the bond rest."""
     barrier = BARRIER * load.kicks
     if not are_spheres(scene, bond):
         radii = scene.bodies[bond.i, at.RADIUS], scene.bodies[bond.j, at.RADIUS]
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
-    return load.force > 0.0 and not lets_out(scene, time, bond, load.force, barrier)
+    return load.force > 0.0 and not lets_out(scene, work, time, bond, load.force, barrier)
 
 
 def kind_at_rest(scene, work, time, bond, load, rested):
     """HOOK or REST of a bond whose pose has been kept for so many rest times, or NO_BOND."""
     if not has_shown(scene, bond, load, rested):
         return NO_BOND
-    if load.kicks > 0.0 and not outlasts_kicks(scene, time, bond, load):
+    if load.kicks > 0.0 and not outlasts_kicks(scene, work, time, bond, load):
         return NO_BOND
-    borne, _, _ = capacity(scene, time, bond, 0.0)
+    borne, _, _ = capacity(scene, work, time, bond, 0.0)
     return HOOK if borne <= load.force and is_hooked(scene, work, bond, load) else REST

@@ -20,6 +20,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import laws_of
+from flocsim.forces.outline import refuse_outlines
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -49,6 +50,7 @@ def repulsion(
     forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid
 ) -> Callable[[np.ndarray], np.ndarray]:
     """A function of gaps (k,) [m] that gives the force between two spheres at rest [N]."""
+    refuse_outlines(forces, "a meeting of two spheres")
     pieces = laws_of(forces, fluid)
     laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
     r_i, r_j = radii

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.arrays import ContactView, PairView, work_of
+from flocsim.arrays import ContactView, OutlineView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
@@ -135,7 +135,13 @@ def check_numbers(system: System) -> None:
         for overlap in CLOSE_OVERLAPS for rate in (-1e-4, 1e-4)
     ]  # fmt: skip
     bodies = [body_view(scene, work, 0.0, at.NOW, body) for body in range(2)]
-    views = {"body": bodies, "centre": pairs, "surface": pairs, "contact": contacts}
+    points = [
+        OutlineView(0.0, gap, max(gap, 1e-10), radii[0], *radii, reduced, mass)
+        for gap in CLOSE_GAPS
+    ]
+    views = {
+        "body": bodies, "centre": pairs, "surface": pairs, "contact": contacts, "outline": points,
+    }  # fmt: skip
     for name, force in system.pieces.used.items():
         pieces = laws_of([force], system.fluid)
         if words := wrong_answer(force, pieces, views, system.fluid):

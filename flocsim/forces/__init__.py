@@ -1,6 +1,14 @@
-"""The forces between bodies and fluid; subclass one of the four kinds to add your own."""
+"""The forces between bodies and fluid; subclass one of the five kinds to add your own."""
 
-from flocsim.forces.base import BodyForce, CentreForce, ContactForce, Force, PairForce, SurfaceForce
+from flocsim.forces.base import (
+    BodyForce,
+    CentreForce,
+    ContactForce,
+    Force,
+    OutlineForce,
+    PairForce,
+    SurfaceForce,
+)
 from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.drag import StokesDrag
@@ -18,6 +26,7 @@ __all__ = [
     "Force",
     "Gravity",
     "Lubrication",
+    "OutlineForce",
     "PairForce",
     "StokesDrag",
     "SurfaceForce",

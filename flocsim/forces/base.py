@@ -15,6 +15,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Fluid
+from flocsim.fields import word_or_quantity
 
 
 @attrs.frozen
@@ -59,7 +60,8 @@ class PairForce(Force):
     @property
     @abstractmethod
     def acts_on(self) -> str:
-        """ "centres" (along the line of centres) or "surfaces" (between the outlines)."""
+        """ "centres" (along the line of centres), "surfaces" (at the nearest points of the
+        outlines) or "outlines" (all along them)."""
 
     @property
     def reach(self) -> float:
@@ -85,6 +87,23 @@ class SurfaceForce(PairForce):
     def acts_on(self) -> str:
         """Always the surfaces: with torque."""
         return "surfaces"
+
+
+@attrs.frozen
+class OutlineForce(PairForce):
+    """A PairForce all along the two outlines: ``kernel(point, …) → pressure`` [Pa].
+
+    ``point`` is an OutlineView, and the pressure that of two plates which are ``point.gap`` apart,
+    above 0 where it pushes them apart. It is summed over the outline of the smaller body, times the
+    ``depth`` of the bodies along the third direction [m] ("sphere": 4/3 r_eq of the smaller).
+    """
+
+    depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere", kw_only=True)
+
+    @property
+    def acts_on(self) -> str:
+        """Always the outlines."""
+        return "outlines"
 
 
 @attrs.frozen

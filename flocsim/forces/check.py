@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.arrays import BodyView, ContactView, OutlineView, PairView
 from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import globals_read, tell
 from flocsim.compiler.reads import names_in, refuse_closure, where
@@ -74,6 +74,14 @@ def sample_pairs(reach: float) -> tuple[PairView, ...]:
         PairView(1e-3, gap, rate, gap + 3e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
         for gap in gaps for rate in (-1e-4, 1e-4)
     )  # fmt: skip
+
+
+def sample_points(force: PairForce) -> tuple[OutlineView, ...]:
+    """OutlineViews with gaps of either sign, within the reach of a force between outlines [m]."""
+    gaps = [min(gap, 0.5 * reach_of(force)) for gap in SAMPLE_GAPS]
+    return tuple(
+        OutlineView(1e-3, gap, max(gap, 1e-10), 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10) for gap in gaps
+    )
 
 
 def refusal(force, function, finding):
@@ -282,6 +290,9 @@ def reach_of(force: PairForce) -> float:
 
 
 def check_pair_force(force, fluid):
+    if force.acts_on == "outlines":
+        check_results(force, fluid, force.kernel_in(fluid), sample_points(force), "pressure [Pa]")
+        return
     samples = sample_pairs(reach_of(force))
     check_results(force, fluid, force.kernel, samples, "repulsion [N]")
     if force.slope is not None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 import attrs
 
 from flocsim.arrays import PairView
-from flocsim.body import Fluid
+from flocsim.body import NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
 from flocsim.forces.check import (
@@ -30,11 +30,13 @@ from flocsim.forces.differences import (
     contact_change,
     pressed_contact,
 )
+from flocsim.forces.outline import outlines_of_forces
 from flocsim.forces.smoothing import smoothness
 from flocsim.laws import LAWS
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
+PLACES_OF_PAIRS = {"centres": "centre", "surfaces": "surface", "outlines": "outline"}
 CHANGES = body_change, changed_body, contact_change, changed_contact, pressed_contact
 
 ROOM = 64
@@ -46,7 +48,8 @@ another kind leave the text of a law as it is."""
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
-    gap of outlines is smoothed (smoothing.py), how many events its contact forces have, and which
+    gap of outlines is smoothed (smoothing.py), how far those all along them look (outline.py), how
+    many events its contact forces have, and which
     forces are used and left out, {name: force} and {name: why}, each by a name of its own
     (base.names_of)."""
 
@@ -55,6 +58,7 @@ class Pieces:
     surface_reach: float = -1.0
     centre_reach: float = -1.0
     smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
+    outlines: tuple[float, float, float, float] = NO_OUTLINES
     events: int = 0
     used: dict[str, Force] = attrs.Factory(dict)
     left_out: dict[str, str] = attrs.Factory(dict)
@@ -192,6 +196,16 @@ def write_pair_laws(source, forces, kind):
         ]
 
 
+def write_outline_law(source, forces):
+    """The pressure between two outlines at a point of one."""
+    terms = []
+    for force in forces:
+        call = source.call(force, force.kernel_in(source.fluid), "point")
+        terms.append((f"point.gap < {source.value(reach_of(force))}", call))
+    if terms:
+        source.functions.append(sum_function("outline_pressure", "point", terms, 1))
+
+
 def write_contact_laws(source, forces):
     """Contact forces, the limit of their tangential displacement, and their events; how many."""
     terms, limits, events = [], [], []
@@ -230,7 +244,7 @@ def sort_forces(pieces, forces, fluid):
 
     UsageError for what is no force, KernelError for a force whose kernel cannot be used.
     """
-    kinds = {"body": [], "centre": [], "surface": [], "contact": []}
+    kinds = {"body": [], "centre": [], "surface": [], "contact": [], "outline": []}
     forces = list(forces)
     for name, force in zip(names_of(forces), forces, strict=True):
         if not isinstance(force, Force):
@@ -245,10 +259,11 @@ def sort_forces(pieces, forces, fluid):
         elif isinstance(force, ContactForce):
             kinds["contact"].append(force)
         elif isinstance(force, PairForce):
-            kinds["centre" if force.acts_on == "centres" else "surface"].append(force)
+            kinds[PLACES_OF_PAIRS[force.acts_on]].append(force)
         else:
             raise UsageError(
-                f"{name} must subclass BodyForce, CentreForce, SurfaceForce or ContactForce"
+                f"{name} must subclass BodyForce, CentreForce, SurfaceForce, OutlineForce or "
+                "ContactForce"
             )
     return kinds
 
@@ -275,6 +290,8 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
         pieces.smoothness = smoothness(kinds["surface"], fluid)
+    write_outline_law(sources["outline"], kinds["outline"])
+    pieces.outlines = outlines_of_forces(kinds["outline"], fluid)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

@@ -13,6 +13,7 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
+from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.thermal import kicks_of
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.geometry.contact.separation import PERIODIC
@@ -90,6 +91,7 @@ class Swarm:
         object.__setattr__(self, "system", system)
         if all(body.fixed for body in self.bodies):
             raise UsageError("a Swarm needs at least one body that moves")
+        refuse_outlines(self.forces, "a swarm")
         self.check_reach()
         self.check_box()
         if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:

@@ -136,6 +136,7 @@ class Replay:
             parameters=np.array(pieces.parameters, dtype=float),
             surface_reach=float(pieces.surface_reach),
             centre_reach=float(pieces.centre_reach), events=int(pieces.events),
+            outlines=pieces.outlines,
         )  # fmt: skip
 
     @functools.cached_property

@@ -330,7 +330,11 @@ def make_encounter(
     the two together.
     """
     bodies = [
-        Body(shape, fixed=(config.scene.receiver == "fixed" and place == 0), **config.body_options)
+        Body(
+            shape,
+            fixed=(config.scene.receiver == "fixed" and place == 0),
+            **config.body_options(shape),
+        )
         for place, shape in enumerate(shapes)
     ]
     method = integrator or config.integrator.method

@@ -25,6 +25,7 @@ from flocsim.fields import (
     quantity,
     word_or_quantity,
 )
+from flocsim.forces.outline import act_along_outlines
 from flocsim.forces.thermal import thermal_in
 
 LARGEST_LENGTH = 0.01
@@ -129,6 +130,17 @@ def uneven_points(parts: Mapping[str, Any], scrambles: int, of_what: str) -> Ite
         yield ("stop", "half_width"), text + "give more replicates and --resume instead"
 
 
+def outline_problems(parts: Mapping[str, Any], *, settles: bool) -> Iterator[Problem]:
+    """What does not go with forces along outlines; ``settles``: whether the scene is one of two
+    bodies that settle."""
+    if not act_along_outlines(parts["forces"]):
+        return
+    if not settles:
+        yield ("forces",), 'law = "outline" is for pairs that settle: give gap = "surface" instead'
+    elif thermal_in(parts["forces"]):
+        yield ("forces", "thermal"), 'does not go with law = "outline" yet: leave one of them out'
+
+
 @attrs.frozen
 class PairScene:
     """Of what sizes two bodies meet, and what all ways to meet have in common.
@@ -193,6 +205,9 @@ class PairScene:
 
     flow_in_fluid = ""
     """Why [fluid] may have no flow of its own; "" where it may."""
+
+    takes_outlines = False
+    """Whether forces may act all along the outlines."""
 
     def __attrs_post_init__(self):
         if not self.is_measured:
@@ -272,6 +287,7 @@ class PairScene:
 
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         """What does not go together with the other tables of a config, by their names."""
+        yield from outline_problems(parts, settles=self.takes_outlines)
         for name in ("velocity", "gradient") if self.flow_in_fluid else ():
             if any(getattr(parts["fluid"], name)):
                 yield ("fluid", name), f"{self.flow_in_fluid}: leave it out"
@@ -342,6 +358,8 @@ class SettlingScene(DrivenScene):
     receiver: str = choice(
         "free", "fixed", default="free", help="whether the receiving body i settles or is held"
     )
+
+    takes_outlines = True
 
 
 @attrs.frozen

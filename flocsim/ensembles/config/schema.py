@@ -18,7 +18,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.body import Fluid
+from flocsim.body import Fluid, FractalDensity
 from flocsim.ensembles.config.kernel_scene import KERNEL_REPLICATES, KernelScene
 from flocsim.ensembles.config.own_classes import (
     INTEGRATOR,
@@ -43,6 +43,7 @@ from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.config.values import (
     list_of,
+    number_or_table,
     one_of,
     read_by,
     read_text,
@@ -241,6 +242,11 @@ class ShapesConfig:
         return self.source or full_name(self.own)
 
 
+FRACTAL = (
+    'a density above 0, or {law = "fractal", primary = "4 um", dimension = 2.1, solid = 2650.0}'
+)
+
+
 @attrs.frozen
 class BodiesConfig:
     """[bodies]: what the flocs weigh; either ``surface_density``, or ``density`` and ``depth``."""
@@ -248,8 +254,15 @@ class BodiesConfig:
     surface_density: float | None = quantity(
         "kg/m^2", above=0.0, default=None, help="ρ_s: mass m = ρ_s A, A the floc's area"
     )
-    density: float | None = quantity(
-        "kg/m^3", above=0.0, default=None, help="ρ of the solid: ρ_s = ρ · depth"
+    density: float | FractalDensity | None = attrs.field(
+        default=None,
+        metadata={
+            "read": number_or_table("kg/m^3", FractalDensity, FRACTAL),
+            "unit": "kg/m^3",
+            "allowed": FRACTAL,
+            "help": "ρ: ρ_s = ρ · depth; of flocs that are the looser the larger they are ρ = "
+            "ρ_f + (solid − ρ_f)(primary/D)^(3 − dimension), D = 2 r_eq, ρ_f of the fluid",
+        },
     )
     depth: float | str = word_or_quantity(
         "sphere",
@@ -448,12 +461,14 @@ class Config:
         """Whether the scene is a KernelScene, and the study one of rates of encounters."""
         return bool(self.scene.kind == "kernel")
 
-    @property
-    def body_options(self) -> dict[str, Any]:
-        """The bodies' weight as keyword arguments of flocsim.body.Body."""
-        if self.bodies.density is None:
+    def body_options(self, shape: Shape) -> dict[str, Any]:
+        """The weight of a body of a shape as keyword arguments of flocsim.body.Body."""
+        density = self.bodies.density
+        if density is None:
             return {"surface_density": self.bodies.surface_density}
-        return {"density": self.bodies.density, "depth": self.bodies.depth}
+        if isinstance(density, FractalDensity):
+            density = density.at(shape.equivalent_radius, self.fluid.density)
+        return {"density": density, "depth": self.bodies.depth}
 
 
 def keys_of(some_class: type) -> dict[str, attrs.Attribute]:
@@ -567,6 +582,10 @@ def weight_contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[Proble
     if bodies.density is None:
         text = "true needs bodies.density, but bodies.surface_density is given: give density and "
         yield ("fluid", "buoyancy"), text + "depth instead, or buoyancy = false"
-    elif bodies.density <= fluid.density:
-        text = f"{bodies.density:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
-        yield ("bodies", "density"), text + "give a larger density, or fluid.buoyancy = false"
+        return
+    fractal = isinstance(bodies.density, FractalDensity)
+    solid = bodies.density.solid if isinstance(bodies.density, FractalDensity) else bodies.density
+    if solid <= fluid.density:
+        text = f"{solid:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
+        place = ("bodies", "density", "solid") if fractal else ("bodies", "density")
+        yield place, text + "give a larger density, or fluid.buoyancy = false"

@@ -6,7 +6,12 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.pair_scene import LARGEST_LENGTH, Problem, size_limit
+from flocsim.ensembles.config.pair_scene import (
+    LARGEST_LENGTH,
+    Problem,
+    outline_problems,
+    size_limit,
+)
 from flocsim.ensembles.config.values import list_of, number, read_by, vector, whole_field
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, flag, number_range, quantity, word_or_quantity
@@ -184,6 +189,7 @@ class SwarmScene:
 
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         """What does not go together with the other tables of a config, by their names."""
+        yield from outline_problems(parts, settles=False)
         shapes = parts["shapes"]
         if len(shapes.vertices) > 1:
             found = f"found {list(shapes.vertices)}: give one"

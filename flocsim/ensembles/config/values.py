@@ -12,7 +12,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.problems import Misfit, misfit, suggestion
+from flocsim.ensembles.config.problems import Misfit, dotted, misfit, suggestion
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
 from flocsim.fields.quantities import kind_of, read_quantity
@@ -63,6 +63,35 @@ def read_by(read: Reader, allowed: str, *, default: Any = attrs.NOTHING, **metad
 
     metadata = {"read": read, "allowed": allowed, **metadata}
     return attrs.field(default=default, validator=check, metadata=metadata)
+
+
+def number_or_table(unit: str, kind: type, allowed: str) -> Reader:
+    """A reader of a number above 0 in a unit, or of a table of all the fields of an attrs class."""
+    fields = attrs.fields_dict(kind)
+    of_number = number(unit, *number_range(above=0.0))
+
+    def read(value):
+        if isinstance(value, kind):
+            return value
+        if not isinstance(value, dict):
+            return of_number(value)
+        findings, values = [], {}
+        for key, each in value.items():
+            if key not in fields:
+                text = f"is no key{suggestion(key, fields)}; known: {list_words(fields)}"
+                findings.append(("." + dotted([key]), text))
+                continue
+            try:
+                values[key] = reader_of(fields[key])(each)
+            except Misfit as error:
+                findings += [("." + key + place, text) for place, text in error.findings]
+        if findings:
+            raise Misfit(*findings)
+        if lacking := [key for key in fields if key not in values]:
+            raise misfit(allowed, value, f" without {list_words(lacking)}")
+        return kind(**values)
+
+    return read
 
 
 def whole_field(at_least: int, at_most: int, **more: Any) -> Any:

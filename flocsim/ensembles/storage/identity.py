@@ -40,7 +40,8 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
     "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler", "bonds",
-    "forces", "integrators", "geometry/shapes", "geometry/contact", "io/results/schema.py",
+    "forces", "integrators", "geometry/shapes", "geometry/contact",
+    "geometry/surfaces", "io/results/schema.py",
     "io/results/events.py",
     "ensembles/collision", "ensembles/study.py", "ensembles/kernels",
 )  # fmt: skip
@@ -141,6 +142,7 @@ def type_facts(study):
             pieces.surface_reach,
             *pieces.smoothness,
             pieces.events,
+            *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
         ]
         facts[f"numbers.{name}"] = digest(np.array(numbers, float))
         # A force of the user's own may compute what the zone follows from.

@@ -16,6 +16,7 @@ from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.gravity import Gravity
+from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.thermal import Thermal
 from flocsim.geometry.shapes.parts import core_gap
 from flocsim.integrators.base import Integrator, Status
@@ -72,6 +73,7 @@ class Opening:
 
 def strongest(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
     """The largest attraction of two spheres at any gap [N]."""
+    refuse_outlines(forces, "the strength of a bond")
     pieces, (r_i, r_j) = laws_of(forces, fluid), radii
     reduced = r_i * r_j / (r_i + r_j)
     gaps = [0.0, *np.geomspace(1e-2 * MINIMUM_GAP, 10.0 * (r_i + r_j), 400).tolist()]

@@ -24,6 +24,7 @@ from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
+from flocsim.forces.outline import refuse_outlines
 from flocsim.io.journal.records import Record
 from flocsim.io.provenance import now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
@@ -125,6 +126,7 @@ class StrengthStudy(StudyKind):
     noun: ClassVar[str] = "doublets"
 
     def __attrs_post_init__(self):
+        refuse_outlines(self.config.forces, "the strength of a bond")
         shape = self.shape[:3]
         self.bonds = {
             (int(np.ravel_multi_index(each[:3], shape)), each.replicate): each.bond

@@ -263,7 +263,7 @@ class SwarmStudy(StudyKind):
         """
         drawn, (width, height), places = self.placed(replicate)
         bodies = [
-            Body(shape, (x, y), angle, **self.config.body_options)
+            Body(shape, (x, y), angle, **self.config.body_options(shape))
             for shape, (x, y, angle) in zip(drawn.shapes, places.tolist(), strict=True)
         ]
         forces, fluid = self.config.forces, self.config.fluid

@@ -279,8 +279,9 @@ def trims_of(bends, lengths, radius):
     return cut, np.roll(cut, -1)
 
 
-def chord_nodes(parts, found):
-    """Points, tangents and weights of the exposed parts of the sides' offsets."""
+def exposed_chords(parts, found):
+    """The exposed parts of the sides' offsets: where the offset of each begins (k, 2), its unit
+    tangent (k, 2), from where to where along it, and the radii (k,)."""
     units, lengths = found.side_units, found.side_lengths
     outward = np.column_stack([units[:, 1], -units[:, 0]])
     origins = found.side_starts + found.side_radius[:, None] * outward
@@ -293,14 +294,21 @@ def chord_nodes(parts, found):
     middle = origins[rows] + (0.5 * (low + high))[:, None] * units[rows]
     seen = exposed(middle, outward[rows], found.side_part[rows], parts)
     rows = rows[seen]
-    place, weights = nodes_on(low[seen], high[seen])
-    points = origins[rows, None] + place[..., None] * units[rows, None]
-    tangents = np.broadcast_to(units[rows, None], points.shape)
+    return origins[rows], units[rows], low[seen], high[seen], found.side_radius[rows]
+
+
+def chord_nodes(parts, found):
+    """Points, tangents and weights of the exposed parts of the sides' offsets."""
+    origins, units, low, high, _ = exposed_chords(parts, found)
+    place, weights = nodes_on(low, high)
+    points = origins[:, None] + place[..., None] * units[:, None]
+    tangents = np.broadcast_to(units[:, None], points.shape)
     return points.reshape(-1, 2), tangents.reshape(-1, 2), weights.ravel()
 
 
-def arc_nodes(parts, found):
-    """Points, tangents and weights of the exposed parts of the arcs around convex corners.
+def exposed_arcs(parts, found):
+    """The exposed parts of the arcs around convex corners: centres (k, 2), radii (k,), and from
+    which angle to which.
 
     An arc reaches from the normal of one side to that of the next; the rest of its circle is
     covered by those two sides.
@@ -315,11 +323,17 @@ def arc_nodes(parts, found):
     around = np.column_stack([np.cos(middle), np.sin(middle)])
     met = points[rows] + radius[rows, None] * around
     seen = exposed(met, around, found.point_part[rows], parts)
-    place, weights = nodes_on(low[seen], high[seen])
-    place = place + first[rows[seen], None]
+    rows = rows[seen]
+    return points[rows], radius[rows], first[rows] + low[seen], first[rows] + high[seen]
+
+
+def arc_nodes(parts, found):
+    """Points, tangents and weights of the exposed parts of the arcs."""
+    centres, radius, low, high = exposed_arcs(parts, found)
+    place, weights = nodes_on(low, high)
     outward = np.stack([np.cos(place), np.sin(place)], axis=-1)
-    reach = radius[rows[seen], None]
-    met = points[rows[seen], None] + reach[..., None] * outward
+    reach = radius[:, None]
+    met = centres[:, None] + reach[..., None] * outward
     tangents = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
     return met.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
 

@@ -8,8 +8,9 @@ straight.
 import math
 
 import flocsim.arrays as at
+from flocsim.integrators.rhs.outline_sum import outlines_apart
 from flocsim.integrators.rhs.views import pair_view
-from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, OUTLINE_PRESSURE, centre_force, has, surface_force
 
 BARRIER = 20.0
 """Thermal energies k_B T that hold a pair: by Kramers' rate kicks take e^20 = 5e8 times as long to
@@ -19,19 +20,21 @@ RUNG, LEAST_RUNG = 0.125, 1e-11
 """A step of the climb over the gap where it is taken, and the shortest one [m]."""
 
 
-def repulsion_at(scene, time, a, b, distance, gap):
+def repulsion_at(scene, work, time, a, b, distance, gap, way):
     """What the pair forces push bodies a and b apart with [N] at rest, at a distance of the centres
-    and a gap of the outlines."""
+    and a gap of the outlines; ``way``: how far from where they are [m]."""
     force = 0.0
     sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
     if has(scene, CENTRE_FORCE):
         force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
     if scene.surface_reach > gap:
         force += surface_force(scene, pair_view(scene, time, a, b, gap, 0.0, distance))
+    if has(scene, OUTLINE_PRESSURE):
+        force += outlines_apart(scene, work, time, a, b, way)
     return force
 
 
-def can_climb(scene, time, a, b, distance, gap, load, needed):
+def can_climb(scene, work, time, a, b, distance, gap, load, needed):
     """Whether less than the energy ``needed`` [J] leads out of the pair's attraction, a load [N]
     helping: its work over the way out, at the highest place of it."""
     if not load < math.inf:
@@ -47,9 +50,12 @@ def can_climb(scene, time, a, b, distance, gap, load, needed):
             rung = min(rung, RUNG * abs(distance + way - sizes))
         if scene.surface_reach > 0.0:
             rung = min(rung, RUNG * abs(gap + way))
+        if gap + way < scene.outlines[0]:
+            rung = min(rung, RUNG * max(gap + way, scene.outlines[1]))
         rung = max(rung, LEAST_RUNG)
         middle = way + 0.5 * rung
-        climbed -= (repulsion_at(scene, time, a, b, distance + middle, gap + middle) + load) * rung
+        there = distance + middle, gap + middle, middle
+        climbed -= (repulsion_at(scene, work, time, a, b, *there) + load) * rung
         if climbed > needed:
             return False
         way += rung

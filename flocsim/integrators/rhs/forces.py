@@ -7,6 +7,7 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.integrators.rhs.grazing import grazing_force
+from flocsim.integrators.rhs.outline_sum import outlines_in
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
 from flocsim.integrators.rhs.views import (
     add_force,
@@ -21,6 +22,7 @@ from flocsim.laws import (
     BODY_FORCE,
     CENTRE_FORCE,
     CONTACT_FORCE,
+    OUTLINE_PRESSURE,
     body_force,
     centre_force,
     contact_force,
@@ -71,6 +73,14 @@ def add_surface_forces(scene, work, time, state):
         row = end
 
 
+def add_outline_forces(scene, work, time, state):
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        fx, fy, torque_a, torque_b = outlines_in(scene, work, time, state, a, b)
+        add_force(work, state, a, fx, fy, torque_a)
+        add_force(work, state, b, -fx, -fy, torque_b)
+
+
 def add_contact_forces(scene, work, state):
     for row in range(work.tally[at.CANDIDATES]):
         if work.candidates[row, at.CLOSED] == at.TOUCHES:
@@ -113,6 +123,8 @@ def sum_other_forces(scene, work, time, state):
         add_centre_forces(scene, work, time, state)
     if scene.surface_reach > 0.0:
         add_surface_forces(scene, work, time, state)
+    if has(scene, OUTLINE_PRESSURE):
+        add_outline_forces(scene, work, time, state)
 
 
 def sum_forces(scene, work, time, state):

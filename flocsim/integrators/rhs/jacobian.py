@@ -14,9 +14,11 @@ the torque changes by N σ.
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.geometry.contact.points import row_radii
+from flocsim.geometry.contact.separation import separation
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
+from flocsim.integrators.rhs.outline_sum import between_outlines
 from flocsim.integrators.rhs.stated_error import doubted
 from flocsim.integrators.rhs.surface_gap import (
     mean_direction,
@@ -33,6 +35,7 @@ from flocsim.integrators.rhs.views import (
 from flocsim.laws import (
     CENTRE_FORCE,
     CONTACT_FORCE,
+    OUTLINE_PRESSURE,
     POSITION_DERIVATIVES,
     VELOCITY_DERIVATIVES,
     centre_derivatives,
@@ -96,6 +99,9 @@ SHIFT_OF_X, SHIFT_OF_Y = (
 
 NOTHING = (0.0, 0.0, 0.0)
 """A body on which a direction has no entries."""
+
+TURN = (0.0, 0.0, 1.0)
+"""A body that turns."""
 
 
 def sliding_row(scene, work, row):
@@ -275,6 +281,49 @@ def add_surfaces(scene, work, time):
         row = end
 
 
+NUDGE = 1e-3
+"""Of the gap of two outlines, by which they are moved to see how their forces change."""
+
+
+def add_outlines(scene, work, time):
+    """Derivatives of the forces between outlines by the places of both, from differences: all three
+    follow from those by j's place, forces going with the bodies."""
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        x, y = separation(scene, work, at.NOW, a, b)
+        angle_a, angle_b = work.motion[at.NOW, a, at.ANGLE], work.motion[at.NOW, b, at.ANGLE]
+        fx, fy, torque_a, torque_b = between_outlines(
+            scene, work, time, a, b, x, y, angle_a, angle_b
+        )
+        if fx == 0.0 and fy == 0.0:
+            continue
+        by = NUDGE * scene.outlines[1]
+        turn = by / scene.bodies[a, at.BOUNDING_RADIUS]
+        across = between_outlines(scene, work, time, a, b, x + by, y, angle_a, angle_b)
+        up = between_outlines(scene, work, time, a, b, x, y + by, angle_a, angle_b)
+        turned = between_outlines(scene, work, time, a, b, x, y, angle_a + turn, angle_b)
+        by_x = ((across[0] - fx) / by, (across[1] - fy) / by, (across[2] - torque_a) / by)
+        by_y = ((up[0] - fx) / by, (up[1] - fy) / by, (up[2] - torque_a) / by)
+        by_a = ((turned[0] - fx) / turn, (turned[1] - fy) / turn, (turned[2] - torque_a) / turn)
+        on_b_x, on_b_y = (across[3] - torque_b) / by, (up[3] - torque_b) / by
+        on_b_a = (turned[3] - torque_b) / turn
+        # Turning b alone is turning both, with all that is between them, and a back.
+        by_b = (
+            -fy + by_x[0] * y - by_y[0] * x - by_a[0],
+            fx + by_x[1] * y - by_y[1] * x - by_a[1],
+            by_x[2] * y - by_y[2] * x - by_a[2],
+        )
+        on_b_b = on_b_x * y - on_b_y * x - on_b_a
+        for column, on_a, on_b in (
+            (SHIFT_OF_X, by_x, on_b_x),
+            (SHIFT_OF_Y, by_y, on_b_y),
+            ((TURN, NOTHING), by_a, on_b_a),
+            ((NOTHING, TURN), by_b, on_b_b),
+        ):
+            out = on_a, (-on_a[0], -on_a[1], on_b)
+            add_product(scene, work, at.STIFFNESS, pair, a, b, out, column, -1.0)
+
+
 def weigh_velocities(scene, work, time, remaining):
     """Derivatives of the body forces, and from them how long each body remembers its velocity."""
     for which in range(2):
@@ -293,6 +342,8 @@ def assemble_others(scene, work, time, remaining):
         add_centres(scene, work, time)
     if scene.surface_reach > 0.0:
         add_surfaces(scene, work, time)
+    if has(scene, OUTLINE_PRESSURE):
+        add_outlines(scene, work, time)
 
 
 def assemble_jacobian(scene, work, time, remaining):

@@ -74,7 +74,7 @@ class Doublet:
         return bond_between(self.scene, self.work, 0.0, 0, 1)
 
     def attraction(self):
-        return attraction_at(self.scene, 0.0, self.between, 0.0)[0]
+        return attraction_at(self.scene, self.work, 0.0, self.between, 0.0)[0]
 
     def bond(self, time=0.0):
         """The kind of bond now."""

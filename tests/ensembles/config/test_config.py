@@ -134,7 +134,7 @@ def test_tang2014_has_the_papers_zone_and_weights(load_preset):
     config = load_preset("tang2014")
     assert zone_number(config) == pytest.approx(0.086541, rel=1e-4)
     assert config.zone.root == "outer"
-    assert config.body_options == {"surface_density": 2.0}
+    assert config.body_options(Sphere(1e-5)) == {"surface_density": 2.0}
     assert not config.fluid.buoyancy
     contact = force_of(config, "contact")
     assert (contact.k_n, contact.k_t, contact.damping_n) == (20.0, 2.0, "critical")
@@ -154,14 +154,14 @@ def test_si_gives_its_zone_since_there_is_no_root(load_preset):
     config = load_preset("si")
     assert zone_number(config) > 4.0 / math.e**2
     assert config.zone == ZoneConfig(distance=1e-8)
-    assert config.body_options == {"density": 2650.0, "depth": "sphere"}
+    assert config.body_options(Sphere(1e-5)) == {"density": 2650.0, "depth": "sphere"}
     assert {force_of(config, name).gap for name in ("van_der_waals", "double_layer")} == {"surface"}
 
 
 def test_the_si_zone_ends_where_the_attraction_is_the_weight(load_preset):
     config = load_preset("si")
     receiving, falling = TYPES["I"]
-    body = Body(Sphere(falling), **config.body_options)
+    body = Body(Sphere(falling), **config.body_options(Sphere(falling)))
     weight = 9.81 * body.areal_density * math.pi * falling**2 * (1.0 - 997.0 / 2650.0)
     reduced = receiving * falling / (receiving + falling)
     attraction = 4.7e-20 * reduced / (6.0 * config.zone.distance**2)

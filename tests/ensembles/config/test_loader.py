@@ -5,6 +5,7 @@ from pathlib import Path
 import attrs
 import pytest
 
+from flocsim import Sphere
 from flocsim.ensembles.config.schema import FORCES
 from tests.helpers.small_study import VALID, load_text, problem_lines
 
@@ -16,7 +17,7 @@ def test_every_value_arrives_in_si_units(tmp_path):
     assert (config.scene.delta, config.scene.start_gap) == ((0.0, 0.5), 2e-6)
     assert (config.scene.escape_gap, config.scene.time_limit) == (4e-6, 5.0)
     assert (config.shapes.vertices, config.shapes.radius, config.shapes.pool) == ((1, 4), 1e-6, 5)
-    assert config.body_options == {"density": 2650.0, "depth": 10e-6}
+    assert config.body_options(Sphere(1e-5)) == {"density": 2650.0, "depth": 10e-6}
     assert (config.fluid.viscosity, config.fluid.velocity) == (8.9e-4, (0.0, 1e-4))
     assert type(config.fluid.density) is float
     assert config.force_names == tuple(FORCES)[:5]
@@ -56,13 +57,13 @@ def test_order_of_tables_and_keys_does_not_matter(tmp_path):
 def test_keys_that_exclude_each_other_replace_the_presets(tmp_path, over, bodies):
     for preset in ("tang2014", "si"):
         text = f'preset = "{preset}"\n[fluid]\nbuoyancy = false\n[bodies]\n{over}\n'
-        assert load_text(tmp_path, text).body_options == bodies
+        assert load_text(tmp_path, text).body_options(Sphere(1e-5)) == bodies
 
 
 def test_a_preset_keeps_what_the_file_leaves_alone(tmp_path):
     text = 'preset = "si"\n[bodies]\ndepth = "5 um"\n[forces.van_der_waals]\nd_min = "2 nm"\n'
     config = load_text(tmp_path, text)
-    assert config.body_options == {"density": 2650.0, "depth": 5e-6}
+    assert config.body_options(Sphere(1e-5)) == {"density": 2650.0, "depth": 5e-6}
     attraction = config.forces[2]
     assert (attraction.d_min, attraction.hamaker, attraction.gap) == (2e-9, 4.7e-20, "surface")
 

@@ -27,7 +27,7 @@ def scene_of(*forces):
                                               (1e-8, 0.1 * PULL * D_MIN)])  # fmt: skip
 def test_the_climb_is_the_depth_of_the_potential(gap, place, depth):
     scene = scene_of(VanDerWaals(HAMAKER, D_MIN, gap))
-    known = scene, 0.0, 1, 0, 2.0 * RADIUS + place, place, 0.0
+    known = scene, None, 0.0, 1, 0, 2.0 * RADIUS + place, place, 0.0
     assert not can_climb(*known, 0.97 * depth)
     assert can_climb(*known, 1.03 * depth)
 
@@ -36,15 +36,15 @@ def test_a_load_helps_on_the_way_out():
     scene, load = scene_of(VanDerWaals(HAMAKER, D_MIN)), 0.01 * PULL
     # Attraction falls to the load at ten d_min.
     left = PULL * D_MIN * (1.0 + 0.9) - 10.0 * load * D_MIN
-    known = scene, 0.0, 1, 0, 2.0 * RADIUS, 0.0, load
+    known = scene, None, 0.0, 1, 0, 2.0 * RADIUS, 0.0, load
     assert not can_climb(*known, 0.97 * left)
     assert can_climb(*known, 1.03 * left)
-    assert can_climb(scene, 0.0, 1, 0, 2.0 * RADIUS, 0.0, math.inf, 0.0)
+    assert can_climb(scene, None, 0.0, 1, 0, 2.0 * RADIUS, 0.0, math.inf, 0.0)
 
 
 def test_without_attraction_nothing_is_to_be_climbed():
     for forces in ((), (DoubleLayer(15e-3, 1e-8),)):
-        assert can_climb(scene_of(*forces), 0.0, 1, 0, 2.0 * RADIUS, 0.0, 0.0, 1e-30)
+        assert can_climb(scene_of(*forces), None, 0.0, 1, 0, 2.0 * RADIUS, 0.0, 0.0, 1e-30)
 
 
 def test_a_barrier_is_part_of_the_climb():
@@ -57,5 +57,5 @@ def test_a_barrier_is_part_of_the_climb():
     climbs = np.cumsum(pull - push) * (gaps[1] - gaps[0])
     highest = climbs.max()
     assert highest > 1.2 * climbs[-1], "there is a barrier"
-    assert not can_climb(scene, 0.0, 1, 0, total, 0.0, 0.0, 0.95 * highest)
-    assert can_climb(scene, 0.0, 1, 0, total, 0.0, 0.0, 1.05 * highest)
+    assert not can_climb(scene, None, 0.0, 1, 0, total, 0.0, 0.0, 0.95 * highest)
+    assert can_climb(scene, None, 0.0, 1, 0, total, 0.0, 0.0, 1.05 * highest)

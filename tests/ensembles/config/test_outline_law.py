@@ -1,0 +1,43 @@
+"""law = "outline" in a config: where it goes, and where it is refused."""
+
+import pytest
+
+from flocsim.ensembles import load_config
+from flocsim.errors import ConfigError
+
+SETTLING = """
+preset = "si"
+[scene]
+types = ["III"]
+[forces.van_der_waals]
+law = "outline"
+depth = "5 um"
+wavelength = "100 nm"
+"""
+
+
+def loaded(tmp_path, text):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    return load_config(path)
+
+
+def test_it_goes_with_pairs_that_settle(tmp_path):
+    [force] = [
+        each for each in loaded(tmp_path, SETTLING).forces if type(each).__name__ == "VanDerWaals"
+    ]
+    assert (force.acts_on, force.depth, force.wavelength) == ("outlines", 5e-6, 1e-7)
+
+
+@pytest.mark.parametrize(
+    ("scene", "more", "words"),
+    [
+        ('meeting = "extension"\nrate = 10.0', "", "is for pairs that settle"),
+        ('meeting = "brownian"', '[forces.thermal]\ntemperature = "298 K"', "pairs that settle"),
+        ("", '[forces.thermal]\ntemperature = "298 K"', "leave one of them out"),
+    ],
+)
+def test_elsewhere_it_is_refused(tmp_path, scene, more, words):
+    text = SETTLING.replace("[scene]\n", f"[scene]\n{scene}\n") + more
+    with pytest.raises(ConfigError, match=words):
+        loaded(tmp_path, text)
