@@ -11,6 +11,7 @@ from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
 HOLDS = {
     "stokes": "Stokes's drag holds within 15 %",
+    "shape": "slow flow around a shape holds within 15 %",
     "schiller_naumann": "the drag of Schiller and Naumann holds within 5 %",
 }
 
