@@ -185,10 +185,9 @@ def scene_of(
         [shape.long_axis for shape in shapes],
         list(range(len(bodies))),
     )
-    if resistances is None:
-        resistances = np.zeros((len(bodies), RESISTANCE_COLUMNS))
+    water = np.zeros((len(bodies), RESISTANCE_COLUMNS)) if resistances is None else resistances
     return Scene(
-        bodies=np.ascontiguousarray(np.column_stack([np.array(columns, float).T, resistances])),
+        bodies=np.ascontiguousarray(np.hstack([np.array(columns, dtype=float).T, np.array(water)])),
         **outlines_of(shapes)._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,

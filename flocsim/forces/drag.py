@@ -117,7 +117,7 @@ class StokesDrag(BodyForce):
             )
         if self.law == "shape" and not self.rotational:
             raise RangeError(
-                'rotational must be true where law is "shape": a shape that is pushed aside of where '
+                'rotational must be true where law is "shape": a shape that is pushed beside where '
                 "it resists turns, and turning pushes it"
             )
 

@@ -1,4 +1,4 @@
-"""What the drag of a body's own shape takes: its resistance to slow flow, computed once and kept."""
+"""The resistance of a body's own shape to slow flow, computed once and kept on the disk."""
 
 import functools
 import hashlib
@@ -52,9 +52,7 @@ def body_resistance(body: Body) -> tuple[float, ...]:
     else:
         height = 4.0 / 3.0 if isinstance(body.depth, str) else body.depth / radius
         unit = unit_resistance(outline_text(shape), round(height, DIGITS))
-    return tuple(
-        number * radius**power for number, power in zip(unit, POWERS, strict=True)
-    )
+    return tuple(number * radius**power for number, power in zip(unit, POWERS, strict=True))
 
 
 def resistance_matrices(numbers: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
+from flocsim.forces.shape_drag import follows_shape
 from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5
@@ -97,12 +98,17 @@ def flow_load(meeting: str, rate: float, outer: float, bodies: Sequence[Sequence
     """A bound of the pull on the bond of a doublet in a flow [N].
 
     The flow draws the centres apart by at most E d, d ≤ ``outer`` = R_i + R_j, E the strain: a
-    force of E d/(µ_i + µ_j). It turns a sphere against the doublet with a torque of at most
-    8πγ r³ E = 4/3 r² E/µ, which on the arm r pries as 4/3 r E/µ. ``bodies``: (r, µ) of both.
+    force of E d/(µ_i + µ_j). It turns a body against the doublet with a torque of at most T E, of a
+    sphere 8πγ r³ E = 4/3 r² E/µ, which on the arm r pries as T E/r. ``bodies``: (r, µ) of both, or
+    (r, µ, T) [m, s/kg, N m s].
     """
     strain = strain_of(meeting, rate)
-    together = sum(mobility for _, mobility in bodies)
-    return strain * (outer / together + max(4.0 / 3.0 * r / mobility for r, mobility in bodies))
+    together = sum(mobility for _, mobility, *_ in bodies)
+    pries = [
+        (turning[0] / r if turning else 4.0 / 3.0 * r / mobility)
+        for r, mobility, *turning in bodies
+    ]
+    return strain * (outer / together + max(pries))
 
 
 def turn_in_flow(
@@ -184,17 +190,22 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
     """Spins [rad/s] at which the body forces on a lone body put no torque on it, at even angles.
 
     Of all body forces together, so that a force under which shapes turn unevenly has its say.
-    ANGLES of them, or a FEW where these are alike.
+    ANGLES of them, or a FEW where these are alike. Where the drag is of shapes, turning and going
+    along are one: at the velocity at which there is no force, either.
     """
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     scale = max(map(abs, system.fluid.gradient), default=0.0) or 1.0
-    lone = lone_view(body, system.fluid, 0.0, 0.0)
+    lone = lone_view(system, body)
+    free = follows_shape(system.forces)
 
     def rates(count: int) -> np.ndarray:
         found = np.zeros(count)
         for place, angle in enumerate((2.0 * np.pi * np.arange(count) / count).tolist()):
             view = lone._replace(angle=angle)
+            if free:
+                found[place] = free_spin(force, view, pieces.parameters, scale)
+                continue
             less, more = (
                 force(view._replace(spin=spin), pieces.parameters)[2] for spin in (-scale, scale)
             )
@@ -204,6 +215,17 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
 
     few = rates(FEW)
     return few if is_even(few) else rates(ANGLES)
+
+
+def free_spin(force: Callable, view: Any, parameters: Sequence[float], scale: float) -> float:
+    """The spin [rad/s] of a body that no force, and no torque, of linear laws is left on."""
+    steps = np.diag([scale * view.radius, scale * view.radius, scale])
+    still = np.array(force(view, parameters))
+    changes = [
+        np.array(force(view._replace(vx=vx, vy=vy, spin=spin), parameters)) - still
+        for vx, vy, spin in steps.tolist()
+    ]
+    return scale * float(np.linalg.solve(np.transpose(changes), -still)[2])
 
 
 def is_even(rates: np.ndarray) -> bool:
