@@ -47,26 +47,27 @@ def inertial_factor(reynolds):
     return 1.0 + 0.15 * reynolds**0.687
 
 
-def shape_load(body, viscosity, vx, vy, spin):
-    """−γ R (v − u, ω − Ω) in the frame of the scene: force and torque on the shape of a body."""
-    c, s = math.cos(body.angle), math.sin(body.angle)
+def resisted(body, c, s, vx, vy, spin):
+    """R (v − u, ω − Ω) in the frame of a shape that has turned by an angle of this cosine and sine,
+    over the viscosity."""
     ahead, aside = c * vx + s * vy, c * vy - s * vx
-    x = body.resistance_xx * ahead + body.resistance_xy * aside + body.resistance_xs * spin
-    y = body.resistance_xy * ahead + body.resistance_yy * aside + body.resistance_ys * spin
-    turn = body.resistance_xs * ahead + body.resistance_ys * aside + body.resistance_ss * spin
-    return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
+    return (
+        body.resistance_xx * ahead + body.resistance_xy * aside + body.resistance_xs * spin,
+        body.resistance_xy * ahead + body.resistance_yy * aside + body.resistance_ys * spin,
+        body.resistance_xs * ahead + body.resistance_ys * aside + body.resistance_ss * spin,
+    )
 
 
-def strain_load(body, viscosity, flow):
-    """γ Γ (E_xx, E_xy) in the frame of the scene: what a flow's strain puts on the shape."""
+def strained_load(body, c, s, flow):
+    """Γ (E_xx, E_xy) in that frame: what a flow's strain puts on the shape, over the viscosity."""
     e_xx, e_xy = strain_of(flow)
-    c, s = math.cos(body.angle), math.sin(body.angle)
     c_2, s_2 = c * c - s * s, 2.0 * c * s
     e_xx, e_xy = c_2 * e_xx + s_2 * e_xy, c_2 * e_xy - s_2 * e_xx
-    x = viscosity * (body.strain_xx_x * e_xx + body.strain_xy_x * e_xy)
-    y = viscosity * (body.strain_xx_y * e_xx + body.strain_xy_y * e_xy)
-    turn = viscosity * (body.strain_xx_s * e_xx + body.strain_xy_s * e_xy)
-    return c * x - s * y, s * x + c * y, turn
+    return (
+        body.strain_xx_x * e_xx + body.strain_xy_x * e_xy,
+        body.strain_xx_y * e_xx + body.strain_xy_y * e_xy,
+        body.strain_xx_s * e_xx + body.strain_xy_s * e_xy,
+    )
 
 
 @attrs.frozen
@@ -161,21 +162,27 @@ class StokesDrag(BodyForce):
     @staticmethod
     def shape_still(body, viscosity):
         """Force and torque on the shape in still water."""
-        return shape_load(body, viscosity, body.vx, body.vy, body.spin)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx, body.vy, body.spin)
+        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
 
     @staticmethod
     def shape(body, viscosity, flow):
         """Force and torque on the shape in a flow without strain."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        return shape_load(body, viscosity, body.vx - u, body.vy - v, body.spin - turning)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
 
     @staticmethod
     def shape_strained(body, viscosity, flow):
         """Force and torque on the shape in the flow."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        fx, fy, torque = shape_load(body, viscosity, body.vx - u, body.vy - v, body.spin - turning)
-        more_x, more_y, more = strain_load(body, viscosity, flow)
-        return fx + more_x, fy + more_y, torque + more
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        more_x, more_y, more = strained_load(body, c, s, flow)
+        x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
+        return c * x - s * y, s * x + c * y, turn
 
     @staticmethod
     def strained(body, viscosity, flow):
