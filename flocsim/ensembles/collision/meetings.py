@@ -44,6 +44,9 @@ LEAST_START = 0.01
 ANGLES, FEW = 720, 7
 """Angles of a body at which its turning is looked at."""
 
+BETWEEN = np.array([0.4, 1.9, 3.3, 5.1])
+"""Angles [rad] at which it is looked at whether a strain's turning is all of it."""
+
 FULL_TURN = 4.0 * math.pi
 """Of a sphere in shear, times its rate."""
 
@@ -190,8 +193,9 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
     """Spins [rad/s] at which the body forces on a lone body put no torque on it, at even angles.
 
     Of all body forces together, so that a force under which shapes turn unevenly has its say.
-    ANGLES of them, or a FEW where these are alike. Where the drag is of shapes, turning and going
-    along are one: at the velocity at which there is no force, either.
+    At ANGLES of them, or a FEW where these are alike; from a FEW to all where a strain turns it,
+    by a + b cos 2θ + c sin 2θ. Where the drag is of shapes, turning and going along are one: at the
+    velocity at which there is no force, either.
     """
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
@@ -199,9 +203,9 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
     lone = lone_view(system, body)
     free = follows_shape(system.forces)
 
-    def rates(count: int) -> np.ndarray:
-        found = np.zeros(count)
-        for place, angle in enumerate((2.0 * np.pi * np.arange(count) / count).tolist()):
+    def rates(angles: np.ndarray) -> np.ndarray:
+        found = np.zeros(len(angles))
+        for place, angle in enumerate(angles.tolist()):
             view = lone._replace(angle=angle)
             if free:
                 found[place] = free_spin(force, view, pieces.parameters, scale)
@@ -213,8 +217,20 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
                 found[place] = scale * (less + more) / (less - more)
         return found
 
-    few = rates(FEW)
-    return few if is_even(few) else rates(ANGLES)
+    few_angles, angles = (2.0 * np.pi * np.arange(count) / count for count in (FEW, ANGLES))
+    few = rates(few_angles)
+    if is_even(few):
+        return few
+    waves, *_ = np.linalg.lstsq(strain_waves(few_angles), few)
+    left = strain_waves(BETWEEN) @ waves - rates(BETWEEN)
+    if np.abs(left).max() <= 1e-9 * np.abs(few).max():
+        return strain_waves(angles) @ waves
+    return rates(angles)
+
+
+def strain_waves(angles: np.ndarray) -> np.ndarray:
+    """1, cos 2θ and sin 2θ (k, 3)."""
+    return np.column_stack([np.ones_like(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
 
 
 def free_spin(force: Callable, view: Any, parameters: Sequence[float], scale: float) -> float:
