@@ -13,6 +13,7 @@ from flocsim.arrays import RESISTANCE_COLUMNS
 from flocsim.body import Body
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.processor import cpu_kind, versions
+from flocsim.errors import UsageError
 from flocsim.forces.base import Force
 from flocsim.forces.drag import StokesDrag
 from flocsim.geometry.shapes.shape import Shape
@@ -77,6 +78,11 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
         found = prism_drag(rings, height)
         r = found.resistance
+        if not np.linalg.eigvalsh(r)[0] > 0.0:
+            raise UsageError(
+                f"the drag of an outline {height:.3g} r_eq deep cannot be computed: its resistance "
+                'is not positive; give the drag the law "stokes", or the shape fewer thin parts'
+            )
         numbers = [r[0, 0], r[0, 1], r[1, 1], r[0, 2], r[1, 2], r[2, 2], *found.strain.T.ravel()]
         return np.array(numbers, dtype=float).tobytes()
 

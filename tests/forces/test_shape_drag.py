@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, Swarm, System
 from flocsim.errors import RangeError, UsageError
-from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
+from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, shape_drag
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.shape_drag import (
@@ -72,8 +72,19 @@ def test_a_disc_of_a_depth_is_a_prism():
     assert [least / stokes, largest / stokes] == pytest.approx([0.976, 0.976], rel=0.015)
     assert 8.0 * math.pi * (3e-6) ** 3 / resistance[2, 2] == pytest.approx(0.830, rel=0.02)
     assert np.abs(strain).max() < 0.01 * 8.0 * math.pi * (3e-6) ** 2
-    flat = resistance_matrices(body_resistance(body_of(Sphere(3e-6), depth=1e-7)))[0]
-    assert flat[0, 0] < 0.8 * resistance[0, 0]
+    # Of a disc of no depth 32/3 µ r edgewise, and 32/3 µ r³.
+    flat = resistance_matrices(body_resistance(body_of(Sphere(3e-6), depth=1e-9)))[0]
+    sizes = np.array([3e-6, 3e-6, 2.7e-17])
+    assert np.diag(flat) / sizes == pytest.approx([32.0 / 3.0] * 3, rel=0.02)
+
+
+def test_a_resistance_that_is_not_positive_is_refused(monkeypatch):
+    def upside_down(rings, height):
+        return attrs.evolve(prism_drag(rings, height), resistance=-np.eye(3))
+
+    monkeypatch.setattr(shape_drag, "prism_drag", upside_down)
+    with pytest.raises(UsageError, match="cannot be computed: its resistance"):
+        body_resistance(body_of(TWO_TO_ONE, depth=1.77 * TWO_TO_ONE.equivalent_radius))
 
 
 def test_numbers_grow_with_the_size_and_are_those_of_the_prism():
