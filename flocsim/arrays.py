@@ -19,8 +19,14 @@ import numpy as np
     ELONGATION,  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area
     LONG_AXIS,  # the angle of its long axis [rad]
     IDENTITY,  # the number that its random forces go by
-    SCENE_BODY_COLUMNS,
+    RESISTANCE,  # from here on: BodyView.resistance_xx … of a viscosity of 1 Pa s, or zeros
 ) = range(11)
+
+RESISTANCE_COLUMNS = 12
+"""How many numbers a body's resistance has: six of R, six of Γ."""
+
+SCENE_BODY_COLUMNS = RESISTANCE + RESISTANCE_COLUMNS
+"""How many columns ``Scene.bodies`` has."""
 
 # Columns of ``Work.motion``; in ``Work.rates`` the velocity stands in the first three.
 (
@@ -328,6 +334,10 @@ class BodyView(NamedTuple):
     ``elongation`` is B = (M₁ − M₂)/(M₁ + M₂) of the shape's principal second moments of area, and
     ``angle + long_axis`` the angle of its long axis; ``kick_x``, ``kick_y`` and ``kick_turn``
     [1/√s] are means of white noise over the present kick, 0 where a scene has no random forces.
+
+    ``resistance_xx`` … and ``strain_xx_x`` …: in the frame of the shape, over the viscosity, the
+    symmetric R of (v_x, v_y, spin) [m, m², m³] and what E_xx = −E_yy, and E_xy, put on a body that
+    goes along [m², m², m³] (flocsim.hydrodynamics.PrismDrag), 0 where no drag follows shapes.
     """
 
     time: float
@@ -346,6 +356,18 @@ class BodyView(NamedTuple):
     kick_x: float = 0.0
     kick_y: float = 0.0
     kick_turn: float = 0.0
+    resistance_xx: float = 0.0
+    resistance_xy: float = 0.0
+    resistance_yy: float = 0.0
+    resistance_xs: float = 0.0
+    resistance_ys: float = 0.0
+    resistance_ss: float = 0.0
+    strain_xx_x: float = 0.0
+    strain_xx_y: float = 0.0
+    strain_xx_s: float = 0.0
+    strain_xy_x: float = 0.0
+    strain_xy_y: float = 0.0
+    strain_xy_s: float = 0.0
 
 
 class PairView(NamedTuple):

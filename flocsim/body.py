@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import Scene
+from flocsim.arrays import RESISTANCE_COLUMNS, Scene
 from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, in_unit, quantity, word_or_quantity
@@ -192,11 +192,13 @@ def scene_of(
     box: tuple[float, float] = NO_BOX,
     kicks: tuple[float, float, float, float] = NO_KICKS,
     key: tuple[int, int] = (0, 0),
+    resistances: Sequence[Sequence[float]] | None = None,
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
-    (flocsim.forces.codegen.Pieces); without, a scene that has no laws."""
+    (flocsim.forces.codegen.Pieces); without, a scene that has no laws. ``resistances``: of every
+    body, where a drag follows their shapes (flocsim.forces.shape_drag)."""
     shapes = [body.shape for body in bodies]
-    columns = (
+    columns: tuple[list[float], ...] = (
         [body.mass for body in bodies],
         [body.buoyant_mass(fluid) for body in bodies],
         [body.inertia for body in bodies],
@@ -208,8 +210,9 @@ def scene_of(
         [shape.long_axis for shape in shapes],
         list(range(len(bodies))),
     )
+    water = np.zeros((len(bodies), RESISTANCE_COLUMNS)) if resistances is None else resistances
     return Scene(
-        bodies=np.ascontiguousarray(np.array(columns, dtype=float).T),
+        bodies=np.ascontiguousarray(np.hstack([np.array(columns, dtype=float).T, np.array(water)])),
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         parameters=np.array(parameters, dtype=float),

@@ -377,7 +377,7 @@ def body_scales(system):
     relaxation, settling = [], []
     for body in free:
         radius = body.shape.equivalent_radius
-        at_rest = lone_view(body, system.fluid, 0.0, 0.0)
+        at_rest = lone_view(system, body)
         at_rest = at_rest._replace(x=body.position[0], y=body.position[1])
         resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
         alone = settled(system, body)

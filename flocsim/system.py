@@ -18,6 +18,7 @@ from flocsim.explain import explain
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
+from flocsim.forces.shape_drag import resistance_numbers
 from flocsim.forces.smoothing import smoothing_of
 from flocsim.forces.thermal import key_of, kicks_of
 from flocsim.geometry.contact import compounds, spheres_only
@@ -159,6 +160,7 @@ class System:
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
+            resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:

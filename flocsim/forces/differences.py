@@ -22,6 +22,10 @@ def changed_body(view, axis, by):
         view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
         view.mass, view.buoyant_mass, view.inertia, view.radius,
         view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
+        view.resistance_xx, view.resistance_xy, view.resistance_yy,
+        view.resistance_xs, view.resistance_ys, view.resistance_ss,
+        view.strain_xx_x, view.strain_xx_y, view.strain_xx_s,
+        view.strain_xy_x, view.strain_xy_y, view.strain_xy_s,
     )  # fmt: skip
 
 

@@ -47,6 +47,29 @@ def inertial_factor(reynolds):
     return 1.0 + 0.15 * reynolds**0.687
 
 
+def resisted(body, c, s, vx, vy, spin):
+    """R (v − u, ω − Ω) in the frame of a shape that has turned by an angle of this cosine and sine,
+    over the viscosity."""
+    ahead, aside = c * vx + s * vy, c * vy - s * vx
+    return (
+        body.resistance_xx * ahead + body.resistance_xy * aside + body.resistance_xs * spin,
+        body.resistance_xy * ahead + body.resistance_yy * aside + body.resistance_ys * spin,
+        body.resistance_xs * ahead + body.resistance_ys * aside + body.resistance_ss * spin,
+    )
+
+
+def strained_load(body, c, s, flow):
+    """Γ (E_xx, E_xy) in that frame: what a flow's strain puts on the shape, over the viscosity."""
+    e_xx, e_xy = strain_of(flow)
+    c_2, s_2 = c * c - s * s, 2.0 * c * s
+    e_xx, e_xy = c_2 * e_xx + s_2 * e_xy, c_2 * e_xy - s_2 * e_xx
+    return (
+        body.strain_xx_x * e_xx + body.strain_xy_x * e_xy,
+        body.strain_xx_y * e_xx + body.strain_xy_y * e_xy,
+        body.strain_xx_s * e_xx + body.strain_xy_s * e_xy,
+    )
+
+
 @attrs.frozen
 class StokesDrag(BodyForce):
     """Drag −6πγ r_eq (v − u) f, and torque −8πγ r_eq³ (ω − Ω) where ``rotational``.
@@ -56,7 +79,14 @@ class StokesDrag(BodyForce):
     (its diameter and its own speed against the flow); the torque stays Stokes's. Viscosity γ,
     density ρ_f and the background flow u, Ω are the fluid's.
 
-    ``strain``: the flow turns a long body by its strain E, too, with the torque
+    "shape": −γ R (v − u, ω − Ω) + γ Γ (E_xx, E_xy), force and torque in one, slow flow around the
+    body's own outline. The symmetric R (3 × 3) and Γ (3 × 2), in the frame of the shape, are those
+    of a prism of the outline and the body's depth, a rigid multiblob
+    (flocsim.hydrodynamics.prism_drag), computed once for a shape; a body of one core point is a
+    sphere unless its depth is given. Such a body falls aslant, and turns as it falls.
+
+    ``strain``: the flow turns a long body by its strain E, too ("shape" has that anyway), with the
+    torque
     −8πγ r_eq³ [ω − Ω − B(−E_xx sin 2ψ + E_xy cos 2ψ)], ψ being the angle of the long axis and
     B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area. An ellipse with the half axes
     a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
@@ -71,8 +101,10 @@ class StokesDrag(BodyForce):
     law: str = choice(
         "stokes",
         "schiller_naumann",
+        "shape",
         default="stokes",
-        help="schiller_naumann: times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re up to 800",
+        help="schiller_naumann: times 1 + 0.15 Re^0.687, Re = 2 r_eq ρ_f v/γ, for Re up to 800; "
+        "shape: slow flow around each body's own outline",
     )
 
     strain: bool = flag(
@@ -84,16 +116,25 @@ class StokesDrag(BodyForce):
             raise RangeError(
                 "strain must be false where rotational is: it is a part of the drag torque"
             )
+        if self.law == "shape" and not self.rotational:
+            raise RangeError(
+                'rotational must be true where law is "shape": a shape that is pushed beside where '
+                "it resists turns, and turning pushes it"
+            )
 
     @property
     def serves_up_to(self) -> float:
         """The Reynolds number up to which the law holds."""
-        return STOKES_UP_TO if self.law == "stokes" else SCHILLER_NAUMANN_UP_TO
+        return SCHILLER_NAUMANN_UP_TO if self.law == "schiller_naumann" else STOKES_UP_TO
 
     def kernel_in(self, fluid: Fluid) -> Callable:
         """Still water needs no flow, and no derivative by the place; a flow without strain, none by
         the angle."""
         stokes = self.law == "stokes"
+        if self.law == "shape":
+            if not any(fluid.flow):
+                return self.shape_still
+            return self.shape_strained if any(strain_of(fluid.flow)) else self.shape
         if not any(fluid.flow):
             return self.still if stokes else self.inertial_still
         if self.strain and any(strain_of(fluid.flow)):
@@ -102,6 +143,8 @@ class StokesDrag(BodyForce):
 
     def remarks(self, fluid: Fluid) -> list[str]:
         """Whether the flow's strain turns bodies."""
+        if self.law == "shape":
+            return ["of each body's own outline"]
         if not self.strain:
             return []
         strained = any(strain_of(fluid.flow))
@@ -115,6 +158,31 @@ class StokesDrag(BodyForce):
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         spin = body.spin - turning
         return -translation * (body.vx - u), -translation * (body.vy - v), -rotation * spin
+
+    @staticmethod
+    def shape_still(body, viscosity):
+        """Force and torque on the shape in still water."""
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx, body.vy, body.spin)
+        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
+
+    @staticmethod
+    def shape(body, viscosity, flow):
+        """Force and torque on the shape in a flow without strain."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
+
+    @staticmethod
+    def shape_strained(body, viscosity, flow):
+        """Force and torque on the shape in the flow."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        more_x, more_y, more = strained_load(body, c, s, flow)
+        x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
+        return c * x - s * y, s * x + c * y, turn
 
     @staticmethod
     def strained(body, viscosity, flow):

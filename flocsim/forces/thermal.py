@@ -12,6 +12,7 @@ from flocsim.constants import BOLTZMANN, MINIMUM_GAP
 from flocsim.errors import UsageError
 from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import BodyForce, Force
+from flocsim.forces.shape_drag import follows_shape
 
 FAR_SHARE = 0.1
 """Share of the smallest radius by which a kick of automatic length moves two bodies against each
@@ -113,6 +114,11 @@ def kicks_of(
         return 0.0, 0.0, 0.0, 0.0
     if len(found) > 1:
         raise UsageError("a scene has one temperature: give one Thermal force")
+    if follows_shape(forces):
+        raise UsageError(
+            'thermal motion cannot have the drag law "shape": its kicks are those of equivalent '
+            "spheres, and such bodies would not stay at their temperature: give another law"
+        )
     thermal = found[0]
     spread = 2.0 * sum(thermal.diffusion(fluid, radius) for radius in radii[:2])
     kick: Any = thermal.kick

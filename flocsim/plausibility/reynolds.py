@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 from flocsim.body import Body
 from flocsim.errors import UsageError
 from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, reynolds_number
+from flocsim.forces.shape_drag import follows_shape
 from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
 HOLDS = {
     "stokes": "Stokes's drag holds within 15 %",
+    "shape": "slow flow around a shape holds within 15 %",
     "schiller_naumann": "the drag of Schiller and Naumann holds within 5 %",
 }
 
@@ -57,11 +59,15 @@ def settled(system: Any, body: Body) -> Settled | None:
 
 def all_settled(system: Any) -> list[Settled]:
     """Every free body that settles, those alike once, in the order of the bodies."""
+    by_shape = follows_shape(system.forces)
     alike = {
-        (body.shape.equivalent_radius, body.mass, body.buoyant_mass(system.fluid)): body
+        (
+            body.shape.equivalent_radius, body.mass, body.buoyant_mass(system.fluid),
+            (id(body.shape), body.angle) if by_shape else None,
+        ): body
         for body in reversed(system.bodies)
         if not body.fixed
-    }
+    }  # fmt: skip
     found = (settled(system, body) for body in reversed(alike.values()))
     return [each for each in found if each is not None]
 

@@ -10,6 +10,12 @@ from flocsim.body import Body
 from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
 from flocsim.forces.codegen import laws_of
+from flocsim.forces.shape_drag import (
+    body_resistance,
+    follows_shape,
+    resistance_matrices,
+    resistance_numbers,
+)
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
@@ -26,27 +32,32 @@ def no_force(view, parameters):
     return 0.0, 0.0, 0.0
 
 
-def lone_view(body, fluid, vx, vy):
-    """The BodyView of a body at the origin, without spin."""
+def lone_view(system, body, vx=0.0, vy=0.0, spin=0.0):
+    """The BodyView of a body at the origin."""
     shape = body.shape
     return BodyView(
-        0.0, 0.0, 0.0, body.angle, vx, vy, 0.0, body.mass, body.buoyant_mass(fluid), body.inertia,
-        shape.equivalent_radius, shape.elongation, shape.long_axis,
+        0.0, 0.0, 0.0, body.angle, vx, vy, spin, body.mass, body.buoyant_mass(system.fluid),
+        body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
+        *resistance_numbers(system.forces, body),
     )  # fmt: skip
 
 
-def balance(force, body, fluid, parameters, velocity):
-    """(fx, fy) on a body that moves at a velocity."""
-    return np.array(force(lone_view(body, fluid, *velocity), parameters)[:2])
+def balance(force, view, parameters, velocity):
+    """(fx, fy) on a body that moves at a velocity (2,); where that is (vx, vy, r_eq spin) also
+    the torque over r_eq."""
+    r = view.radius
+    spin = velocity[2] / r if len(velocity) > 2 else 0.0
+    fx, fy, torque = force(view._replace(vx=velocity[0], vy=velocity[1], spin=spin), parameters)
+    return np.array((fx, fy, torque / r)[: len(velocity)])
 
 
-def derivative(force, body, fluid, parameters, velocity):
-    """∂(fx, fy)/∂(vx, vy) by central differences."""
-    size = 1e-3 * max(abs(velocity[0]), abs(velocity[1])) + 1e-9
+def derivative(force, view, parameters, velocity):
+    """∂(fx, fy, …)/∂(vx, vy, …) by central differences."""
+    size = 1e-3 * np.abs(velocity).max() + 1e-9
     columns = []
-    for step in np.eye(2) * size:
-        ahead = balance(force, body, fluid, parameters, velocity + step)
-        behind = balance(force, body, fluid, parameters, velocity - step)
+    for step in np.eye(len(velocity)) * size:
+        ahead = balance(force, view, parameters, velocity + step)
+        behind = balance(force, view, parameters, velocity - step)
         columns.append((ahead - behind) / (2.0 * size))
     return np.array(columns).T
 
@@ -61,10 +72,8 @@ def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> floa
     force = pieces.laws.get("body_force", no_force)
     u, v = system.fluid.velocity
     size = size or 1e-3 * speed + 1e-9
-    ends = [
-        balance(force, body, system.fluid, pieces.parameters, (u, v - speed + by))[1]
-        for by in (size, -size)
-    ]
+    view = lone_view(system, body)
+    ends = [balance(force, view, pieces.parameters, (u, v - speed + by))[1] for by in (size, -size)]
     return float(ends[1] - ends[0]) / (2.0 * size)
 
 
@@ -74,10 +83,13 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
 
     A drag that grows faster than the speed yields most at rest; a linear one alike everywhere.
     ``mobility`` is that at the terminal speed, which stands where there is no drag at rest. So
-    1/it is the least resistance with which what is left of a velocity dies away.
+    1/it is the least resistance with which what is left of a velocity dies away. Of a shape that
+    has one in every direction: the largest.
     """
     if not mobility > 0.0:
         return mobility
+    if follows_shape(system.forces):
+        return free_mobilities(system, body)[1]
     size = NEARLY_AT_REST * speed + 1e-9
     try:
         at_rest = resistance(system, body, 0.0, size)
@@ -88,14 +100,31 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
 
 @np.errstate(all="ignore")
 def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> float:
-    """The least mobility [s/kg] of a body up to a speed [m/s] that another may impose on it."""
+    """The least mobility [s/kg] of a body up to a speed [m/s] that another may impose on it; of a
+    shape that of the direction in which it resists most, held at its angle."""
     if not mobility > 0.0:
         return mobility
+    if follows_shape(system.forces):
+        return held_mobility(system, body)
     try:
         there = resistance(system, body, speed)
     except (ArithmeticError, ValueError):
         return mobility
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
+
+
+def held_mobility(system: Any, body: Body) -> float:
+    """The least mobility [s/kg] of a body whose drag follows its shape, held from turning."""
+    resistance, _ = resistance_matrices(body_resistance(body))
+    return float(1.0 / (system.fluid.viscosity * np.linalg.eigvalsh(resistance[:2, :2])[-1]))
+
+
+def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
+    """(least, largest) [s/kg] by direction of a body free to turn, whose drag follows its shape."""
+    resistance, _ = resistance_matrices(body_resistance(body))
+    mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
+    least, largest = np.linalg.eigvalsh(mobility).tolist()
+    return least, largest
 
 
 def no_number(system, body, velocity):
@@ -105,7 +134,7 @@ def no_number(system, body, velocity):
         own = laws_of([force], system.fluid)
         law = own.laws.get("body_force")
         try:
-            known = (law, body, system.fluid, own.parameters)
+            known = (law, lone_view(system, body), own.parameters)
             if law is None or np.isfinite(derivative(*known, velocity)).all():
                 continue
         except (ArithmeticError, ValueError):
@@ -118,15 +147,16 @@ def no_number(system, body, velocity):
 def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
 
-    The velocity at which the system's body forces balance; the mobility is the inverse of their
-    resistance along gravity. Zero both for a fixed body. UsageError where there is no balance.
+    The velocity at which the system's body forces balance; the mobility is that along gravity.
+    Where the drag is of shapes a body turns as well, so that its torques balance, too, and both are
+    those at its angle. Zero both for a fixed body. UsageError where there is no balance.
     """
     if body.fixed:
         return np.zeros(2), 0.0
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
-    known = (force, body, system.fluid, pieces.parameters)
-    velocity = np.zeros(2)
+    known = (force, lone_view(system, body), pieces.parameters)
+    velocity = np.zeros(3 if follows_shape(system.forces) else 2)
     for _ in range(ITERATIONS):
         try:
             slope = derivative(*known, velocity)
@@ -139,6 +169,8 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
         change = np.linalg.solve(slope, balance(*known, velocity))
         velocity = velocity - change
         if np.abs(change).max() <= 1e-12 * (np.abs(velocity).max() + 1e-15):
+            if len(velocity) > 2:
+                return velocity[:2], float(-np.linalg.inv(slope)[1, 1])
             return velocity, float(-1.0 / slope[1, 1])
     raise UsageError(
         "no terminal velocity: a binary collision starts from steady settling, which needs a drag "

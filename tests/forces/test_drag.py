@@ -143,5 +143,5 @@ def test_a_linear_drag_has_one_mobility():
 
 
 def test_laws_are_named():
-    with pytest.raises(RangeError, match="must be 'stokes' or 'schiller_naumann'"):
+    with pytest.raises(RangeError, match="must be 'stokes', 'schiller_naumann' or 'shape'"):
         StokesDrag(law="oseen")

@@ -22,12 +22,14 @@ from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release,
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
+from flocsim.forces.shape_drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
 from flocsim.plausibility.settling import (
+    held_mobility,
     largest_mobility,
     least_mobility,
     terminal_motion,
@@ -74,8 +76,19 @@ class Encounter:
             refuse_release(self.options, self.shapes, self.diffusion)
         if self.meeting != SETTLING:
             names = [type(force).__name__ for force in self.system.forces]
+            if follows_shape(self.system.forces):
+                # Strain moves a shape, too, around its place in the flow.
+                fluid = attrs.evolve(self.system.fluid, gradient=(0.0,) * 4)
+                system = attrs.evolve(self.system, fluid=fluid)
+                motions = [terminal_motion(system, body) for body in system.bodies]
             meetings.refuse_drift(motions[1][0] - motions[0][0], -self.drift[1], names)
             return
+        if follows_shape(self.system.forces):
+            raise UsageError(
+                'two bodies that meet by settling cannot have the drag law "shape": they fall '
+                "aslant and turn as they fall, so that no offset at the start says where they meet "
+                "and none has passed for good: give another law, or let a flow bring them together"
+            )
         if not math.hypot(*self.drift) > 0.0:
             raise UsageError(
                 "the two bodies settle at the same speed and never meet: give scene.pairs two "
@@ -217,7 +230,10 @@ class Encounter:
         if self.meeting == BROWNIAN:
             return 0.0
         if self.rate is not None:
-            return meetings.flow_load(self.meeting, self.rate, self.outer, self.yielding)
+            bodies: Sequence[Sequence[float]] = self.yielding
+            if follows_shape(self.system.forces):
+                bodies = [resisting(self.system, body) for body in self.system.bodies]
+            return meetings.flow_load(self.meeting, self.rate, self.outer, bodies)
         fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
         least = [
             least_mobility(self.system, body, fastest, mobility)
@@ -318,6 +334,15 @@ class Encounter:
         place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
         velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
         return work_of(self.scene, place, velocity)
+
+
+def resisting(system: System, body: Body) -> tuple[float, float, float]:
+    """(r_eq [m], least mobility [s/kg], torque [N m s] by a strain of 1/s) of a body whose drag
+    follows its shape."""
+    resistance, strain = resistance_matrices(body_resistance(body))
+    turning = max(resistance[2, 2], math.hypot(*strain[2]))
+    least = held_mobility(system, body)
+    return body.shape.equivalent_radius, least, system.fluid.viscosity * turning
 
 
 def make_encounter(

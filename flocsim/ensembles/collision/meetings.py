@@ -29,6 +29,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
+from flocsim.forces.shape_drag import follows_shape
 from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5
@@ -42,6 +43,9 @@ LEAST_START = 0.01
 
 ANGLES, FEW = 720, 7
 """Angles of a body at which its turning is looked at."""
+
+BETWEEN = np.array([0.4, 1.9, 3.3, 5.1])
+"""Angles [rad] at which it is looked at whether a strain's turning is all of it."""
 
 FULL_TURN = 4.0 * math.pi
 """Of a sphere in shear, times its rate."""
@@ -97,12 +101,17 @@ def flow_load(meeting: str, rate: float, outer: float, bodies: Sequence[Sequence
     """A bound of the pull on the bond of a doublet in a flow [N].
 
     The flow draws the centres apart by at most E d, d ≤ ``outer`` = R_i + R_j, E the strain: a
-    force of E d/(µ_i + µ_j). It turns a sphere against the doublet with a torque of at most
-    8πγ r³ E = 4/3 r² E/µ, which on the arm r pries as 4/3 r E/µ. ``bodies``: (r, µ) of both.
+    force of E d/(µ_i + µ_j). It turns a body against the doublet with a torque of at most T E, of a
+    sphere 8πγ r³ E = 4/3 r² E/µ, which on the arm r pries as T E/r. ``bodies``: (r, µ) of both, or
+    (r, µ, T) [m, s/kg, N m s].
     """
     strain = strain_of(meeting, rate)
-    together = sum(mobility for _, mobility in bodies)
-    return strain * (outer / together + max(4.0 / 3.0 * r / mobility for r, mobility in bodies))
+    together = sum(mobility for _, mobility, *_ in bodies)
+    pries = [
+        (turning[0] / r if turning else 4.0 / 3.0 * r / mobility)
+        for r, mobility, *turning in bodies
+    ]
+    return strain * (outer / together + max(pries))
 
 
 def turn_in_flow(
@@ -184,17 +193,23 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
     """Spins [rad/s] at which the body forces on a lone body put no torque on it, at even angles.
 
     Of all body forces together, so that a force under which shapes turn unevenly has its say.
-    ANGLES of them, or a FEW where these are alike.
+    At ANGLES of them, or a FEW where these are alike; from a FEW to all where a strain turns it,
+    by a + b cos 2θ + c sin 2θ. Where the drag is of shapes, turning and going along are one: at the
+    velocity at which there is no force, either.
     """
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     scale = max(map(abs, system.fluid.gradient), default=0.0) or 1.0
-    lone = lone_view(body, system.fluid, 0.0, 0.0)
+    lone = lone_view(system, body)
+    free = follows_shape(system.forces)
 
-    def rates(count: int) -> np.ndarray:
-        found = np.zeros(count)
-        for place, angle in enumerate((2.0 * np.pi * np.arange(count) / count).tolist()):
+    def rates(angles: np.ndarray) -> np.ndarray:
+        found = np.zeros(len(angles))
+        for place, angle in enumerate(angles.tolist()):
             view = lone._replace(angle=angle)
+            if free:
+                found[place] = free_spin(force, view, pieces.parameters, scale)
+                continue
             less, more = (
                 force(view._replace(spin=spin), pieces.parameters)[2] for spin in (-scale, scale)
             )
@@ -202,8 +217,31 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
                 found[place] = scale * (less + more) / (less - more)
         return found
 
-    few = rates(FEW)
-    return few if is_even(few) else rates(ANGLES)
+    few_angles, angles = (2.0 * np.pi * np.arange(count) / count for count in (FEW, ANGLES))
+    few = rates(few_angles)
+    if is_even(few):
+        return few
+    waves, *_ = np.linalg.lstsq(strain_waves(few_angles), few)
+    left = strain_waves(BETWEEN) @ waves - rates(BETWEEN)
+    if np.abs(left).max() <= 1e-9 * np.abs(few).max():
+        return strain_waves(angles) @ waves
+    return rates(angles)
+
+
+def strain_waves(angles: np.ndarray) -> np.ndarray:
+    """1, cos 2θ and sin 2θ (k, 3)."""
+    return np.column_stack([np.ones_like(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
+
+
+def free_spin(force: Callable, view: Any, parameters: Sequence[float], scale: float) -> float:
+    """The spin [rad/s] of a body that no force, and no torque, of linear laws is left on."""
+    steps = np.diag([scale * view.radius, scale * view.radius, scale])
+    still = np.array(force(view, parameters))
+    changes = [
+        np.array(force(view._replace(vx=vx, vy=vy, spin=spin), parameters)) - still
+        for vx, vy, spin in steps.tolist()
+    ]
+    return scale * float(np.linalg.solve(np.transpose(changes), -still)[2])
 
 
 def is_even(rates: np.ndarray) -> bool:

@@ -40,7 +40,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields", "constants.py", "hooks.py", "laws.py",
     "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler", "bonds",
-    "forces", "integrators", "geometry/shapes", "geometry/contact",
+    "hydrodynamics", "forces", "integrators", "geometry/shapes", "geometry/contact",
     "geometry/surfaces", "io/results/schema.py",
     "io/results/events.py",
     "ensembles/collision", "ensembles/study.py", "ensembles/kernels",

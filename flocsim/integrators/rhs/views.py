@@ -20,6 +20,12 @@ def body_view(scene, work, time, state, body):
         known[body, at.EQUIVALENT_RADIUS], known[body, at.ELONGATION], known[body, at.LONG_AXIS],
         work.bodies[body, at.KICK_X], work.bodies[body, at.KICK_X + 1],
         work.bodies[body, at.KICK_X + 2],
+        known[body, at.RESISTANCE], known[body, at.RESISTANCE + 1],
+        known[body, at.RESISTANCE + 2], known[body, at.RESISTANCE + 3],
+        known[body, at.RESISTANCE + 4], known[body, at.RESISTANCE + 5],
+        known[body, at.RESISTANCE + 6], known[body, at.RESISTANCE + 7],
+        known[body, at.RESISTANCE + 8], known[body, at.RESISTANCE + 9],
+        known[body, at.RESISTANCE + 10], known[body, at.RESISTANCE + 11],
     )  # fmt: skip
 
 

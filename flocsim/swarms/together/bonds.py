@@ -33,12 +33,13 @@ from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
 from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
+from flocsim.forces.shape_drag import follows_shape
 from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
 from flocsim.laws import compiled_calls
-from flocsim.plausibility.settling import least_mobility, terminal_motion
+from flocsim.plausibility.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Neighbours
 
@@ -129,7 +130,7 @@ class BondGauge:
         )
         self.free = np.array([not body.fixed for body in swarm.bodies])
         self.work = self.work_for(64, 1)
-        self.settling, self.resistance = alone(swarm)
+        self.settling, self.resistance, self.aslant = alone(swarm)
         self.shear = math.hypot(*swarm.fluid.gradient)
         self.kicks = max((each.energy for each in thermal_in(swarm.forces)), default=0.0)
 
@@ -173,7 +174,8 @@ class BondGauge:
         two = (np.bincount(labels)[label] == 2) & ~on_wall[later] & ~on_wall[earlier]
         against = self.settling[later] - self.settling[earlier]
         speed = np.hypot(*against.T)
-        known = two & (speed > 0.0) & (self.shear == 0.0)
+        known = two & (speed > 0.0) & (self.shear == 0.0) & (self.aslant[later] == 0.0)
+        known &= self.aslant[earlier] == 0.0
         toward = np.where(known, 1.0 / np.where(known, speed, 1.0), 0.0)[:, None] * against
         lever = np.where(two, 0.0, extent[label])
         return np.column_stack([load[label], drift[label], toward, lever, two, held.gap])
@@ -199,6 +201,10 @@ class BondGauge:
         extent = np.zeros(count)
         np.maximum.at(extent, labels, np.hypot(*(places - middle[labels]).T) + reach)
         slip = np.hypot(*(self.settling - mean[labels]).T) + self.shear * extent[labels]
+        # By how much those of other angles may differ: of the body, and of the mean.
+        widest = np.zeros(count)
+        np.maximum.at(widest, labels, self.aslant)
+        slip += self.aslant + np.where(rests, 0.0, widest)[labels]
         # What settles against nothing but itself pulls as much up as down.
         load = summed(self.resistance * slip) * np.where(rests, 1.0, 0.5)
         # The fastest two: on a wall they may go the same way, else against each other.
@@ -212,24 +218,32 @@ class BondGauge:
         return load, np.maximum(drift, STILL * fastest), 2.0 * extent
 
 
-def alone(swarm: Any) -> tuple[np.ndarray, np.ndarray]:
-    """(velocity (n, 2) [m/s], resistance (n,) [kg/s]) at which every body settles alone; nothing
-    where no drag lets it."""
-    known: dict[tuple, tuple[np.ndarray, float]] = {}
+def alone(swarm: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(velocity (n, 2) [m/s], resistance (n,) [kg/s], aslant (n,) [m/s]) at which every body
+    settles alone; nothing where no drag lets it. ``aslant``: by how much the velocity may differ at
+    another angle, where the drag is of shapes."""
+    known: dict[tuple, tuple[np.ndarray, float, float]] = {}
     rows = []
     for body in swarm.bodies:
         key = id(body.shape), body.surface_density, body.density, body.depth, body.fixed, body.angle
         if key not in known:
             known[key] = settling(swarm, body)
         rows.append(known[key])
-    return np.array([each[0] for each in rows]), np.array([each[1] for each in rows])
+    velocity, resistance, aslant = zip(*rows, strict=True)
+    return np.array(velocity), np.array(resistance), np.array(aslant)
 
 
 def settling(swarm, body):
-    """(velocity, resistance) of a body alone."""
+    """(velocity, resistance, aslant) of a body alone."""
     try:
         velocity, mobility = terminal_motion(swarm.system, body)
     except UsageError:
-        return np.zeros(2), 0.0
+        return np.zeros(2), 0.0, 0.0
+    against = velocity - swarm.fluid.velocity
     least = least_mobility(swarm.system, body, math.hypot(*velocity), mobility)
-    return velocity, 1.0 / least if least > 0.0 else 0.0
+    aslant = 0.0
+    if follows_shape(swarm.system.forces) and not body.fixed:
+        smallest, largest = free_mobilities(swarm.system, body)
+        # Velocities of one force at all angles lie on a circle of this diameter.
+        aslant = (largest / smallest - 1.0) * math.hypot(*against)
+    return velocity, 1.0 / least if least > 0.0 else 0.0, aslant

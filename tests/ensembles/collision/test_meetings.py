@@ -13,7 +13,9 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.forces import BodyForce, Gravity, StokesDrag, VanDerWaals
+from flocsim.forces.shape_drag import body_resistance, resistance_matrices
 from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.system import System
 from tests.helpers.kernel_study import kernel_config
@@ -164,3 +166,22 @@ def test_pairs_of_one_size_meet_in_a_binary_study_in_shear(tmp_path):
     config = load_config(path)
     row = Study(config).run(0, 1, 0.5, 0)
     assert OUTCOMES[row["outcome"]] in "AC"
+
+
+def test_shapes_turn_as_their_resistance_says_and_may_be_pried_harder():
+    corners = 1e-6 * np.array([(0, 0), (8, 0), (8, 1), (1, 1), (1, 5), (0, 5)], dtype=float)
+    body = Body(SpheroPolygon(corners, 2e-7), surface_density=2.0)
+    fluid = Fluid(gradient=(1.0, 8.0, 2.0, -1.0))
+    system = System([body], [StokesDrag(law="shape")], fluid=fluid)
+    rates = meetings.turning_rates(system, body)
+    resistance, strain = resistance_matrices(body_resistance(body))
+    by_strain = np.linalg.solve(resistance, strain)[2]
+    twice = 2.0 * (2.0 * np.pi * np.arange(len(rates)) / len(rates))
+    e_xx, e_xy = np.cos(twice) + 5.0 * np.sin(twice), 5.0 * np.cos(twice) - np.sin(twice)
+    wanted = -3.0 + by_strain[0] * e_xx + by_strain[1] * e_xy
+    assert rates == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+    sphere = (1e-5, 1e7)
+    shape = (*sphere, 2.0 * 4.0 / 3.0 * 1e-10 / 1e7)
+    loads = [meetings.flow_load("shear", 2.0, 2e-5, [sphere, each]) for each in (sphere, shape)]
+    far = 2e-5 / 2e7
+    assert loads[1] - far == pytest.approx(2.0 * (loads[0] - far))

@@ -64,7 +64,7 @@ def gauge_of(bodies):
     swarm = Swarm(bodies, [*SETTLING, Contact()], fluid=WATER)
     gauge = types.SimpleNamespace()
     gauge.bodies, gauge.shear = swarm.bodies, 0.0
-    gauge.settling, gauge.resistance = alone(swarm)
+    gauge.settling, gauge.resistance, gauge.aslant = alone(swarm)
     return gauge
 
 
