@@ -32,7 +32,6 @@ NOT_PHYSICS = {
     "io/trajectory.py": "writes motions",
     "io/plots/": "draws",
     "io/exchange/": "writes motions for other programs",
-    "io/results/run_words.py": "text for people",
     "io/results/kernel_group.py": "rates, which follow from rows",
     "io/groups.py": "how arrays are stored",
     "io/labelled.py": "how rates are named",
