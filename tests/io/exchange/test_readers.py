@@ -101,7 +101,8 @@ def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes):
             ids = [found.GetId(k) for k in range(found.GetNumberOfIds())]
             expected = placed(ring, position[step : step + 1, body])[0]
             np.testing.assert_allclose(points[ids, :2], expected, rtol=1e-12, atol=1e-18)
-            assert bodies[cell] == body and holes[cell] == (ring is not rings[body][0])
+            # Parts that touch in a point have one outer ring or several, as rounding has it.
+            assert bodies[cell] == body and holes[cell] == (area_of(ring) < 0.0)
         assert not points[:, 2].any()
 
 

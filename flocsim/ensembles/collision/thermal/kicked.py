@@ -78,7 +78,9 @@ def return_bound(scene, work, observed, time):
         return 1.0
     half = 0.5 * (along - outer)
     mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
-    drift += mobility * min(repulsion_at(scene, time, BODY_J, BODY_I, outer + half, half), 0.0)
+    drift += mobility * min(
+        repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half), 0.0
+    )
     relaxation = max(
         scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
         scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
