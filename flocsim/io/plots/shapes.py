@@ -13,6 +13,7 @@ from flocsim.io.plots.style import (
     Figure,
     house_style,
     new_figure,
+    set_log_axis,
     set_vertex_axis,
     vertex_positions,
 )
@@ -131,6 +132,8 @@ def draw_dimension(axes, areas, perimeters):
         label = f"$D_{{f2}}$ = {slope.value:.2f} ± {slope.error:.2f}"
         axes.plot(ends, middle * ends ** (0.5 * slope.value), color="#D55E00", label=label)
     axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
+    set_log_axis(axes.xaxis)
+    set_log_axis(axes.yaxis)
     axes.legend()
 
 

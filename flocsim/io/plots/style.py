@@ -189,6 +189,15 @@ def set_probability_axis(axes):
     axes.grid(axis="y", color="0.9", linewidth=0.6)
 
 
+def set_log_axis(axis):
+    """A logarithmic axis with plain numbers at 1, 2 and 5 of each decade."""
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
 def dodge(number, count):
     """Sideways shift, as a share of a slot, that keeps the bars of ``count`` lines apart."""
     step = min(0.1, 0.6 / max(count - 1, 1))
