@@ -58,6 +58,14 @@ def resisted(body, c, s, vx, vy, spin):
     )
 
 
+def resisted_in(body, flow):
+    """(cosine and sine of its angle, the same of its motion in a flow)."""
+    u, v, turning = flow_at(flow, body.x, body.y)
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+    return c, s, x, y, turn
+
+
 def strained_load(body, c, s, flow):
     """Γ (E_xx, E_xy) in that frame: what a flow's strain puts on the shape, over the viscosity."""
     e_xx, e_xy = strain_of(flow)
@@ -169,17 +177,13 @@ class StokesDrag(BodyForce):
     @staticmethod
     def shape(body, viscosity, flow):
         """Force and torque on the shape in a flow without strain."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        c, s = math.cos(body.angle), math.sin(body.angle)
-        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        c, s, x, y, turn = resisted_in(body, flow)
         return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
 
     @staticmethod
     def shape_strained(body, viscosity, flow):
         """Force and torque on the shape in the flow."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        c, s = math.cos(body.angle), math.sin(body.angle)
-        x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+        c, s, x, y, turn = resisted_in(body, flow)
         more_x, more_y, more = strained_load(body, c, s, flow)
         x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
         return c * x - s * y, s * x + c * y, turn

@@ -85,22 +85,24 @@ def distance_to(x, y, piece):
     return math.sqrt(dx * dx + dy * dy) - piece.inward
 
 
+def beside_end(end, middle, half, middle_2, half_2):
+    """(squared distance, x, y of an end of a core, x, y on the other one) where that is nearest."""
+    x, y = middle[0] + end * half[0], middle[1] + end * half[1]
+    place = place_beside(x, y, middle_2, half_2)
+    x_2, y_2 = middle_2[0] + place * half_2[0], middle_2[1] + place * half_2[1]
+    return (x - x_2) * (x - x_2) + (y - y_2) * (y - y_2), x, y, x_2, y_2
+
+
 def between_cores(one, other):
     """(squared distance, x, y on the one's core, x, y on the other's) where two are nearest."""
     (middle, half), (middle_2, half_2) = core_of(one), core_of(other)
     least = math.inf
     x, y, x_2, y_2 = 0.0, 0.0, 0.0, 0.0
     for end in (-1.0, 1.0):
-        px, py = middle[0] + end * half[0], middle[1] + end * half[1]
-        place = place_beside(px, py, middle_2, half_2)
-        qx, qy = middle_2[0] + place * half_2[0], middle_2[1] + place * half_2[1]
-        squared = (px - qx) * (px - qx) + (py - qy) * (py - qy)
+        squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
         if squared < least:
             least, x, y, x_2, y_2 = squared, px, py, qx, qy
-        qx, qy = middle_2[0] + end * half_2[0], middle_2[1] + end * half_2[1]
-        place = place_beside(qx, qy, middle, half)
-        px, py = middle[0] + place * half[0], middle[1] + place * half[1]
-        squared = (px - qx) * (px - qx) + (py - qy) * (py - qy)
+        squared, qx, qy, px, py = beside_end(end, middle_2, half_2, middle, half)
         if squared < least:
             least, x, y, x_2, y_2 = squared, px, py, qx, qy
     return least, x, y, x_2, y_2

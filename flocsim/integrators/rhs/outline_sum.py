@@ -205,11 +205,8 @@ def depth_of(scene, a, b):
     """The depth along which two bodies act on each other [m]."""
     if scene.outlines[2] > 0.0:
         return scene.outlines[2]
-    return (
-        4.0
-        / 3.0
-        * min(scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS])
-    )
+    radius_a, radius_b = radii_of(scene, a, b)
+    return 4.0 / 3.0 * min(radius_a, radius_b)
 
 
 @apart
@@ -226,10 +223,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     lens = max(LENS * math.sqrt((least + inset) * floor), steady)
     list_near(scene, work, a, b, pose, lens)
     depth = depth_of(scene, a, b)
-    radius_a, radius_b = (
-        scene.bodies[a, at.EQUIVALENT_RADIUS],
-        scene.bodies[b, at.EQUIVALENT_RADIUS],
-    )
+    radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
         time, least, least, depth, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
