@@ -1,16 +1,22 @@
 """Body and Fluid: what a user builds a scene of."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.arrays import RESISTANCE_COLUMNS, Scene
-from flocsim.constants import WATER_DENSITY, WATER_VISCOSITY
+from flocsim import water
+from flocsim.constants import (
+    ROOM_TEMPERATURE,
+    WATER_DENSITY,
+    WATER_PERMITTIVITY,
+    WATER_VISCOSITY,
+)
 from flocsim.errors import RangeError, UsageError
-from flocsim.fields import choice, flag, in_unit, quantity, word_or_quantity
+from flocsim.fields import choice, flag, in_unit, is_number, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.pieces import pieces_of_bodies
@@ -66,10 +72,35 @@ class Fluid:
 
     u(x) = velocity + gradient · x, Ω = ½ (∂u_y/∂x − ∂u_x/∂y); still by default.
     ``gradient`` = (∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y) [1/s].
+
+    With a ``temperature``, a ``salinity`` or an ``ionic_strength``, what is not given of viscosity
+    and density is that of such water (flocsim.water), and so are ``permittivity`` and
+    ``debye_length``. Of a salt that is given by its ionic strength, viscosity and density are those
+    of fresh water: 0.1 mol/l of NaCl adds 0.9 and 0.4 % to them.
     """
 
-    viscosity: float = quantity("Pa s", above=0.0, default=WATER_VISCOSITY, help="γ")
-    density: float = quantity("kg/m^3", at_least=0.0, default=WATER_DENSITY, help="ρ_f")
+    temperature: float | None = quantity(
+        "K", at_least=water.ZERO_CELSIUS, at_most=water.ZERO_CELSIUS + 40.0, default=None,
+        help='of the water, "15 degC"; 25 °C where only its salt is given', kw_only=True,
+    )  # fmt: skip
+    salinity: float | None = quantity(
+        "g/kg", at_least=0.0, at_most=42.0, default=None,
+        help="of sea water, or of such with fresh water in it; the ocean has 35 g/kg", kw_only=True,
+    )  # fmt: skip
+    ionic_strength: float | None = quantity(
+        "mol/m^3", above=0.0, at_most=1000.0, default=None,
+        help="I of a salt other than that of the sea, instead of `salinity`", kw_only=True,
+    )  # fmt: skip
+    viscosity: float = quantity(
+        "Pa s", above=0.0, help="γ",
+        default=attrs.Factory(lambda self: self.of_water(water.viscosity, WATER_VISCOSITY), True),
+        shown=f"{WATER_VISCOSITY:g}, or that of the water",
+    )  # fmt: skip
+    density: float = quantity(
+        "kg/m^3", at_least=0.0, help="ρ_f",
+        default=attrs.Factory(lambda self: self.of_water(water.density, WATER_DENSITY), True),
+        shown=f"{WATER_DENSITY:g}, or that of the water",
+    )  # fmt: skip
     buoyancy: bool = flag(default=False, help="subtract the displaced fluid's weight")
     velocity: tuple[float, float] = attrs.field(
         default=(0.0, 0.0),
@@ -85,6 +116,63 @@ class Fluid:
             "help": "of the background flow: ∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y",
         },
     )
+
+    def __attrs_post_init__(self) -> None:
+        if self.salinity is not None and self.ionic_strength is not None:
+            raise UsageError(
+                "salinity gives the ionic strength, and ionic_strength is given too: remove one of "
+                "them"
+            )
+
+    def of_water(self, law: Callable[[float, float], float], otherwise: float) -> float:
+        """A law of flocsim.water of the temperature and the salinity; ``otherwise`` where the
+        water is not described, or not by numbers, which validators then say."""
+        given = [
+            each for each in (self.temperature, self.salinity, self.ionic_strength)
+            if each is not None
+        ]  # fmt: skip
+        if not given or not all(map(is_number, given)):
+            return otherwise
+        return law(self.temperature or ROOM_TEMPERATURE, self.salinity or 0.0)
+
+    @property
+    def ions(self) -> float | None:
+        """The ionic strength [mol/m³]; None where no salt is given."""
+        if self.salinity is None:
+            return self.ionic_strength
+        return self.of_water(water.ionic_strength, 0.0)
+
+    @property
+    def permittivity(self) -> float:
+        """ε_r [-]."""
+        salt = self.ionic_strength or water.sea_normality(self.salinity or 0.0)
+        return self.of_water(lambda warmth, _: water.permittivity(warmth, salt), WATER_PERMITTIVITY)
+
+    @property
+    def debye_length(self) -> float | None:
+        """1/κ [m]; None where no salt is given, or none is in it."""
+        if not self.ions:
+            return None
+        warmth = self.temperature or ROOM_TEMPERATURE
+        return water.debye_length(warmth, self.ions, self.permittivity)
+
+    @property
+    def words(self) -> str:
+        """What water it is, and what follows from that; "" where nothing is said of it."""
+        warmth = self.temperature or ROOM_TEMPERATURE
+        said = [f"{warmth - water.ZERO_CELSIUS:.4g} degC"]
+        if self.salinity is not None:
+            said.append(f"{self.salinity:g} g/kg of salt")
+        if self.ionic_strength is not None:
+            said.append(f"an ionic strength of {1e-3 * self.ionic_strength:g} mol/l")
+        if len(said) == 1 and self.temperature is None:
+            return ""
+        debye = self.debye_length
+        return (
+            f"water of {' and '.join(said)}: viscosity {1e3 * self.viscosity:.4g} mPa s, density "
+            f"{self.density:.5g} kg/m^3, permittivity {self.permittivity:.4g}"
+            + (f", Debye length {1e9 * debye:.3g} nm" if debye else "")
+        )
 
     @property
     def flow(self) -> tuple[float, ...]:

@@ -6,6 +6,15 @@ VACUUM_PERMITTIVITY = 8.854e-12
 BOLTZMANN = 1.380649e-23
 """k_B [J/K], exact by definition."""
 
+ELEMENTARY_CHARGE = 1.602176634e-19
+"""e [C], exact by definition."""
+
+AVOGADRO = 6.02214076e23
+"""N_A [1/mol], exact by definition."""
+
+ROOM_TEMPERATURE = 298.15
+"""25 °C [K], where nothing else is said."""
+
 STANDARD_GRAVITY = 9.81
 """g [m/s²], the value that MODEL's reference settling speeds were computed with."""
 

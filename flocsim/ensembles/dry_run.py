@@ -275,6 +275,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         f"seed {config.seed}, {ranks} rank(s), results in {config.output.file}",
         f"  vertices {list(shapes.vertices)}, {way_words(scene)}",
         f"  flocs: {flocs}",
+        *([f"  {words}"] if (words := config.fluid.words) else []),
         f"  integrator: {chosen_words(config) or f'{config.integrator.label}, {accuracy}'}",
         f"  run again: {checked_words(config)}",
         "collisions:",

@@ -22,7 +22,9 @@ KINDS = {
     "rad/s": ("an angular velocity", "1 rad/s"),
     "N": ("a force", "1 pN"),
     "N m": ("a torque", "1e-18 N m"),
-    "K": ("a temperature", "298.15 K"),
+    "K": ("a temperature", "25 degC"),
+    "g/kg": ("a salinity", "35 g/kg"),
+    "mol/m^3": ("a concentration", "0.1 mol/l"),
     "1/m": ("a reciprocal length", "1.02 1/um"),
 }
 """What a quantity of a unit is called, and how one is written."""
@@ -40,6 +42,9 @@ SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶�
 
 PIXELS = ("px", "pixel", "dot", "pel", "picture_element", "css_pixel")
 """What pint takes for a length, of screens and paper."""
+
+CELSIUS = ("degc", "deg c", "celsius")
+"""Degrees that do not count from zero, as `read_quantity` has them in lower case ("°" is "deg")."""
 
 LONGEST = 100
 """Letters of a number and its unit."""
@@ -59,7 +64,8 @@ def read_quantity(text: str, unit: str) -> float:
 
     The conversion is decimal: ``read_quantity("16.41 um", "m") == 16.41e-6``. Units multiply by a
     space, "*" or "·", divide by "/", and have exponents: "mPa s", "kg/m^3", "kg m-3", "m²",
-    "Pa^0.5", "m^(1/2)". An energy may be "4 kT@293K": the temperature is part of the unit.
+    "Pa^0.5", "m^(1/2)". An energy may be "4 kT@293K": the temperature is part of the unit. A
+    temperature may be "25 degC".
     ValueError, with the reason, for text that is no quantity or has another dimension.
     """
     if len(text) > LONGEST:
@@ -72,6 +78,8 @@ def read_quantity(text: str, unit: str) -> float:
         raise ValueError("a number in quotes needs a unit")
     with localcontext() as context:
         context.prec = DIGITS
+        if unit == "K" and written.lower() in CELSIUS:
+            return float(Decimal(match[1]) + Decimal("273.15"))
         return float(Decimal(match[1]) * factor(written, unit))
 
 
@@ -135,7 +143,7 @@ def unit_of(name):
     except (pint.PintError, ArithmeticError, AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"unknown unit {name!r}") from error
     if shifted:
-        raise ValueError(f"{name!r} does not count from zero: give kelvins")
+        raise ValueError(f"{name!r} does not count from zero: give kelvins, or degC")
     return unit
 
 

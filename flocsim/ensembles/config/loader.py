@@ -21,6 +21,7 @@ from flocsim.ensembles.config.schema import (
     elsewhere,
     implied,
     keys_of,
+    of_water,
     scene_class,
 )
 from flocsim.ensembles.config.sources import Sources
@@ -106,7 +107,7 @@ class Reader:
         parts = self.values(STUDY_KEYS, given, ())
         for name, table_class in (TABLES | {"scene": scene_class(table)}).items():
             parts[name] = self.table(name, table_class, table.get(name, {}))
-        forces = self.forces(table.get("forces", {}))
+        forces = self.forces(self.in_water(table.get("forces", {}), parts["fluid"]))
         parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
         if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
             for place, text in contradictions(parts):
@@ -183,6 +184,18 @@ class Reader:
             )
             self.problems.note(("shapes", "file"), text)
         return self.sources.library(path)
+
+    def in_water(self, table, fluid):
+        """The tables of the forces with what follows from the water; noted where it is given."""
+        found = table if isinstance(table, dict) else {}
+        for (name, key), value in (of_water(fluid) if fluid else {}).items():
+            if not isinstance(found.get(name), dict):
+                continue
+            if key in found[name]:
+                text = f"follows from the water of [fluid], which gives {value:.4g}: remove it"
+                self.problems.note(("forces", name, key), text)
+            found = found | {name: {key: value} | found[name]}
+        return found or table
 
     def forces(self, table):
         """{name: force} in the fixed order, then the user's own as in the file."""

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from flocsim.ensembles.config.schema import excluded_by
+from flocsim.ensembles.config.schema import excluded_by, without_following
 from flocsim.ensembles.config.text_limits import MOST_PARTS, text_problem
 from flocsim.ensembles.config.toml_text import DEEPEST_TABLE
 from flocsim.errors import ConfigError
@@ -13,12 +13,14 @@ from flocsim.errors import ConfigError
 def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """``below`` with everything that ``above`` gives put over it; tables are merged.
 
-    A key replaces those below that it excludes (`schema.excluded_by`). A value None in ``above``
+    A key replaces those below that it excludes (`schema.excluded_by`), or that follow from it
+    (`schema.without_following`). A value None in ``above``
     counts as not given. A table over ``false`` starts afresh.
     """
     given = {key: value for key, value in above.items() if value is not None}
     gone = excluded_by(".".join(path), given.keys())
     merged = {key: value for key, value in below.items() if key not in gone}
+    merged = merged if path else without_following(merged, given)
     for key, value in given.items():
         if isinstance(value, dict) and len(path) < DEEPEST_TABLE:
             under = merged.get(key)

@@ -508,10 +508,23 @@ ALTERNATIVES: dict[str, tuple[set[str], ...]] = {
     "scene": ({"types"}, {"pairs"}),
     "shapes": ({"source"}, {"class"}),
     "bodies": ({"surface_density"}, {"density", "depth"}),
+    "fluid": ({"salinity"}, {"ionic_strength"}),
     "zone": ({"root"}, {"distance"}, {"centre"}),
     "integrator": ({"name"}, {"class"}, {"accuracy"}),
 }
 """Table → sets of keys that exclude each other: one of them replaces the others from below."""
+
+WATER = ("temperature", "salinity", "ionic_strength")
+"""The keys of [fluid] that say what water it is."""
+
+FOLLOWING: dict[tuple[str, ...], Collection[str]] = {
+    ("fluid", "viscosity"): WATER[:2],
+    ("fluid", "density"): WATER[:2],
+    ("forces", "double_layer", "permittivity"): WATER,
+    ("forces", "double_layer", "debye_length"): WATER[1:],
+    ("forces", "thermal", "temperature"): WATER[:1],
+}
+"""Place of a key → the keys of [fluid] that it follows from: these replace it from below."""
 
 INSTEAD_OF = {"integrator": {"accuracy": {"tolerance", "step"}}}
 """Table → key → further keys that it excludes, and that go with one another."""
@@ -526,6 +539,39 @@ def excluded_by(table: str, given: Collection[str]) -> set[str]:
         found |= others if key in given else set()
         found |= {key} if others & set(given) else set()
     return found
+
+
+def without_following(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """A config's nested dicts without what follows from the water that those above them tell."""
+    left: dict[str, Any] = dict(below)
+    fluid = above.get("fluid")
+    told = {key for key in WATER if isinstance(fluid, Mapping) and fluid.get(key) is not None}
+    for (*tables, key), sources in FOLLOWING.items() if told else ():
+        table = left
+        for name in tables:
+            inner = table.get(name)
+            if not isinstance(inner, Mapping):
+                break
+            table[name] = table = dict(inner)
+        else:
+            if told & set(sources):
+                table.pop(key, None)
+    return left
+
+
+def of_water(fluid: Fluid) -> dict[tuple[str, str], float]:
+    """(force, key) → value that follows from the water: each holds where its force is."""
+    values = {
+        ("double_layer", "permittivity"): fluid.permittivity,
+        ("double_layer", "debye_length"): fluid.debye_length,
+        ("thermal", "temperature"): fluid.temperature,
+    }
+    told = {key for key in WATER if getattr(fluid, key) is not None}
+    return {
+        place: value
+        for place, value in values.items()
+        if value is not None and told & set(FOLLOWING["forces", *place])
+    }
 
 
 def implied(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -44,6 +44,7 @@ def dry_run(config: Config, ranks: int) -> str:
         f"  {scene.duration:g} s{speed}",
         f"  {moments} snapshots, one in {scene.interval:g} s; a state to go on from every "
         f"{duration(scene.checkpoint)}; results file about {size / 1e6:.3g} MB",
+        *([f"  {words}"] if (words := config.fluid.words) else []),
         f"  integrator: {config.integrator.label}, tolerance {method.tolerance:g} m",
         "forces:",
         *(f"  {line}" for line in force_lines(pair)),
