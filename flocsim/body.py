@@ -7,8 +7,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import RESISTANCE_COLUMNS, Scene
 from flocsim import water
+from flocsim.arrays import RESISTANCE_COLUMNS, Scene
 from flocsim.constants import (
     ROOM_TEMPERATURE,
     WATER_DENSITY,
@@ -92,14 +92,14 @@ class Fluid:
         help="I of a salt other than that of the sea, instead of `salinity`", kw_only=True,
     )  # fmt: skip
     viscosity: float = quantity(
-        "Pa s", above=0.0, help="γ",
+        "Pa s", above=0.0, help="γ; by default that of the water, where it is told",
         default=attrs.Factory(lambda self: self.of_water(water.viscosity, WATER_VISCOSITY), True),
-        shown=f"{WATER_VISCOSITY:g}, or that of the water",
+        shown=f"{WATER_VISCOSITY}",
     )  # fmt: skip
     density: float = quantity(
-        "kg/m^3", at_least=0.0, help="ρ_f",
+        "kg/m^3", at_least=0.0, help="ρ_f; by default that of the water, where it is told",
         default=attrs.Factory(lambda self: self.of_water(water.density, WATER_DENSITY), True),
-        shown=f"{WATER_DENSITY:g}, or that of the water",
+        shown=f"{WATER_DENSITY}",
     )  # fmt: skip
     buoyancy: bool = flag(default=False, help="subtract the displaced fluid's weight")
     velocity: tuple[float, float] = attrs.field(

@@ -18,6 +18,7 @@ from flocsim.explain import explain
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
+from flocsim.forces.double_layer import refuse_unlike
 from flocsim.forces.shape_drag import resistance_numbers
 from flocsim.forces.smoothing import smoothing_of
 from flocsim.forces.thermal import key_of, kicks_of
@@ -125,6 +126,7 @@ class System:
     pieces: Pieces = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
+        refuse_unlike(self.forces, len(self.bodies))
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
 
     def __repr__(self) -> str:

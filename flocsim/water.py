@@ -4,7 +4,7 @@ one atmosphere.
 Density: Millero and Poisson (1981), Deep-Sea Research 28A, 625 (the standard EOS-80), ± 0.004
 kg/m³. Viscosity: Sharqawy, Lienhard and Zubair (2010), Desalination and Water Treatment 16, 354,
 eqs. 22 and 23, ± 1.5 %. Permittivity: Malmberg and Maryott (1956), J. Res. Natl. Bur. Stand. 56, 1,
-times the share that a salt leaves of it: Stogryn (1971), IEEE Trans. Microwave Theory Tech. 19, 733.
+times what a salt leaves of it: Stogryn (1971), IEEE Trans. Microwave Theory Tech. 19, 733.
 Ionic strength of sea water: Millero (1982), Ocean Sci. Eng. 7, 403.
 """
 

@@ -32,7 +32,7 @@ ROWS = [
     ["body"],
     ["geometry", "hydrodynamics", "laws"],
     ["arrays", "hooks"],
-    ["compiler", "fields", "interruption"],
+    ["compiler", "fields", "interruption", "water"],
     ["constants", "errors", "limits"],
 ]
 

@@ -37,7 +37,7 @@ def test_viscosity_of_sea_water():
 def test_permittivity_of_fresh_and_salt_water():
     assert water.permittivity(ZERO + 25) == pytest.approx(78.30, abs=0.01)
     assert water.permittivity(ZERO) == pytest.approx(87.74, abs=0.01)
-    # A 1 mol/l solution of NaCl has 61 to 63: Hasted, Ritson and Collie (1948), J. Chem. Phys. 16, 1.
+    # NaCl at 1 mol/l: 61 to 63, Hasted, Ritson and Collie (1948), J. Chem. Phys. 16, 1.
     assert 61 < water.permittivity(ZERO + 25, 1000.0) < 63
 
 

@@ -124,6 +124,32 @@ def quantity(
     return checked_field(check, allowed, default, unit=unit, help=help, **metadata)
 
 
+def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
+    """A field that takes a quantity of both bodies of a pair, or a list of one for each."""
+
+    def listed(value: Any) -> bool:
+        return isinstance(value, list | tuple)
+
+    def read(value: Any) -> Any:
+        try:
+            if not listed(value):
+                return in_unit(value, unit, "")
+            return tuple(in_unit(each, unit, "") for each in value)
+        except RangeError:
+            return value
+
+    def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
+        each = value if listed(value) else (value,)
+        for one in each:
+            in_unit(one, unit, attribute.name)
+        if len(each) not in ((2,) if listed(value) else (1,)) or not all(map(is_number, each)):
+            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
+
+    allowed = "a finite number, or a list of two"
+    metadata = {"allowed": allowed, "unit": unit, "of_each": True, "help": help}
+    return attrs.field(default=default, converter=read, validator=validate, metadata=metadata)
+
+
 def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **metadata: Any) -> Any:
     """A field that takes one of the given words."""
     metadata = {"choices": options, "help": help, **metadata}

@@ -30,6 +30,8 @@ class Usual:
 
         A value that is no number has no range. The sign does not count.
         """
+        if isinstance(value, tuple):
+            return next(filter(None, (self.doubt(place, each) for each in value)), "")
         if isinstance(value, str | bool) or not isinstance(value, int | float):
             return ""
         if self.low <= abs(value) <= self.high:

@@ -18,18 +18,19 @@ LARGEST_RATIO = 4.0 / math.e**2
 
 
 def attraction_ratio(
-    hamaker: float, potential: float, debye_length: float, permittivity: float
+    hamaker: float, potential: float | tuple[float, float], debye_length: float, permittivity: float
 ) -> float:
-    """S = H_A κ/(24π ε0 ε_r φ²) [-]; inf without a potential."""
+    """S = H_A κ/(24π ε0 ε_r φ_i φ_j) [-]; inf without repulsion."""
     layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
-    if layer.strength == 0.0:
+    if layer.strength <= 0.0:
         return math.inf
     return hamaker / (6.0 * layer.strength * debye_length**2)
 
 
 def neutral_distance(
-    hamaker: float, potential: float, debye_length: float, permittivity: float, root: str
-) -> float:
+    hamaker: float, potential: float | tuple[float, float], debye_length: float,
+    permittivity: float, root: str,
+) -> float:  # fmt: skip
     """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
     ratio = attraction_ratio(hamaker, potential, debye_length, permittivity)
     if ratio > LARGEST_RATIO:

@@ -15,6 +15,7 @@ from flocsim.ensembles.config.pair_scene import (
 from flocsim.ensembles.config.values import list_of, number, read_by, vector, whole_field
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, flag, number_range, quantity, word_or_quantity
+from flocsim.forces.double_layer import unlike
 
 MOST_BODIES = 100_000
 SNAPSHOTS = 10
@@ -190,6 +191,10 @@ class SwarmScene:
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         """What does not go together with the other tables of a config, by their names."""
         yield from outline_problems(parts, settles=False)
+        for name, force in zip(parts["force_names"], parts["forces"], strict=True):
+            if unlike(force):
+                text = "is of two unlike bodies, and those of a swarm are alike: give one number"
+                yield ("forces", name, "potential"), text
         shapes = parts["shapes"]
         if len(shapes.vertices) > 1:
             found = f"found {list(shapes.vertices)}: give one"

@@ -28,6 +28,9 @@ def reader_of(attribute: attrs.Attribute) -> Reader:
         return read_flag
     if "vector" in metadata:
         return vector(metadata["vector"], metadata.get("unit", ""))
+    if metadata.get("of_each"):
+        one = number(metadata["unit"], *number_range())
+        return either(list | tuple, vector(2, metadata["unit"]), one)
     if "unit" in metadata:
         allowed = metadata.get("allowed", "a finite number")
         return number(metadata["unit"], passes(attribute), allowed, metadata.get("choices", ()))
@@ -193,7 +196,7 @@ def list_of(
     return read
 
 
-def either(kind: type, read_kind: Reader, read_other: Reader) -> Reader:
+def either(kind: Any, read_kind: Reader, read_other: Reader) -> Reader:
     """A reader of values of a type, and of all others."""
     return lambda value: (read_kind if isinstance(value, kind) else read_other)(value)
 

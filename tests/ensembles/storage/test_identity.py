@@ -16,6 +16,7 @@ ENTRIES = (
 
 NOT_PHYSICS = {
     "errors.py": "messages; a row is what comes without an error",
+    "water.py": "what follows of [fluid] and forces is compared itself",
     "explain.py": "text for people",
     "plausibility/doubts.py": "text for people",
     "plausibility/ranges.py": "text for people",
