@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from flocsim.ensembles.config import presets
+from flocsim.ensembles.config.kinds import SCENE_WORDS
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, keys_of
@@ -34,7 +35,7 @@ SCENE_HEADINGS = {
     "": SCENES["settling"],
     " in a flow": SCENES["shear"],
     " in thermal motion": SCENES["brownian"],
-    " of a swarm": SCENES["swarm"],
+    **{f" of a {word}": SCENES[word] for word in SCENE_WORDS},
     " of a kernel study": SCENES["kernel"],
 }
 

@@ -11,11 +11,13 @@ if TYPE_CHECKING:
     from flocsim import hydrodynamics as hydrodynamics
     from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
-    from flocsim.ensembles.studies.compare import Comparison, SwarmComparison, compare
-    from flocsim.ensembles.studies.opened import StudyResults
+    from flocsim.ensembles.pairs.comparison import Comparison
+    from flocsim.ensembles.pairs.opened import StudyResults
+    from flocsim.ensembles.studies.compare import compare
     from flocsim.ensembles.studies.opened import open_any as open
     from flocsim.ensembles.studies.study import Study
     from flocsim.ensembles.studies.sweep import sweep
+    from flocsim.ensembles.swarms.comparison import SwarmComparison
     from flocsim.forces.base import Force
     from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape
@@ -45,12 +47,12 @@ HOMES = {
     "State": "trajectories.trajectory",
     "Status": "integrators.base",
     "Swarm": "swarms.swarm",
-    "SwarmComparison": "ensembles.studies.compare",
+    "SwarmComparison": "ensembles.swarms.comparison",
     "SwarmResults": "io.results.swarm_file",
     "SwarmTrajectory": "swarms.trajectory",
     "Study": "ensembles.studies.study",
-    "Comparison": "ensembles.studies.compare",
-    "StudyResults": "ensembles.studies.opened",
+    "Comparison": "ensembles.pairs.comparison",
+    "StudyResults": "ensembles.pairs.opened",
     "SweepResults": "io.results.sweep_file",
     "System": "system",
     "Trajectory": "trajectories.trajectory",

@@ -26,7 +26,7 @@ from benchmarks.faults.job import KINDS, STUDY, Job, Tally
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.chunks import COLUMNS, ROW, chunk_record, layout
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.pairs import PAIRS
+from flocsim.ensembles.pairs.kind import KIND
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.identity import identity_of, short
@@ -97,7 +97,7 @@ def write_study(folder, replicates, first=0, longest=16_384):
 def resumed(study, identity, folder):
     """The Beginning of a study that goes on from what is in its folder."""
     journal, _ = claim(folder / "study.h5", RESUME)
-    return begin(study, identity, folder / "study.h5", RESUME, journal, PAIRS.old_rows)
+    return begin(study, identity, folder / "study.h5", RESUME, journal, KIND.old_rows)
 
 
 def finish_here(folder):

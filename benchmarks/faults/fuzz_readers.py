@@ -43,15 +43,15 @@ KEPT = Path(tempfile.gettempdir()) / "flocsim-fuzz"
 
 def read_results_file(path):
     """Read it in all ways; the values that were believed are checked."""
-    from flocsim.commands.info import results_text
+    from flocsim.ensembles.contents import text_of
     from flocsim.io.results.checks import check_rows
-    from flocsim.io.results.file import read_overview, read_results
+    from flocsim.io.results.file import read_results
 
     found = read_results(path)
     check_rows(found.replicates.__getitem__, len(found.failures), len(found.flocs))
     assert np.isfinite(found.delta).all()
     assert np.all(found.probabilities["n_total"] == found.count)
-    results_text("r.h5", found, read_overview(path)[1])
+    text_of(path)
 
 
 def read_kernel_file(path):
@@ -81,7 +81,7 @@ def read_strengths_file(path):
 
 def read_library_file(path):
     """Read it, and make the shapes."""
-    from flocsim.commands.info import library_text
+    from flocsim.ensembles.contents import text_of
     from flocsim.io.shapes.library import read_library
 
     entries = read_library(path)
@@ -90,7 +90,7 @@ def read_library_file(path):
             assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
             assert math.isfinite(fit.shape.area)
         assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
-    library_text(path, entries)
+    text_of(path)
 
 
 def read_picture_file(path):
@@ -133,7 +133,7 @@ def read_config_file(path):
 
 def read_swarm_file(path):
     """Read it, describe it, and make the shapes."""
-    from flocsim.commands.info import swarm_text
+    from flocsim.ensembles.contents import text_of
     from flocsim.io.plots.swarm import shape_of
     from flocsim.io.results.swarm_file import read_swarm
 
@@ -142,7 +142,7 @@ def read_swarm_file(path):
     for replicate in range(min(replicates, 3)):
         for body in range(min(bodies, 5)):
             assert math.isfinite(shape_of(found, replicate, body).area)
-    swarm_text(path, found)
+    text_of(path)
 
 
 class SwarmJournalReader:

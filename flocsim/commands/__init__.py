@@ -17,7 +17,7 @@ SUMMARIES = {
     "sweep": "run a study at several values of a key",
     "trajectory": "run one replicate of a config and draw it as a strip of frames",
     "plot": "draw the figures of a results file or a shape library",
-    "report": "write one HTML page of a results file",
+    "report": "write one HTML page of a file",
     "export": "write motion, or rates of encounters, in a format of another program",
     "compare": "compare two results files: differences of probabilities with 95 %% intervals",
     "strength": "at what rate a flow opens the bonds of a study",

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import SUMMARIES
+from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.contents import RESULTS, SWARM, TRAJECTORY, content_of
 from flocsim.io.exchange.gsd_file import write_gsd
-from flocsim.io.files import write_file
+from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.plots.swarm import last_known, shape_of
 from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
 from flocsim.io.results.kernel_tables import (
     MODELS,
@@ -71,31 +70,11 @@ def run(args: argparse.Namespace) -> int:
     if args.format == "csv":
         write_file(path, kernel_csv(kernel_in(args.source)).encode(), rule)
     else:
-        motions = {TRAJECTORY: motion_in, SWARM: first_swarm}
-        kind, found = content_of(args.source, motions)
-        t, position, velocity, shapes = motions[kind](found)
+        kind = file_kind(source := held(args.source), "motion")
+        t, position, velocity, shapes = kind.motion(kind.read(source))
         write_gsd(path, t, position, velocity, shapes, rule)
     print(path)
     return 0
-
-
-def motion_in(motion):
-    """(times, positions, velocities, shapes) of a trajectory file."""
-    return motion.t, motion.position, motion.velocity, motion.shapes
-
-
-def first_swarm(found):
-    """The same of the first swarm of a study; UsageError where bodies have left it."""
-    moments = found.groups["snapshots"]
-    known = slice(last_known(found) + 1)
-    position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
-    if not np.isfinite(position).all():
-        raise UsageError(
-            "bodies have left the first swarm, and a GSD file has the same bodies at all times: "
-            "flocsim plot --animation shows it"
-        )
-    shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
-    return found.scales["time"][known], position, velocity, shapes
 
 
 def named(args):
@@ -109,7 +88,8 @@ def named(args):
 
 def kernel_in(path):
     """The rates in a results file; UsageError where it has none."""
-    kernel = content_of(path, (RESULTS,))[1].kernel
+    kind = file_kind(source := held(path), "rates")
+    kernel = kind.rates(kind.read(source))
     if kernel is None:
         raise UsageError(
             f"{path} is of no kernel study and has no rates: run flocsim kernel with a config of "
@@ -121,7 +101,7 @@ def kernel_in(path):
 def water_factors(path):
     """{mechanism: (i, j)}: how often the equivalent spheres of a study touch with the water between
     them, over how often they do without."""
-    from flocsim.ensembles.studies.opened import open_results
+    from flocsim.ensembles.pairs.opened import open_results
 
     results = open_results(path)
     scene, found = results.config.scene, {}

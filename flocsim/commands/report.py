@@ -5,27 +5,24 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import FOLDER_HELP, SUMMARIES
-from flocsim.commands.reporting.examples import examples_of
-from flocsim.commands.reporting.page import report_page, swarm_page
-from flocsim.ensembles.studies.opened import open_results
+from flocsim.commands.reporting.page import report_page
+from flocsim.ensembles.contents import overview_of
 from flocsim.errors import UsageError
-from flocsim.io.contents import READERS, RESULTS, SWARM, content_of
 from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.own_mark import marked
 from flocsim.io.plots.results import MOST_ROWS
-from flocsim.io.results.file import read_overview, with_rows
 
 DESCRIPTION = """\
-Write one HTML page that needs no other file: the figures of flocsim plot, the probabilities with
-both errors, warnings, where the results came from, and one replicate of each class (A to D) to
-watch, which is run again for it. Of swarms: their figures and clusters over time."""
+Write one HTML page on a file that needs no other file: the figures of flocsim plot, the numbers
+with their errors, warnings, and where it came from; of pairs one replicate of each class (A to D)
+to watch, which is run again for it."""
 
 
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser("report", help=SUMMARIES["report"], description=DESCRIPTION)
     add = parser.add_argument
-    add("results", help="results file that flocsim ensemble wrote")
+    add("results", help="file that flocsim wrote")
     add("-o", "--output", metavar="FILE.html",
         help="page to write (default: r.html for r.h5, in the current folder)")  # fmt: skip
     add("--no-motion", action="store_true", help="run no replicate again: a page without motion")
@@ -41,16 +38,11 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--output {path}: a page's name must end in .html")
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.results])
-    source, examples = held(args.results), []
-    kind, found = content_of(source, (RESULTS, SWARM), READERS | {RESULTS: read_overview})
-    if kind == SWARM:
-        page = swarm_page(str(args.results), found)
-    else:
-        if not args.no_motion:
-            examples = examples_of(open_results(source, args.folder))
-        results, totals = found
-        results = with_rows(source, results, MOST_ROWS)
-        page = report_page(str(args.results), results, totals, examples)
+    source = held(args.results)
+    kind, found = overview_of(source)
+    examples = [] if args.no_motion else kind.examples(source, args.folder)
+    found = kind.with_rows(source, found, MOST_ROWS)
+    page = report_page(str(args.results), kind, found, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:
         if example.reason:

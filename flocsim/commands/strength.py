@@ -54,9 +54,9 @@ def places(args: Namespace) -> tuple[Path, Path]:
 
 def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
     """What is run, as a config; on the ``first`` rank what it writes is seen to be possible."""
+    from flocsim.ensembles.pairs.opened import open_results
     from flocsim.ensembles.storage.resume import WAYS
-    from flocsim.ensembles.strength.survey import Bonds, config_of
-    from flocsim.ensembles.studies.opened import open_results
+    from flocsim.ensembles.strength.kind import Bonds, config_of
     from flocsim.io.journal.journal import SUFFIX
     from flocsim.io.plots.style import checked_format
 

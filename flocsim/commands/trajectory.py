@@ -8,8 +8,8 @@ from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.overrides import nested, parse_setting
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.pairs.replicates import chosen, one_count_study, replicate_of
 from flocsim.ensembles.preflight import check_study, inputs_of
-from flocsim.ensembles.studies.replicates import chosen, one_count_study, replicate_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format, save

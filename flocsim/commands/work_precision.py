@@ -15,8 +15,8 @@ from flocsim.commands.precision import ladder
 from flocsim.commands.precision.judged import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.pairs.replicates import one_count_study, with_one_count
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.studies.replicates import one_count_study, with_one_count
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import OUTCOMES

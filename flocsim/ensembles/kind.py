@@ -122,6 +122,10 @@ class StudyKind:
             "delta": list(config.scene.delta), "replicates": config.replicates,
         }  # fmt: skip
 
+    def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """{name: what all parts of a sweep have in common} of what `asked` says of one of them."""
+        return {name: asked[name] for name in ("types", "vertices", "delta")}
+
     def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
         raise NotImplementedError
@@ -170,6 +174,8 @@ class Kind:
     """What rank 0 asks about a kind of study; ``study`` is a StudyKind, ``results`` what the kind
     makes of one."""
 
+    scenes: Sequence[type]
+    """The classes of its [scene]."""
     make: Callable[..., Any]
     """(config, flocs, methods) → study."""
     flocs: Callable[[Config], list]

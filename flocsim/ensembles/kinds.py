@@ -1,22 +1,23 @@
 """The kinds of studies: by their scenes."""
 
+from functools import cache
 from typing import Any
 
-from flocsim.ensembles.config.schema import SCENES, Config
-from flocsim.ensembles.config.swarm_scene import SwarmScene
+from flocsim.ensembles.config.kinds import STUDIES
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import Kind, StudyKind
-from flocsim.ensembles.pairs import PAIRS
-from flocsim.ensembles.strength.survey import STRENGTHS, Bonds
-from flocsim.ensembles.swarms.kind import SWARMS
 
-KINDS: dict[type, Kind] = dict.fromkeys(SCENES.values(), PAIRS)
-KINDS |= {SwarmScene: SWARMS, Bonds: STRENGTHS}
-"""Class of [scene] → its Kind; rates are pairs with other draws and conditions."""
+
+@cache
+def kinds() -> dict[type, Kind]:
+    """Class of [scene] → its Kind; rates are pairs with other draws and conditions."""
+    found = [folder.part("kind").KIND for folder in STUDIES.values()]
+    return {scene: each for each in found for scene in each.scenes}
 
 
 def kind_of(config: Config) -> Kind:
     """The Kind of a config's study."""
-    return KINDS[type(config.scene)]
+    return kinds()[type(config.scene)]
 
 
 def study_of(config: Config, flocs: list | None = None, methods: dict | None = None) -> StudyKind:

@@ -6,8 +6,7 @@ while it is read here.
 
 from pathlib import Path
 
-from flocsim.ensembles.kinds import KINDS
-from flocsim.ensembles.pairs import PAIRS
+from flocsim.ensembles.kinds import kinds
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.ensembles.storage.unfinished import Unfinished
@@ -29,5 +28,7 @@ def read_unfinished(path: str | Path) -> Unfinished:
     if not sessions:
         raise FileError(f"{path} is no journal of an unfinished run, or has just begun: try again")
     asked = sessions[-1].get("asked")
-    kinds = [each for each in KINDS.values() if each.asked and matches(asked, ASKED | each.asked)]
-    return (kinds or [PAIRS])[0].so_far(path, sessions, records)
+    # Pairs come first, and are all that says nothing of itself.
+    first, *others = kinds().values()
+    said = [each for each in others if each.asked and matches(asked, ASKED | each.asked)]
+    return (said or [first])[0].so_far(path, sessions, records)

@@ -45,6 +45,12 @@ class Labelled:
     columns: dict[str, Column]
     facts: dict[str, Any] = attrs.Factory(dict)
 
+    @property
+    def shared_axes(self) -> list[str]:
+        """The axes that all of its arrays have."""
+        return [name for name, each in self.axes.items() if each.axes == (name,)
+                and all(name in column.axes for column in self.columns.values())]  # fmt: skip
+
     def to_xarray(self) -> Dataset:
         """A Dataset with units and meanings; UsageError where xarray is not installed."""
         xarray = needed("xarray")

@@ -3,8 +3,8 @@
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.commands.info import results_text, text_of
-from flocsim.io.results.file import read_overview, write_results
+from flocsim.ensembles.contents import text_of
+from flocsim.io.results.file import write_results
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.shapes.library import SHIPPED
 from tests.helpers.small_rates import mixed
@@ -14,7 +14,7 @@ from tests.helpers.synthetic_results import make_results
 def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
     results = make_results(types=("I",), vertices=(1, 8), delta=(0.0, 0.7))
     write_results(tmp_path / "r.h5", results)
-    lines = results_text("r.h5", *read_overview(tmp_path / "r.h5")).splitlines()
+    lines = text_of(tmp_path / "r.h5").splitlines()
     (told,) = [line for line in lines if line.startswith("bonds")]
     held = [int((results.replicates["bond"] == code).sum()) for code in (1, 2, 3)]
     assert min(held) > 0

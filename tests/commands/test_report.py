@@ -12,7 +12,7 @@ import pytest
 
 import flocsim
 from flocsim.commands import report
-from flocsim.commands.reporting import page
+from flocsim.ensembles.pairs import contents
 from flocsim.ensembles.report import efficiency_rows
 from flocsim.ensembles.studies.study import Study
 from flocsim.errors import FileError, UsageError
@@ -68,7 +68,7 @@ def write_made_up(path):
 def made_up(tmp_path, monkeypatch):
     """The folder of made-up results; their page has one figure."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(page, "FIGURES", {"4": FIGURES["4"]})
+    monkeypatch.setattr(contents, "FIGURES", {"4": FIGURES["4"]})
     write_made_up("r.h5")
     return tmp_path
 

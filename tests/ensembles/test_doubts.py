@@ -2,12 +2,12 @@
 
 import json
 
-from flocsim.commands.info import results_text
 from flocsim.ensembles import cli
+from flocsim.ensembles.contents import text_of
 from flocsim.ensembles.doubts import said_doubts, settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.storage.stored_json import stored
-from flocsim.io.results.file import read_overview, read_results
+from flocsim.io.results.file import read_results
 from tests.helpers.small_study import small_config, write_small
 
 USUAL = {
@@ -106,6 +106,6 @@ def test_a_run_tells_them_once_and_keeps_them(folder, capsys):
     heavier = small_config(folder, {"bodies": {"surface_density": 3.0}})
     assert stored(run, "settling") == settling_facts(heavier)
     assert json.loads(run["settling"])[1]["reynolds"] > 4.0
-    text = results_text("small.h5", *read_overview(folder / "small.h5"))
+    text = text_of(folder / "small.h5")
     assert line.removeprefix("flocsim: ") in text.splitlines()
     assert "I: i Re 3.3 St " in text

@@ -66,10 +66,6 @@ REFUSED = {
         "compare",
         "strengths",
     ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
-    (
-        "report",
-        "strengths",
-    ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
     ("dry run", "strengths"): "unrecognized arguments: --dry-run",
     ("export", "pairs"): "is of no kernel study and has no rates",
     ("export", "swarms"): "holds a flocsim swarm",

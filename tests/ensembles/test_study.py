@@ -7,8 +7,8 @@ from flocsim import run
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILED, FAILURES
 from flocsim.ensembles.collision.start import draws
+from flocsim.ensembles.pairs.replicates import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
-from flocsim.ensembles.studies.replicates import replicate_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.geometry.shapes.parts import table_of

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.estimates.statistics import tabulate
-from flocsim.ensembles.pairs import table, verdict
+from flocsim.ensembles.pairs.kind import table, verdict
 from flocsim.interruption import WITHHELD
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.synthetic_results import make_results

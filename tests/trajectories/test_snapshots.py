@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.ensembles.studies.replicates import replicate_of
+from flocsim.ensembles.pairs.replicates import replicate_of
 from flocsim.trajectories.figures import frames_of
 from flocsim.trajectories.frames import frames_at, instants_along, travelled
 from tests.helpers.rounding import to_rounding

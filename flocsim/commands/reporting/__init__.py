@@ -1,2 +1,2 @@
-"""The page of `flocsim report`: replicates to watch (`examples`), their drawing that moves
-(`motion`), the HTML (`markup`), and all of it together (`page`)."""
+"""The page of `flocsim report`: the drawing of a replicate that moves (`motion`), the HTML
+(`markup`), and all of it together (`page`)."""

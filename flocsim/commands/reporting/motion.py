@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flocsim.commands.reporting.examples import Example
 from flocsim.commands.reporting.markup import text
+from flocsim.ensembles.contents import Example
 from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 
@@ -51,6 +51,8 @@ def as_tuple(value: Any) -> tuple[str, ...]:
 class KernelScene(DrivenScene):
     """With `kind = "kernel"`: what brings bodies of which sizes together, how their orientations
     and offsets are sampled, and how their meetings begin and end."""
+
+    usual_replicates: ClassVar[int | None] = KERNEL_REPLICATES
 
     kind: str = choice("kernel", default="kernel", help="rates of encounters")
     meeting: tuple[str, ...] = attrs.field(

@@ -7,6 +7,7 @@ import attrs
 
 from flocsim.ensembles.config.overrides import lay_over
 from flocsim.ensembles.config.own_classes import FORCE, load_class
+from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.problems import Misfit, Problems, dotted, misfit, show, suggestion
 from flocsim.ensembles.config.schema import (
@@ -25,7 +26,6 @@ from flocsim.ensembles.config.schema import (
     scene_class,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.config.toml_text import STANDARD_INPUT, parse
 from flocsim.ensembles.config.values import reader_of
 from flocsim.errors import ConfigError
@@ -35,9 +35,6 @@ from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 DEFAULTS = {"source": "synthetic"}
 """Of keys that others go with."""
 
-FOR_PAIRS = {"zone", "stop", "sampling"}
-"""Tables that a swarm has no use for."""
-
 
 def load_config(
     path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
@@ -45,10 +42,11 @@ def load_config(
     """The config file of a study of binary collisions: see `load_any_config`; ConfigError for one
     of another kind."""
     config = load_any_config(path, overrides, sources)
-    if config.is_swarm:
+    if not isinstance(config.scene, PairScene):
+        kind = config.scene.kind
         raise ConfigError(
-            f'{path} is of a swarm (scene.kind = "swarm"): run it with `flocsim swarm`, and look '
-            "at its results by `flocsim info` and `flocsim plot`"
+            f'{path} is of a {kind} (scene.kind = "{kind}"), not of two bodies: run it with '
+            "`flocsim ensemble`, and look at its results by `flocsim info` and `flocsim plot`"
         )
     return config
 
@@ -74,9 +72,11 @@ def load_any_config(
         table = lay_over(PRESETS.get(preset, {}), table)
     table = lay_over(implied(table), table)
     reader = Reader(folder, problems, sources)
-    if scene_class(table) is SwarmScene:
-        for name in FOR_PAIRS & given:
-            problems.note((name,), "is for binary collisions: leave it out of a swarm")
+    scene = scene_class(table)
+    for name in scene.without & given:
+        problems.note(
+            (name,), f"is for binary collisions: leave it out of a {table['scene']['kind']}"
+        )
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):

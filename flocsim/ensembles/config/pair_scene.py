@@ -3,10 +3,11 @@
 import itertools
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import attrs
 
+from flocsim.ensembles.config.kinds import SCENE_WORDS
 from flocsim.ensembles.config.values import (
     either,
     list_of,
@@ -49,7 +50,7 @@ BROWNIAN = "brownian"
 
 MEETINGS = (*MECHANISMS, BROWNIAN)
 
-KINDS_OF_SCENES = ("binary", "swarm", "kernel")
+KINDS_OF_SCENES = ("binary", *SCENE_WORDS, "kernel")
 
 Problem = tuple[tuple[str, ...], str]
 """(place in the config, what is wrong there)"""
@@ -147,6 +148,11 @@ class PairScene:
 
     What is a key of some ways alone is fixed in the others.
     """
+
+    without: ClassVar[frozenset[str]] = frozenset()
+    """Tables and keys that such a study has no use for."""
+    usual_replicates: ClassVar[int | None] = None
+    """Where nothing is said; None for that of the key."""
 
     kind: str = one_tag(
         "binary",

@@ -19,7 +19,8 @@ from typing import Any
 import attrs
 
 from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config.kernel_scene import KERNEL_REPLICATES, KernelScene
+from flocsim.ensembles.config.kernel_scene import KernelScene
+from flocsim.ensembles.config.kinds import scenes
 from flocsim.ensembles.config.own_classes import (
     INTEGRATOR,
     SHAPE,
@@ -40,7 +41,6 @@ from flocsim.ensembles.config.pair_scene import (
     uneven_points,
 )
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.config.values import (
     list_of,
     number_or_table,
@@ -446,11 +446,6 @@ class Config:
     modules: dict[str, bytes] = attrs.field(factory=dict, repr=False)
 
     @property
-    def is_swarm(self) -> bool:
-        """Whether the scene is a SwarmScene, and the study one of many bodies."""
-        return bool(self.scene.kind == "swarm")
-
-    @property
     def scrambles(self) -> int:
         """Of how many scrambles of a Sobol sequence the replicates of two bodies are points; 0
         where they are drawn independently."""
@@ -488,7 +483,7 @@ TABLES = {
 STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" in field.metadata}
 """The keys above all tables."""
 
-SCENES: dict[str, type] = PAIR_SCENES | {"swarm": SwarmScene, "kernel": KernelScene}
+SCENES: dict[str, type] = PAIR_SCENES | {"kernel": KernelScene} | scenes()
 """`[scene] meeting` of binary encounters, or `[scene] kind` of others → class of the table."""
 
 TOP_KEYS = (*STUDY_KEYS, *TABLES, "forces")
@@ -578,8 +573,8 @@ def implied(table: Mapping[str, Any]) -> dict[str, Any]:
     """Values that follow from others of a config's nested dicts, where they are not given."""
     scene, shapes = (table.get(name) for name in ("scene", "shapes"))
     found: dict[str, Any] = {}
-    if isinstance(scene, Mapping) and scene.get("kind") == "kernel":
-        found["replicates"] = KERNEL_REPLICATES
+    if usual := scene_class(table).usual_replicates:
+        found["replicates"] = usual
     elif table.get("sampling") == SOBOL:
         found["replicates"] = SOBOL_REPLICATES
     if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
@@ -589,7 +584,7 @@ def implied(table: Mapping[str, Any]) -> dict[str, Any]:
     return found | {"shapes": {"size": "own"}}
 
 
-def scene_class(table: Mapping[str, Any]) -> type:
+def scene_class(table: Mapping[str, Any]) -> Any:
     """The class of a config's [scene], by its kind and meeting; of unknown ones SettlingScene,
     whose keys tell that."""
     scene = table.get("scene")

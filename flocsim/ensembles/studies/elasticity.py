@@ -8,8 +8,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from flocsim.ensembles.studies.compare import Comparison, compare
-from flocsim.ensembles.studies.opened import StudyResults, open_any
+from flocsim.ensembles.pairs.comparison import Comparison, compare
+from flocsim.ensembles.pairs.opened import open_results
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.ensembles.studies.sweep import parts_folder, sweep, value_of
 from flocsim.errors import UsageError
@@ -75,23 +75,17 @@ def elasticities(
         raise UsageError(f"the ratio of an elasticity must be above 1 and finite, found {ratio:g}")
     if not keys or len(set(keys)) < len(keys):
         raise UsageError("elasticities are of at least one key, each named once")
-    if study.config.is_swarm or study.config.is_kernel:
+    if study.config.scene.kind != "binary":
         raise UsageError("elasticities are of probabilities of pairs: sweep the key instead")
     values = [number_of(study, key) for key in keys]
     found: list[Comparison] = []
     for key, value in zip(keys, values, strict=True):
         path = named(output, key)
-        ends = [value / math.sqrt(ratio), value * math.sqrt(ratio)]
-        sweep(study, {key: ends}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
+        both = [value / math.sqrt(ratio), value * math.sqrt(ratio)]
+        sweep(study, {key: both}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
               tell=tell, ways=ways)  # fmt: skip
-        first, second = (
-            open_any(parts_folder(path) / f"{number:04d}.h5", study.path.parent)
-            for number in (0, 1)
-        )
-        assert isinstance(first, StudyResults) and isinstance(second, StudyResults)
-        compared = compare(first, second)
-        assert isinstance(compared, Comparison)
-        found.append(compared)
+        ends = (parts_folder(path) / f"{number:04d}.h5" for number in (0, 1))
+        found.append(compare(*(open_results(each, study.path.parent) for each in ends)))
     arrays = {
         name: np.stack([each.arrays["pr_a"][column] for each in found]) / math.log(ratio)
         for name, column in COLUMNS.items()

@@ -7,20 +7,20 @@ from typing import Any
 
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.config.overrides import lay_over, nested
+from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import read_text_file
 from flocsim.ensembles.kinds import kind_of
+from flocsim.ensembles.pairs.replicates import one_count_study, place_of, replicate_of
 from flocsim.ensembles.preflight import inputs_of
-from flocsim.ensembles.studies.opened import StudyResults, open_any
+from flocsim.ensembles.studies.opened import open_any
 from flocsim.ensembles.studies.process import run_command
-from flocsim.ensembles.studies.replicates import one_count_study, place_of, replicate_of
 from flocsim.ensembles.studies.text import toml_text, value_text
 from flocsim.errors import ConfigError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.journal.journal import SUFFIX
 from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.io.results.swarm_file import SwarmResults
 from flocsim.trajectories.trajectory import Trajectory
 
 MODES = ("new", "resume", "restart")
@@ -89,7 +89,7 @@ class Study:
     def run(
         self, jobs: int = 1, *, output: str | os.PathLike | None = None, mode: str = "new",
         overwrite: bool = False, quiet: bool = True, plan: str | os.PathLike | None = None,
-    ) -> StudyResults | SwarmResults:  # fmt: skip
+    ) -> Any:  # fmt: skip
         """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
 
         ``jobs`` processes of this machine (without ``if __name__ == "__main__"``);
@@ -118,9 +118,7 @@ class Study:
         for key, value in settings_of(self.overrides):
             words += ["--set", f"{key}={value}"]
         run_command(words, self.text, self.path.parent, quiet)
-        found = open_any(target, self.path.parent)
-        assert isinstance(found, StudyResults | SwarmResults), "it is what was run"
-        return found
+        return open_any(target, self.path.parent)
 
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""
@@ -136,10 +134,10 @@ class Study:
         a displacement δ/δ_max (the first). The Trajectory's ``row`` has what the table of
         replicates holds of it. UsageError for what the study does not have.
         """
-        if self.config.is_swarm:
+        if not isinstance(self.config.scene, PairScene):
             raise UsageError(
-                "a replicate of a swarm is no collision: run the study, and look at the group "
-                "snapshots of its results"
+                f"a replicate of a {self.config.scene.kind} is no collision: run the study, and "
+                "look at the group snapshots of its results"
             )
         place = place_of(self.config, type, vertices, delta)
         return replicate_of(replicate, place, one_count_study(self.config, place[1]))

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.ensembles.comparison import identity_in
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
+from flocsim.ensembles.contents import Joined
 from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.storage.identity import machine_facts
 from flocsim.ensembles.storage.plan import (
-    AXES,
     NAME,
     Facts,
     Plan,
@@ -32,32 +33,20 @@ from flocsim.ensembles.storage.plan import (
     read_plan,
     write_plan,
 )
-from flocsim.ensembles.studies.opened import StudyResults, identity_in, open_any
+from flocsim.ensembles.studies.opened import open_any
 from flocsim.ensembles.studies.study import WAYS, Study
+from flocsim.ensembles.studies.sweep_contents import all_joined, joined_of, read_joined
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import make_folder
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
-from flocsim.io.results.schema import GROUPS, RADII
-from flocsim.io.results.swarm_file import SwarmResults
-from flocsim.io.results.sweep_file import (
-    JOINED,
-    OF_SWARMS,
-    SweepResults,
-    Swept,
-    read_sweep,
-    write_sweep,
-)
+from flocsim.io.results.schema import GROUPS
+from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
 
 MOST_PARTS = 10_000
 FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
-OF_FORM = ("times", "bounds")
-"""What parts of a sweep of swarms have in common besides."""
-
-Part = StudyResults | SwarmResults
-
 NO_PHYSICS = ("output", "stop")
 """Keys, and tables, that cannot be swept: they are dimensions already, or no physics."""
 
@@ -82,7 +71,7 @@ def sweep(
     before = read_plan(folder / NAME) if goes_on else {}
     rule = data_rule(overwrite)
     if mode == "resume" and output.exists():
-        joined_before = read_sweep(output)  # what is replaced has to be a sweep
+        joined_before = read_joined(output)  # what is replaced has to be a sweep
         rule = extension_rule(output)
         if joined_before.plan and goes_on:
             before = plan_of(joined_before.plan, output) | before
@@ -153,13 +142,9 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
         if config.integrator.is_chosen:  # a pilot has yet to say by what method each type is run
             facts = {k: v for k, v in facts.items() if not k.endswith(".integrator")}
         plan[path.name] = facts
-        first, own = next(iter(plan.values()))["asked"], facts["asked"]
-        axes = {axis: (first[axis], own[axis]) for axis in AXES}
-        if config.is_swarm:
-            axes |= {axis: (first["swarm"][axis], own["swarm"][axis]) for axis in OF_FORM}
-            axes["replicates"] = [first["replicates"]], [own["replicates"]]
-        for axis, (there, here) in axes.items():
-            if there != here:
+        first, own = (study.fixed(each["asked"]) for each in (next(iter(plan.values())), facts))
+        for axis, there in first.items():
+            if there != (here := own[axis]):
                 raise UsageError(
                     f"the parts of a sweep cannot be joined: {axis} are {listed(there)} in the "
                     f"first, {listed(here)} in {path}; run them one by one"
@@ -167,11 +152,11 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
     return plan
 
 
-def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Part:
+def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Any:
     """The results at a part's path; UsageError where they are not what was planned, or cannot
     become so by more rows (``whole``: where they have less)."""
     found = open_any(path, study.path.parent)
-    if not isinstance(found, Part):
+    if joined_of(found) is None:
         raise UsageError(f"{path} is no part of a sweep: name another output")
     if wrong := apart(facts_in(found), planned, whole):
         raise UsageError(
@@ -181,14 +166,16 @@ def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Pa
     return found
 
 
-def facts_in(results: Part) -> Facts:
-    """What a results file says that it is."""
-    if isinstance(results, SwarmResults):
-        asked = {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))],
-                 "delta": [0.0], "replicates": len(results.scales["replicate"])}  # fmt: skip
-        return identity_in(results) | {"asked": asked}
-    axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
-    return identity_in(results) | {"asked": axes | {"replicates": results.count}}
+def facts_in(results: Any) -> Facts:
+    """What a results file of a part says that it is."""
+    return identity_in(results) | {"asked": needed(results).asked(results)}
+
+
+def needed(results: Any) -> Joined:
+    """What is joined of results that are a part."""
+    found = joined_of(results)
+    assert found is not None, "results of a kind that sweeps can run"
+    return found
 
 
 def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[str, Swept]:
@@ -200,7 +187,7 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     lengths = [len(values) for values in over.values()]
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        taken = [*GROUPS.values(), *OF_SWARMS.values()]
+        taken = [*GROUPS.values(), *all_joined().values()]
         clash = lasts.count(last) > 1 or any(last in group.index for group in taken)
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))
@@ -231,13 +218,13 @@ def value_of(config: Config, key: str) -> tuple[Any, str]:
     return getattr(owner, field.name, None), field.metadata.get("unit") or "1"
 
 
-def joined(swept: dict[str, Swept], parts: Sequence[Part]) -> dict[str, Labelled]:
+def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]:
     """The groups of all parts with the swept keys as first axes."""
-    of_swarms = isinstance(parts[0], SwarmResults)
+    kind = needed(parts[0])
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in OF_SWARMS if of_swarms else JOINED:
+    for group in kind.groups:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):
@@ -248,7 +235,6 @@ def joined(swept: dict[str, Swept], parts: Sequence[Part]) -> dict[str, Labelled
 
         columns = {name: stacked("columns", name) for name in labelled[0].columns}
         # Sizes may follow from what is swept, as from the limits of measured flocs.
-        sizes = () if of_swarms else RADII
-        axes = labelled[0].axes | {name: stacked("axes", name) for name in sizes}
+        axes = labelled[0].axes | {name: stacked("axes", name) for name in kind.own}
         found[group] = Labelled(coordinates | axes, columns)
     return found

@@ -33,6 +33,7 @@ from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from
 from flocsim.ensembles.swarms.checks import FORM, Form, check_part
 from flocsim.ensembles.swarms.dry_run import dry_run, largest_pair
 from flocsim.ensembles.swarms.records import Found, part_of
+from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
@@ -230,7 +231,8 @@ def form_of(asked: dict) -> Form:
     return Form(about["bodies"], bounds, times, about["periodic"])
 
 
-SWARMS = Kind(
+KIND = Kind(
+    scenes=(SwarmScene,),
     make=lambda config, flocs=None, methods=None: SwarmStudy(
         config, **({} if flocs is None else {"flocs": flocs})
     ),

@@ -12,11 +12,11 @@ from flocsim.body import Body
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
-from flocsim.ensembles.config.swarm_scene import SwarmScene
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.ensembles.swarms.checks import Form, check_ends, check_part
 from flocsim.ensembles.swarms.records import MOMENT, Found, Left, Read, part_of
 from flocsim.ensembles.swarms.replicate import run_replicate
+from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
 from flocsim.io.journal.records import Record
@@ -132,6 +132,11 @@ class SwarmStudy(StudyKind):
     def asked(self) -> dict[str, Any]:
         """What the study consists of, and what its records look like."""
         return super().asked() | {"swarm": self.form.asked()}
+
+    def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The times and size classes as well, and the number of replicates, which are an axis."""
+        form = {name: asked["swarm"][name] for name in ("times", "bounds")}
+        return super().fixed(asked) | form | {"replicates": [asked["replicates"]]}
 
     def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile all that a swarm needs, or load it, by running two bodies for no time."""

@@ -105,21 +105,25 @@ def read_results(path: str | os.PathLike, replicates: bool = True) -> Results:
         return results_in(file, replicates)
 
 
-def read_overview(path: str | os.PathLike) -> tuple[Results, "Totals"]:
-    """The Results in a file without its table of replicates, and the Totals of that table.
+def read_overview(path: str | os.PathLike) -> "Overview":
+    """The Results in a file without its table of replicates, but with the Totals of that table.
 
     For files larger than the memory; FileError as `read_results`.
     """
     with opened(path) as file:
         results = results_in(file, replicates=False)
-        return results, totals_in(file["replicates"], len(results.failures))
+        totals = totals_in(file["replicates"], len(results.failures))
+        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
+        return Overview(**known, totals=totals)
 
 
 def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -> Results:
     """The Results in a file with their table of replicates, unless that has more than ``most``
     rows."""
     rows = int(np.prod(results.shape)) * results.count
-    return read_results(path) if results.replicates is None and rows <= most else results
+    if results.replicates is not None or rows > most:
+        return results
+    return attrs.evolve(results, replicates=read_results(path).replicates)
 
 
 def results_in(file, replicates):
@@ -203,6 +207,13 @@ class Totals:
         self.steps += int(steps.sum())
         self.most_steps = max(self.most_steps, int(steps.max(initial=0)))
         self.rejected += int(rejected.sum())
+
+
+@attrs.frozen(eq=False)
+class Overview(Results):
+    """Results with the ``totals`` of their replicates."""
+
+    totals: Totals = attrs.field(kw_only=True)
 
 
 def totals_in(rows, reasons):

@@ -7,7 +7,7 @@ what the rows of each part follow from.
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -20,14 +20,9 @@ from flocsim.io.hdf5.structure import Node
 from flocsim.io.json_text import matches, read_json
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.opening import opened_file
-from flocsim.io.results import swarm_file
-from flocsim.io.results.schema import GROUPS, LAST_AXES
 
 FORMAT = "flocsim sweep"
 SCHEMA_VERSION = 1
-JOINED = {name: GROUPS[name] for name in ("probabilities", "pooled")}
-OF_SWARMS = {"counts": swarm_file.GROUPS["counts"]}
-"""Groups of results that are joined."""
 
 
 @attrs.frozen(eq=False)
@@ -62,8 +57,7 @@ class SweepResults(Tables):
     @property
     def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
         """{group: axes of its rows}, the swept keys first."""
-        known = JOINED | OF_SWARMS
-        return {name: [*self.swept, *known[name].index] for name in self.groups}
+        return {name: group.shared_axes for name, group in self.groups.items()}
 
     def labelled(self, group: str) -> Labelled:
         """The arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
@@ -81,9 +75,12 @@ def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
     write_groups(results.path, attributes, results.groups, {"plan": results.plan}, rule)
 
 
-def read_sweep(path: str | os.PathLike) -> SweepResults:
+def read_sweep(
+    path: str | os.PathLike, known: Sequence[tuple[Mapping[str, Group], Mapping[str, int]]]
+) -> SweepResults:
     """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
-    or version."""
+    or version. ``known``: (groups of results, how many places their last axes have) of all kinds
+    of studies that are joined."""
     with opened_file(
         path,
         lambda reason: f"{path} holds no readable sweep: {reason}; join it again with --resume",
@@ -92,11 +89,9 @@ def read_sweep(path: str | os.PathLike) -> SweepResults:
         about = read_json(str(file.attrs["swept"]), {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept names no keys")
-        joined = OF_SWARMS if "counts" in nodes else JOINED
-        declared = {name: joined_group(name, about, nodes) for name in joined}
+        joined, lengths = next((each for each in known if each[0].keys() <= nodes.keys()), ({}, {}))
+        declared = {name: joined_group(each, name, about, nodes) for name, each in joined.items()}
         wanted = {name: group.arrays for name, group in declared.items()}
-        known = {} if joined is OF_SWARMS else LAST_AXES  # both have classes
-        lengths = {axis: len(words) for axis, words in known.items()}
         hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, list(joined), lengths)
         groups = {name: group.labelled(group.read(file[name])) for name, group in declared.items()}
         first = next(iter(groups.values())).axes
@@ -108,9 +103,10 @@ def read_sweep(path: str | os.PathLike) -> SweepResults:
         return SweepResults(Path(path), swept, groups, str(plan))
 
 
-def joined_group(name: str, about: Mapping[str, dict], nodes: Mapping[str, Node]) -> Group:
+def joined_group(
+    one: Group, name: str, about: Mapping[str, dict], nodes: Mapping[str, Node]
+) -> Group:
     """A group of results along the swept keys, {dimension: {key, unit}}, as well."""
-    one = (JOINED | OF_SWARMS)[name]
 
     def along(declared):
         return {

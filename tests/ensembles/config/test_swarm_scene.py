@@ -4,7 +4,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import load_any_config, load_config
-from flocsim.ensembles.config.swarm_scene import SwarmScene
+from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.errors import ConfigError
 from tests.helpers.swarm_study import SWARM, swarm_config, write_swarm_study
 

@@ -16,7 +16,7 @@ import pytest
 from benchmarks.faults.assembly import finish_here, kill_once, prepare, resumed, write_study
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, sums_of
-from flocsim.ensembles.pairs import results_of
+from flocsim.ensembles.pairs.kind import results_of
 from flocsim.ensembles.parallel import assembly
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode

@@ -16,8 +16,7 @@ from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, 
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run, run_to_file
 from flocsim.ensembles.strength import survey as module
-from flocsim.ensembles.strength.opening import Opening
-from flocsim.ensembles.strength.survey import (
+from flocsim.ensembles.strength.kind import (
     Bonds,
     Bound,
     StrengthStudy,
@@ -25,6 +24,7 @@ from flocsim.ensembles.strength.survey import (
     config_of,
     in_words,
 )
+from flocsim.ensembles.strength.opening import Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.strength import over_rate
 from flocsim.io.results.strength_file import QUANTILES, read_strengths, write_strengths
@@ -264,7 +264,7 @@ def command(fake, tmp_path, monkeypatch):
     """Runs the command in a folder where study.h5 is the fake one."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.h5").write_bytes(b"never read here")
-    monkeypatch.setattr("flocsim.ensembles.studies.opened.open_results", lambda *_: fake)
+    monkeypatch.setattr("flocsim.ensembles.pairs.opened.open_results", lambda *_: fake)
     return lambda *words: program.main(["strength", "study.h5", *map(str, words)])
 
 
@@ -277,7 +277,8 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     assert names >= {"study-strength.h5", "study-strength.png"} and len(names) == 4
     found = read_strengths("study-strength.h5")
     assert found.about["flow"] == "shear" and "features" in json.loads(found.about["cpus"])[0]
-    assert plot.read_content("study-strength.h5")[1].keys() == {"strength"}
+    kind, found, _ = plot.read_content("study-strength.h5")
+    assert kind.figures(found).keys() == {"strength"}
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()
     assert command("--flow", "extension") == 2

@@ -316,7 +316,8 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     return Unfinished(path, FORMAT, made, done, wanted, notes, sessions, unread, "doublets")
 
 
-STRENGTHS = Kind(
+KIND = Kind(
+    scenes=(Bonds,),
     make=lambda config, flocs=None, methods=None: StrengthStudy(config),
     flocs=lambda config: [], identity=about_of, code=TESTING, check=lambda config: None,
     prepare=lambda study, comm: None, doubts=lambda study: [], facts=lambda study: {},

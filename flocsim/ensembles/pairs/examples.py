@@ -1,30 +1,18 @@
 """One replicate of each class of a results file, run again to be watched."""
 
-from typing import Any
+import os
 
-import attrs
-
-from flocsim.ensembles.studies.opened import StudyResults
-from flocsim.ensembles.studies.replicates import place_of
+from flocsim.ensembles.contents import Example
+from flocsim.ensembles.pairs.opened import StudyResults, open_results
+from flocsim.ensembles.pairs.replicates import place_of
 from flocsim.errors import FlocsimError
 from flocsim.io.results.file import first_of_each
 from flocsim.io.results.schema import CLASSES
 
 
-@attrs.frozen(eq=False)
-class Example:
-    """A replicate of a class: ``title`` says which, ``trajectory`` is None where it could not be
-    run again, which ``reason`` says; ``zone_distance`` D_0 [m]."""
-
-    outcome: str
-    title: str
-    trajectory: Any = None
-    zone_distance: float = float("nan")
-    reason: str = ""
-
-
-def examples_of(opened: StudyResults) -> list[Example]:
+def examples_of(path: str | os.PathLike, folder: str | os.PathLike | None) -> list[Example]:
     """The first replicate of each class that the file has, of its flocs with the most vertices."""
+    opened = open_results(path, folder)
     found = first_of_each(opened.source)
     return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
 

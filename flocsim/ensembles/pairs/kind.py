@@ -13,6 +13,8 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
+from flocsim.ensembles.config.kernel_scene import KernelScene
+from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
@@ -228,7 +230,8 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
     return {name: values for name, values in sums.items() if name not in (*POOLED_NAMES, JOINT)}
 
 
-PAIRS = Kind(
+KIND = Kind(
+    scenes=(*PAIR_SCENES.values(), KernelScene),
     make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
     prepare=lambda study, comm: None, doubts=lambda study: study_doubts(study.config, study.flocs),
     facts=facts, old_rows=old_rows, results=results, read=partial(read_results, replicates=False),

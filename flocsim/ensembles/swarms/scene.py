@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 
@@ -30,6 +30,10 @@ RADIUS = number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH))
 class SwarmScene:
     """With `kind = "swarm"`: how many bodies of what sizes begin where, for how long they are
     followed, and what is kept."""
+
+    without: ClassVar[frozenset[str]] = frozenset({"zone", "stop", "sampling"})
+    """Tables and keys that such a study has no use for."""
+    usual_replicates: ClassVar[int | None] = None
 
     kind: str = choice("swarm", default="swarm", help="many bodies, which this table describes")
     number: int = whole_field(1, MOST_BODIES, default=1000, help="bodies of each replicate")
@@ -209,3 +213,6 @@ class SwarmScene:
             yield ("shapes", "size"), text
         if parts["integrator"] is not None and parts["integrator"].is_chosen:
             yield ("integrator", "accuracy"), "is for studies of pairs: give name and tolerance"
+
+
+SCENE = SwarmScene

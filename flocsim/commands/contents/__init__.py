@@ -1,0 +1,1 @@
+"""What files hold that are of no study: shape libraries and trajectories."""

@@ -1,0 +1,79 @@
+"""What a shape library holds, for the commands."""
+
+import os
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import attrs
+
+from flocsim.ensembles.contents import Contents, Summary
+from flocsim.errors import visible
+from flocsim.hydrodynamics import prism_drag
+from flocsim.io.plots.shapes import POPULATION_FIGURES
+from flocsim.io.plots.style import Figure
+from flocsim.io.shapes.fit_report import format_errors
+from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings
+from flocsim.io.terminal import aligned
+
+
+@attrs.frozen(eq=False)
+class Library:
+    """The flocs of a library, and what their fits were made with."""
+
+    entries: list[ShapeEntry]
+    settings: dict[str, Any]
+
+
+def read(path: str | os.PathLike) -> Library:
+    """All that a library holds."""
+    return Library(read_library(path), read_settings(path))
+
+
+def summary(found: Library) -> Summary:
+    """How many flocs of how many pictures, their sizes, and how they were fitted."""
+    images = sorted({entry.image for entry in found.entries})
+    sizes = [1e6 * entry.measured_radius for entry in found.entries]
+    facts = [
+        ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
+        ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+        *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
+    ]
+    return Summary(facts)
+
+
+def water(path: str | os.PathLike) -> list[str]:
+    """What slow flow makes of the flocs of a library."""
+    entries = read_library(path)
+    rows: list[tuple[str, ...]] = [("floc", "sinks", "at least", "turns", "B", "+- %")]
+    for entry in entries:
+        count = max(entry.fits)
+        drag = prism_drag(entry.fits[count].shape.outline())
+        rows.append((
+            visible(entry.floc_id, ""), *(f"{each:.3f}" for each in drag.mobility),
+            f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
+        ))  # fmt: skip
+    heading = (
+        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: how fast they sink, at most and at "
+        "least, and turn, over their equivalent spheres; B, by which a strain turns them, over "
+        "that of a line"
+    )
+    return [heading, *aligned(rows)]
+
+
+def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
+    """A figure of flocs as one of a Library."""
+    return wraps(draw)(lambda found: draw(found.entries))
+
+
+FIGURES = {name: of_entries(draw) for name, draw in POPULATION_FIGURES.items()}
+
+CONTENTS = Contents(
+    title="a shape library",
+    read=read,
+    summary=summary,
+    table=lambda found: format_errors(found.entries),
+    figures=lambda found: FIGURES,
+    drawn={"a shape library that flocsim fit wrote": FIGURES},
+    water=water,
+)

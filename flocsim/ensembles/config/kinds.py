@@ -1,0 +1,48 @@
+"""The table of all kinds, of studies and of other files.
+
+All that a kind of study is lies in its folder, whose modules are loaded by name, when something of
+the kind is there: `scene` has the class of its [scene] as SCENE, where that has a `kind` of its
+own; `kind` what runs it as KIND, a `flocsim.ensembles.kind.Kind`; `contents` what its files hold as
+CONTENTS, a `flocsim.ensembles.contents.Contents`.
+"""
+
+import importlib
+from typing import Any, NamedTuple
+
+
+class Folder(NamedTuple):
+    """The folder of a kind in flocsim/ensembles, and its `[scene] kind`, if it has one itself."""
+
+    name: str
+    scene: str = ""
+
+    def part(self, module: str) -> Any:
+        """One of its modules."""
+        return importlib.import_module(f"flocsim.ensembles.{self.name}.{module}")
+
+
+STUDIES = {
+    "flocsim results": Folder("pairs"),
+    "flocsim swarm": Folder("swarms", "swarm"),
+    "flocsim strength": Folder("strength"),
+}
+"""What a results file says that it is → the Folder of the kind."""
+
+FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
+    "flocsim sweep": "ensembles.studies.sweep_contents",
+    "flocsim trajectory": "commands.contents.trajectory",
+    "flocsim shape library": "commands.contents.library",
+}
+"""What any file says that it is → the module of its CONTENTS in flocsim."""
+
+SCENE_WORDS = tuple(each.scene for each in STUDIES.values() if each.scene)
+
+
+def scenes() -> dict[str, type]:
+    """`[scene] kind` → class of the table, of kinds that have one of their own."""
+    return {each.scene: each.part("scene").SCENE for each in STUDIES.values() if each.scene}
+
+
+def contents_of(file_format: str) -> Any:
+    """The Contents of a kind of file, by what such a file says that it is."""
+    return importlib.import_module(f"flocsim.{FILES[file_format]}").CONTENTS

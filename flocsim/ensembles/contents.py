@@ -1,0 +1,223 @@
+"""What a file holds, of whatever kind it is: the contract of a kind of file.
+
+Each kind gives its Contents, by which `open`, `info`, `plot`, `report`, `compare`, `sweep` and
+`export` read it and show it; they know no kind themselves. `flocsim.ensembles.config.kinds` is the
+table of all.
+"""
+
+import os
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+import attrs
+
+from flocsim.ensembles.config.kinds import FILES, STUDIES, contents_of
+from flocsim.ensembles.storage.cpu_kind import describe_kind
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.errors import FileError, visible
+from flocsim.io.files import held
+from flocsim.io.groups import Group
+from flocsim.io.opening import kind_of
+from flocsim.io.plots.style import Figure
+
+Facts = list[tuple[str, str]]
+"""[(name, value)]."""
+
+Figures = Mapping[str, Callable[..., Figure]]
+"""{name: function}, the first line of whose docstring is its help."""
+
+SAID_APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
+              "warnings", "trial", "modules", "settling", "size_classes", "equivalent_spheres",
+              "most_undecided")  # fmt: skip
+"""What the group ``run`` holds besides what is printed as it is."""
+
+MOST_FAILURES = 10
+
+
+@attrs.frozen
+class Summary:
+    """What a file says of itself: ``facts`` and ``origin``, where it came from; warnings, and what
+    failed, a line each."""
+
+    facts: Facts
+    origin: Facts = attrs.Factory(list)
+    warnings: list[str] = attrs.Factory(list)
+    failed: list[str] = attrs.Factory(list)
+
+
+@attrs.frozen
+class Table:
+    """A table of a page: its heading, lines above it, heads, rows, and the numbers of the rows with
+    a line above them."""
+
+    heading: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    said: Sequence[str] = ()
+    firsts: Sequence[int] = ()
+
+
+@attrs.frozen(eq=False)
+class Example:
+    """A replicate of a class: ``title`` says which, ``trajectory`` is None where it could not be
+    run again, which ``reason`` says; ``zone_distance`` D_0 [m]."""
+
+    outcome: str
+    title: str
+    trajectory: Any = None
+    zone_distance: float = float("nan")
+    reason: str = ""
+
+
+@attrs.frozen(eq=False)
+class Joined:
+    """What a sweep joins of its parts: ``groups`` of results; how many places the last ``axes``
+    have; coordinates that may differ from part to part, ``own``; the rows of `info`, heads first,
+    and lines below; the figures."""
+
+    groups: Mapping[str, Group]
+    rows: Callable[[Any], list[tuple[str, ...]]]
+    figures: Figures
+    asked: Callable[[Any], dict]
+    """(results) → the axes and the number of replicates, as StudyKind.asked has them."""
+    axes: Mapping[str, int] = attrs.Factory(dict)
+    own: Sequence[str] = ()
+    below: Callable[[Any], list[str]] = lambda swept: []
+
+
+@attrs.frozen(eq=False, kw_only=True)
+class Contents:
+    """What the commands ask of a kind of file; ``found`` is what `read` gives."""
+
+    title: str
+    """What a file holds, in words."""
+    results: type | None = None
+    """Of what class is what `opened` gives; None where `flocsim.open` is not for it."""
+    read: Callable[[Any], Any]
+    """(path) → found; FileError for a file that is absent, damaged, or of another kind."""
+    summary: Callable[[Any], Summary]
+    """(found) → what it says of itself; ValueError where that cannot be read."""
+    table: Callable[[Any], str]
+    """(found) → its numbers as text."""
+    figures: Callable[[Any], Figures]
+    """(found) → the figures that it has."""
+    drawn: Mapping[str, Figures]
+    """{what has them, in words: all figures}."""
+    overview: Callable[[Any], Any] | None = None
+    """(path) → found, with what only `summary` needs."""
+    with_rows: Callable[[Any, Any, float], Any] = lambda path, found, most: found
+    """(path, found, most) → found with its single replicates, unless these are more."""
+    rows_drawn: Collection[str] = ()
+    """Names of figures that draw single replicates."""
+    tables: Callable[[Any], list[Table | str]] = lambda found: []
+    """(found) → the tables and texts of its page, in the place of the table as text."""
+    examples: Callable[[Any, Any], list[Example]] = lambda path, folder: []
+    """(path, folder of its config or None) → replicates that are worth watching."""
+    mark: Callable[[Any], str] = lambda found: ""
+    """(found) → what each figure has to say, as that it is not complete."""
+    opened: Any = None
+    """(path, folder, sources) → what a script has of it, where there are ``results``."""
+    compare: Any = None
+    """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
+    compared: Mapping[str, str] = attrs.Factory(dict)
+    """{name: words} of what can be compared."""
+    joined: Joined | None = None
+    """What sweeps join; None where they cannot be run."""
+    animate: Any = None
+    """(path, found, rule) writes a GIF."""
+    motion: Any = None
+    """(found) → (times, positions, velocities, shapes)."""
+    rates: Any = None
+    """(found) → Kernel; None where it has none."""
+    water: Any = None
+    """(path) → lines on what slow flow makes of it."""
+    run: Any = None
+    """(found) → scalars of the group ``run``."""
+    so_far: Any = None
+    """(Unfinished) → facts of a study that has not ended."""
+
+
+def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:
+    """The Contents of a file whose kind has an ability, a field of Contents; FileError for one of
+    another kind, or that is absent or damaged. What does not say its kind is read as the first."""
+    name = kind_of(path)
+    if name and (name not in FILES or getattr(contents_of(name), ability) is None):
+        able = [each for each in FILES if getattr(contents_of(each), ability) is not None]
+        raise FileError(f"{path} holds a {name}: name a file of {' or '.join(able)}")
+    found: Contents = contents_of(name or next(iter(FILES)))
+    return found
+
+
+def studies() -> list[Contents]:
+    """The Contents of all kinds of studies."""
+    return [contents_of(name) for name in STUDIES]
+
+
+def overview_of(path: str | os.PathLike) -> tuple[Contents, Any]:
+    """(Contents, found) of a file, with all that its summary needs."""
+    kind = file_kind(path)
+    return kind, (kind.overview or kind.read)(path)
+
+
+def summary_of(path: object, kind: Contents, found: Any) -> Summary:
+    """What a file says of itself; FileError where that cannot be read."""
+    try:
+        return kind.summary(found)
+    except ValueError as error:
+        raise FileError(f"{path} holds no readable {kind.title}: {error}") from error
+
+
+def text_of(path: str | os.PathLike) -> str:
+    """What `flocsim info` prints of a file."""
+    kind, found = overview_of(held(path))
+    said, mark = summary_of(path, kind, found), kind.mark(found)
+    title = f"{kind.title}; {mark}" if mark else kind.title
+    lines = [f"{path}: {title}", "", *fact_lines(said.facts + said.origin)]
+    if said.warnings:
+        lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
+    if said.failed:
+        lines += ["", *(f"failed: {visible(line, '')}" for line in said.failed[:MOST_FAILURES])]
+    if len(said.failed) > MOST_FAILURES:
+        lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
+    table = kind.table(found)
+    return "\n".join([*lines, *(["", table] if table else [])])
+
+
+def unfinished_text(found: Any) -> str:
+    """What an Unfinished has so far; nothing of it is final."""
+    kind, last = contents_of(found.kind), found.sessions[-1]
+    facts = [*kind.so_far(found), ("begun", f"{last['date']} by {last['command']}")]
+    if found.unread:
+        facts.append(("damaged", f"{found.unread} bytes of {found.noun}, left out"))
+    reasons = Counter(str(note["why"]) for note in found.notes)
+    lines = [f"{found.path}: {found.progress}", "", *fact_lines(facts)]
+    shown = reasons.most_common(MOST_FAILURES)
+    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
+    return "\n".join([*lines, "", f"{found.progress}:", kind.table(found.results)])
+
+
+def fact_lines(facts: Facts) -> list[str]:
+    """[(name, value)] as aligned lines; what a file says is shown, and steers no terminal."""
+    width = max(len(name) for name, _ in facts)
+    return [f"{visible(name, ''):<{width}}  {visible(value, '')}" for name, value in facts]
+
+
+def origin(run: Mapping[str, Any]) -> Facts:
+    """All that the group ``run`` knows and a person wants to; ValueError where it cannot be
+    read."""
+    facts = []
+    for name, value in run.items():
+        if name in SAID_APART or value == "":
+            continue
+        if isinstance(value, float):
+            value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
+        facts.append((name.replace("_", " "), str(value)))
+    kinds = stored(run, "cpus")
+    names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
+    return [*facts, ("kind of CPU", "; ".join(names))] if names else facts
+
+
+def in_words(value: object) -> str:
+    """A coordinate as text."""
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,209 @@
+"""What a results file of pairs or rates holds, for the commands."""
+
+import json
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from flocsim.ensembles.config.toml_text import parse
+from flocsim.ensembles.contents import Contents, Facts, Figures, Joined, Summary, in_words, origin
+from flocsim.ensembles.pairs.comparison import compare
+from flocsim.ensembles.pairs.examples import examples_of
+from flocsim.ensembles.pairs.opened import StudyResults, open_results
+from flocsim.ensembles.pairs.page import tables_of
+from flocsim.ensembles.report import (
+    change_lines,
+    checked_line,
+    efficiency_lines,
+    format_table,
+    graze_lines,
+    kernel_lines,
+    touch_lines,
+    undecided_line,
+)
+from flocsim.ensembles.storage.plan import AXES
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.errors import ConfigError, visible
+from flocsim.io.plots.kernel import KERNEL_FIGURES
+from flocsim.io.plots.results import FIGURES, OF_ROWS
+from flocsim.io.plots.sweep import SWEEP_FIGURES
+from flocsim.io.results.events import ENDS_COUNTED, ends_of
+from flocsim.io.results.file import OUTCOMES, Overview, read_overview, read_results, with_rows
+from flocsim.io.results.run_words import (
+    choice_lines,
+    class_words,
+    describe_note,
+    sphere_words,
+    water_words,
+)
+from flocsim.io.results.schema import BONDS, COMPARED, GROUPS, LAST_AXES, RADII, Results
+
+
+def summary(results: Overview) -> Summary:
+    """What a results file says of its study; ValueError where that cannot be read."""
+    run = results.run
+    facts = conditions(results) + sizes(results) + outcomes(results)
+    facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+    facts += [("", line) for line in change_lines(results)]
+    if choice := stored(run, "accuracy"):
+        facts += [("accuracy", line) for line in choice_lines(choice)]
+    warnings = [str(line) for line in stored(run, "warnings")]
+    warnings += filter(None, [undecided_line(results)])
+    failed = [describe_note(note) for note in stored(run, "failed")]
+    facts += settling(run) + thermal(run)
+    facts += [("touched", line) for line in touch_lines(results)]
+    return Summary(facts, origin(run), warnings, failed)
+
+
+def table(results: Results) -> str:
+    """Counts and probabilities, behind the efficiencies if there are any; or the rates."""
+    if results.kernel is not None:
+        return "\n".join(kernel_lines(results.kernel))
+    efficiencies = efficiency_lines(results)
+    counts = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
+
+
+def conditions(results: Results) -> Facts:
+    """[(name, value)] of what was simulated."""
+    vertices = (f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)
+    facts = [
+        ("preset", preset(results.run)),
+        ("types", ", ".join(results.types)),
+        ("vertices", ", ".join(vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
+    ]
+    over = stored(results.run, "overrides")
+    return [*facts, ("over the config", json.dumps(over))] if over else facts
+
+
+def sizes(results: Overview) -> Facts:
+    """[(name, value)] of the radii of the types, and between which values the replicates were."""
+    known = [
+        f"{name}: {1e6 * i:.4g}, {1e6 * j:.4g}"
+        for name, i, j in zip(
+            results.types, results.radii["r_i"], results.radii["r_j"], strict=True
+        )
+        if i > 0.0 and j > 0.0
+    ]
+    facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
+    if classes := class_words(stored(results.run, "size_classes")):
+        facts.insert(0, ("size classes", classes.partition(": ")[2]))
+    units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
+    words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
+    for name, (low, high) in results.totals.spans.items():
+        low, high = units[name] * low, units[name] * high
+        if f"{low:.4g}" != f"{high:.4g}":
+            facts.append((words[name], f"{low:.4g} to {high:.4g} in the replicates"))
+    return facts
+
+
+def preset(run):
+    if "preset" in run:
+        return run["preset"] or "none named"
+    try:
+        return str(parse("config", str(run.get("config", ""))).get("preset", "none named"))
+    except ConfigError:
+        return "unknown, the config cannot be read"
+
+
+def outcomes(results: Overview) -> Facts:
+    """(name, value) of what came out, all conditions together."""
+    totals = results.totals
+    found = zip(OUTCOMES, totals.outcomes, strict=True)
+    rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
+    bonds = zip(
+        BONDS, results.probabilities["n_bond"].reshape(-1, len(BONDS)).sum(axis=0), strict=True
+    )
+    rows.append(("bonds", ", ".join(f"{n} {word}" for word, n in bonds)))
+    named = list(zip(results.failures, totals.failures, strict=True))[1:]
+    if any(number for _, number in named):
+        rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))
+    if totals.count:
+        steps = f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
+        steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
+        rows.append(("steps", steps))
+    return rows
+
+
+def settling(run):
+    """[(name, value)] of the bodies at their terminal speeds, a line for each collision type."""
+    types: dict[str, list[str]] = {}
+    for each in stored(run, "settling"):
+        number = f"{each['body']} Re {each['reynolds']:.2g} St {each['stokes']:.2g}"
+        types.setdefault(each["type"], []).append(number)
+    return [("settling", f"{name}: {', '.join(numbers)}") for name, numbers in types.items()]
+
+
+def thermal(run):
+    """[(name, value)] of what integrals say of equivalent spheres, for each type of a brownian
+    study."""
+    found = stored(run, "equivalent_spheres")
+    return [("thermal", f"{each['type']}: {sphere_words(each)}") for each in found]
+
+
+def so_far(found: Any) -> Facts:
+    """[(name, value)] of the conditions of a study of pairs that still runs."""
+    results = found.results
+    planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
+    counts = results.probabilities["n_total"]
+    return [
+        ("types", ", ".join(results.types)),
+        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
+         f"{planned}"),
+        ("numerical error", checked_line(results) or "unknown: none was run again yet"),
+    ]  # fmt: skip
+
+
+def sweep_rows(found: Any) -> list[tuple[str, ...]]:
+    """Outcomes and Pr[A] of every value and condition, heads first."""
+    table = found.labelled("probabilities")
+    ends = ends_of({name: table.columns[name].values for name in ENDS_COUNTED})
+    rows = [(*found.swept, "type", "N", "delta", "n", *ends, "Pr[A]", "[95 %]")]
+    axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
+    columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
+    for place in np.ndindex(*columns[0].shape):
+        names = [axis[k] for axis, k in zip(axes, place, strict=True)]
+        n, value, low, high = (column[place] for column in columns)
+        told = (f"{value:.3f}" if value == value else "-",
+                f"[{low:.3f}, {high:.3f}]" if high == high else "-")  # fmt: skip
+        counts = (str(each[place]) for each in ends.values())
+        rows.append((*(visible(in_words(each), "") for each in names), str(n), *counts, *told))
+    return rows
+
+
+def figures(results: Results) -> Figures:
+    """The figures of pairs, or of rates."""
+    return FIGURES if results.kernel is None else KERNEL_FIGURES
+
+
+def asked(results: StudyResults) -> dict[str, Any]:
+    """The axes of results, and how many replicates each condition has."""
+    axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
+    return axes | {"replicates": results.count}
+
+
+CONTENTS = Contents(
+    title="results of a collision ensemble", results=StudyResults,
+    read=partial(read_results, replicates=False), overview=read_overview, summary=summary,
+    table=table, figures=figures, tables=tables_of, examples=examples_of,
+    drawn={
+        "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":
+            FIGURES,
+        "a kernel study": KERNEL_FIGURES,
+    },
+    with_rows=with_rows, rows_drawn=OF_ROWS, so_far=so_far, run=lambda found: found.run,
+    opened=open_results, compare=compare, compared=COMPARED,
+    joined=Joined(
+        {name: GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows, SWEEP_FIGURES,
+        asked, {axis: len(words) for axis, words in LAST_AXES.items()}, tuple(RADII),
+        lambda swept: graze_lines(swept.labelled("probabilities").axes["delta"].values),
+    ),
+    rates=lambda found: found.kernel,
+    water=lambda path: [water_words(each) for each in open_results(path).in_water()],
+)  # fmt: skip

@@ -1,0 +1,265 @@
+"""StudyResults: a results file with its arrays, tables and figures, and its replicates anew."""
+
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from flocsim.ensembles.config.consent import Consent, read_sources
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.equivalent_spheres import water_facts
+from flocsim.ensembles.pairs.replicates import (
+    Place,
+    chosen,
+    one_count_study,
+    place_of,
+    recorded_methods,
+    replicate_of,
+    row_in_words,
+)
+from flocsim.ensembles.report import checked_line, format_table
+from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
+from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.study import Study, methods_of
+from flocsim.errors import ConfigError, FileError, UsageError
+from flocsim.fields import is_whole
+from flocsim.integrators.base import Integrator
+from flocsim.io.files import held
+from flocsim.io.labelled import Labelled, Tables
+from flocsim.io.outputs import figure_rule
+from flocsim.io.plots.results import FIGURES, OF_ROWS
+from flocsim.io.plots.style import Figure, save
+from flocsim.io.results.file import read_results, read_row
+from flocsim.io.results.schema import GROUPS, Results
+from flocsim.trajectories.trajectory import Trajectory
+
+STEPS_MORE = 1000
+"""Steps beyond twice those of its row after which a replicate is given up as another one."""
+
+REPEATED = ("outcome", "inside", "bond")
+"""What of a row has to come out again."""
+
+INDICES = {name: group.index for name, group in GROUPS.items()}
+
+
+class StudyResults(Tables):
+    """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
+
+    ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
+    ``probabilities``, ``pooled``, ``differences`` and ``numerics`` {name: array} its tables,
+    ``replicates`` the same of every single collision, read when asked for; ``kernel`` the rates of
+    a kernel study, None in others; ``run`` where it came from.
+    """
+
+    indices = INDICES
+
+    def __init__(
+        self, results: Results, source: str | os.PathLike, folder: Path | None,
+        sources: Sources | None = None,
+    ) -> None:  # fmt: skip
+        self.results, self.source = results, source
+        self.folder = Path(source).parent if folder is None else folder
+        self.trusted, self.sources = folder is not None, sources or Sources()
+        self.path = Path(source)
+        self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
+        self.count, self.run = results.count, results.run
+        self.probabilities, self.pooled = results.probabilities, results.pooled
+        self.differences, self.kernel = results.differences, results.kernel
+        self.numerics = results.numerics
+        self.studies: dict[int, Study] = {}
+
+    @functools.cached_property
+    def replicates(self) -> dict[str, np.ndarray]:
+        """{column: (type, vertices, delta, replicate)} of all replicates, read from the file that
+        was opened; FileError where another has taken its place."""
+        found = read_results(self.source).replicates
+        assert found is not None
+        return found
+
+    @functools.cached_property
+    def config(self) -> Config:
+        """What was run: the config that the file holds, and what was laid over it."""
+        text = str(self.run.get("config", ""))
+        if not text:
+            raise FileError(f"{self.path} holds no config: it was not written by flocsim ensemble")
+        if self.sources.config is None:
+            self.sources.config = text
+            self.sources.consent = None if self.trusted else Consent(str(self.path), self.modules)
+        try:
+            return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+        except ConfigError as error:
+            line, *more = str(error).split("\n")
+            further = f" (and {len(more)} more)" if more else ""
+            raise ConfigError(
+                f"the config in {self.path} cannot be used: {line}{further}"
+            ) from error
+
+    @property
+    def modules(self) -> dict[str, dict[str, str]]:
+        """{place: {digest, source}} of the user's own modules that were run; none in files of
+        before."""
+        try:
+            return read_sources(self.run)
+        except ValueError as error:
+            raise FileError(f"{self.path} holds no readable results: {error}") from error
+
+    def stored(self, name: str) -> dict:
+        """What the group ``run`` has as JSON."""
+        try:
+            return stored(self.run, name)
+        except ValueError as error:
+            raise FileError(f"{self.path} holds no readable results: {error}") from error
+
+    def table(self) -> str:
+        """Counts and probabilities of every condition as the command prints them, as text."""
+        lines = [format_table(self.types, self.vertices, self.delta, self.probabilities)]
+        return "\n".join([*lines, *filter(None, [checked_line(self.results)])])
+
+    def labelled(self, group: str = "probabilities") -> Labelled:
+        """The arrays of a group of the file with their axes; UsageError for an unknown one."""
+        group = self.known(group)
+        arrays: Mapping[str, np.ndarray] = getattr(self, group)
+        if not arrays:
+            raise UsageError(f"{self.path} has no group {group}: it was written without")
+        return self.results.labelled(group, arrays)
+
+    def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
+        """One of the figures of `flocsim plot`, as a matplotlib Figure.
+
+        Written to ``file`` if given. UsageError for an unknown one, which lists them.
+        """
+        if figure not in FIGURES:
+            raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
+        results = self.results
+        if figure in OF_ROWS:
+            results = attrs.evolve(results, replicates=self.replicates)
+        drawn = FIGURES[figure](results)
+        if file is not None:
+            save(drawn, Path(file), figure_rule())
+        return drawn
+
+    def replicate(
+        self, replicate: int = 0, type: str | None = None, vertices: int | None = None,
+        delta: float | None = None,
+    ) -> Trajectory:  # fmt: skip
+        """Run one replicate of the file again, and keep its motion.
+
+        Of a collision type (default: the first), with so many vertices (the last) at a displacement
+        (the first). UsageError where the file does not have it, where the config's library or own
+        modules are not where the results lie (``flocsim.open(path, folder=…)`` says where), and
+        where this flocsim computes something else than the file holds. Own modules that are not
+        what the file was made with are run only where ``folder`` is given.
+        """
+        if not is_whole(replicate) or not 0 <= replicate < self.count:
+            raise UsageError(
+                f"replicate must be a whole number from 0 to {self.count - 1}, found {replicate!r}"
+            )
+        for value, known, name in (
+            (type, self.types, "type"), (vertices, self.vertices.tolist(), "vertices"),
+            (delta, self.delta.tolist(), "delta"),
+        ):  # fmt: skip
+            chosen(value, known, name, 0)
+        place = place_of(self.config, type, vertices, delta)
+        study, row = self.study_with(place[1]), self.row(int(replicate), place)
+        found = replicate_of(int(replicate), place, study, STEPS_MORE + 2 * int(row["steps"]))
+        self.hold(found, row)
+        return found
+
+    def in_water(self) -> list[dict[str, Any]]:
+        """[{type, water, alone}]: the share of the rectilinear kernel of the equivalent spheres of
+        each type that touches with the water that they push at each other, and without.
+
+        Computed by their ways in three dimensions, without inertia (flocsim.hydrodynamics), in a
+        second for each type. UsageError where that is not known.
+        """
+        return water_facts(self.config)
+
+    def row(self, replicate: int, place: Place) -> dict[str, Any]:
+        """The stored row of a replicate, in words."""
+        name = self.config.scene.names[place[0]]
+        at = (
+            list(self.types).index(name), self.vertices.tolist().index(place[1]),
+            self.delta.tolist().index(place[2]), replicate,
+        )  # fmt: skip
+        if "replicates" in vars(self):
+            return row_in_words({each: self.replicates[each][at] for each in self.replicates})
+        return row_in_words(read_row(self.source, at))
+
+    def hold(self, found: Trajectory, row: Mapping[str, Any]) -> None:
+        """UsageError where a replicate has come out otherwise than its row says."""
+        assert found.row is not None, "a replicate of a study"
+        for name in REPEATED:
+            if found.row[name] != row[name]:
+                raise UsageError(
+                    f"{self.path} cannot be run again as it was: {name} is {row[name]} in the "
+                    f"file, {found.row[name]} now; use the kind of machine that it was made with"
+                )
+
+    def study_with(self, vertices: int) -> Study:
+        """The study of the file with bodies of so many vertices, ready to run replicates again.
+
+        UsageError where this flocsim would compute something else than the file holds.
+        """
+        if vertices not in self.studies:
+            config, identity = self.config, self.stored("identity")
+            methods = recorded_methods(self.stored("accuracy")) or self.methods()
+            if lacking := set(config.scene.names) - methods.keys():
+                self.refuse([f"no method is known for the type {min(lacking)}"])
+            # What costs nothing comes first: flocs may take hours.
+            before = facts_before(config, methods)
+            self.refuse(differences({k: v for k, v in identity.items() if k in before}, before))
+            self.refuse(self.contradictions())
+            study = one_count_study(config, vertices, methods)
+            self.refuse(differences(identity, identity_of(study)))
+            self.studies[vertices] = study
+        return self.studies[vertices]
+
+    def refuse(self, unlike: Sequence[str]) -> None:
+        """UsageError where something differs from what the file says."""
+        if unlike:
+            raise UsageError(
+                f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
+                "files and the kind of machine that it was made with"
+            )
+
+    def methods(self) -> dict[str, Integrator]:
+        """The methods of a config that needs no pilot."""
+        if self.config.integrator.is_chosen:
+            raise FileError(f"{self.path} does not say what methods its pilot has chosen")
+        return methods_of(self.config)
+
+    def contradictions(self) -> list[str]:
+        """What the config asks for that the file does not have, a line each."""
+        shapes, lines = self.config.shapes, []
+        lacking = set(self.config.scene.names) - set(self.types)
+        if lacking:
+            lines.append(f"its config has the type {min(lacking)}, its rows have not")
+        grown = shapes.own is None and shapes.source == "synthetic" and max(shapes.vertices) > 1
+        if grown and len(self.results.flocs) != shapes.pool:
+            lines.append(
+                f"its config asks for {shapes.pool} flocs, its rows have {len(self.results.flocs)}"
+            )
+        return lines
+
+    def __repr__(self) -> str:
+        shape = " × ".join(map(str, self.results.shape))
+        return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
+
+
+def open_results(
+    path: str | os.PathLike, folder: str | os.PathLike | None = None,
+    sources: Sources | None = None,
+) -> StudyResults:  # fmt: skip
+    """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
+    modules and libraries."""
+    source = held(path)
+    file_kind(source, "rates")
+    found = read_results(source, replicates=False)
+    return StudyResults(found, source, None if folder is None else Path(folder), sources)

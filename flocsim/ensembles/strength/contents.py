@@ -1,0 +1,33 @@
+"""What a file of `flocsim strength` holds, for the commands."""
+
+from collections import Counter
+
+from flocsim.ensembles.contents import Contents, Facts, Summary
+from flocsim.ensembles.estimates.strengths import table_of
+from flocsim.io.plots.strength import STRENGTH_FIGURES
+from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths
+
+
+def facts_of(found: Strengths) -> Facts:
+    """What has been tested, and what was found, also of a survey that has not ended."""
+    statuses = Counter(found.column("status").tolist())
+    ends = [f"{count} {STATUS[code].replace('_', ' ')}"
+            for code, count in sorted(statuses.items())]  # fmt: skip
+    used = Counter(found.column("tolerance").tolist())
+    needed = [f"{count} at {tolerance:g} m" for tolerance, count in sorted(used.items())]
+    told = found.progress if found.complete else f"{found.progress} so far; go on with --resume"
+    facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
+    return facts + [
+        (name.replace("_", " "), str(value)) for name, value in found.about.items()
+        if name not in ("asked", "complete", "cpus")
+    ]  # fmt: skip
+
+
+CONTENTS = Contents(
+    title="strengths of bonds", results=Strengths, read=read_strengths,
+    summary=lambda found: Summary(facts_of(found)), table=table_of,
+    figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
+    mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",
+    so_far=lambda found: facts_of(found.results),
+    opened=lambda path, folder=None, sources=None: read_strengths(path),
+)  # fmt: skip
