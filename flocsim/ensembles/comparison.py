@@ -12,7 +12,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.labelled import Column, Labelled, Tables
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Differences(Tables):
     """``arrays`` {quantity: {name: values}} of what the second has more of than the first.
 

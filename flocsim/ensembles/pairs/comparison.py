@@ -30,7 +30,7 @@ MEANINGS = {
 """The arrays of a comparison of one probability."""
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Comparison(Differences):
     """What one results file has more of than another: `flocsim.compare` makes it.
 

@@ -22,7 +22,7 @@ OF_MEANS = {
 """The arrays of a comparison of one quantity of swarms."""
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class SwarmComparison(Differences):
     """What one file of swarms has more of than another: ``arrays`` {column of the counts: {name:
     (time,)}} at the ``times`` [s] that both have, names as in OF_MEANS; intervals by Student's

@@ -38,11 +38,11 @@ Every dataset has the attributes
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -114,7 +114,7 @@ MEASURE_COLUMNS = declared(
     },
     ("floc",),
 )
-"""The measures of the masks; a library may lack them."""
+"""The measures of the masks."""
 
 UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
 
@@ -126,7 +126,7 @@ POPULATION_COLUMNS = declared(
     },
     ("floc",),
 )
-"""What the picture leaves open; a library may lack them."""
+"""What the picture leaves open."""
 
 ATTRIBUTES = {
     "id": "floc_id", "part": "points.part", "ring": "points.ring",
@@ -206,6 +206,47 @@ class ShapeEntry:
         return self.equivalent_radius * self.pixel_size
 
 
+def measures_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
+    """The ShapeMeasures of all flocs, None for those without; ValueError for what cannot be."""
+    table = np.stack(list(columns.values()))
+    known = np.isfinite(table) & (table > 0.0)
+    if not np.all(known.all(axis=0) | np.isnan(table).all(axis=0)):
+        raise ValueError("measures holds values that are no numbers of a floc's")
+    rows = table.T.tolist()
+    return {"measures": [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]}
+
+
+def population_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
+    """What the picture leaves open of all flocs; ValueError for what cannot be."""
+    for name, values in columns.items():
+        if not np.all((values > 0.0) & (values <= MOST_PIXELS)):
+            raise ValueError(f"population/{name} holds values that are no numbers of a floc's")
+    return {name: values.tolist() for name, values in columns.items()}
+
+
+class OptionalGroup(NamedTuple):
+    """A group that a library may lack: its columns, whether it says anything of an entry, what of
+    an entry has its values, and these, once they were checked, as attributes of entries."""
+
+    columns: Mapping[str, Declared]
+    is_known: Callable[[ShapeEntry], bool]
+    owner: Callable[[ShapeEntry], Any]
+    read: Callable[[dict[str, np.ndarray]], dict[str, list]]
+
+
+OPTIONAL = {
+    "measures": OptionalGroup(
+        MEASURE_COLUMNS, lambda entry: entry.measures is not None,
+        lambda entry: entry.measures or UNMEASURED, measures_in,
+    ),
+    "population": OptionalGroup(
+        POPULATION_COLUMNS,
+        lambda entry: entry.radius_low < entry.radius_high or entry.weight != 1.0,
+        lambda entry: entry, population_in,
+    ),
+}  # fmt: skip
+
+
 def make_entry(
     image: str,
     region: Any,
@@ -277,11 +318,9 @@ def write_library(
     for count in sorted(entries[0].fits):
         fits = [entry.fits[count] for entry in entries]
         groups[f"fits/{count}"] = labelled(fits_at(count, compound), fits)
-    if any(entry.measures for entry in entries):
-        measured = [entry.measures or UNMEASURED for entry in entries]
-        groups["measures"] = labelled(MEASURE_COLUMNS, measured)
-    if any(entry.radius_low < entry.radius_high or entry.weight != 1.0 for entry in entries):
-        groups["population"] = labelled(POPULATION_COLUMNS, entries)
+    for name, group in OPTIONAL.items():
+        if any(map(group.is_known, entries)):
+            groups[name] = labelled(group.columns, [group.owner(entry) for entry in entries])
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
     attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
     write_groups(path, attributes, groups, rule=rule)
@@ -354,7 +393,7 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
                 raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
-    optional = {"measures": MEASURE_COLUMNS, "population": POPULATION_COLUMNS}
+    optional = {name: group.columns for name, group in OPTIONAL.items()}
     lengths = hold_against(nodes, groups | optional, groups)
     if lengths["floc"] < 1 or len(groups) < 3:
         raise ValueError("there are no flocs")
@@ -378,9 +417,9 @@ def _entries(file):
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have one id")
-    flocs["measures"] = _measures(file, len(flocs["floc_id"]))
-    if "population" in file:
-        flocs |= {name: column_values(file, name).tolist() for name in POPULATION_COLUMNS}
+    for name, group in OPTIONAL.items():
+        if name in file:
+            flocs |= group.read({each: file[name][each][()] for each in group.columns})
     fits = {int(count): _fits(int(count), group) for count, group in file["fits"].items()}
     entries = []
     for row in range(len(flocs["floc_id"])):
@@ -391,28 +430,6 @@ def _entries(file):
         values = {attribute: column[row] for attribute, column in flocs.items()}
         entries.append(ShapeEntry(**values, fits=stored))
     return entries
-
-
-def _measures(file, count):
-    """The ShapeMeasures of all flocs, None for those without; ValueError for values that cannot
-    be."""
-    if "measures" not in file:
-        return [None] * count
-    columns = {name: file["measures"][name][()] for name in MEASURE_COLUMNS}
-    table = np.stack(list(columns.values()))
-    known = np.isfinite(table) & (table > 0.0)
-    if not np.all(known.all(axis=0) | np.isnan(table).all(axis=0)):
-        raise ValueError("measures holds values that are no numbers of a floc's")
-    rows = table.T.tolist()
-    return [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]
-
-
-def column_values(file, name):
-    """What the group "population" holds of all flocs; ValueError for values that cannot be."""
-    values = file["population"][name][()]
-    if not np.all((values > 0.0) & (values <= MOST_PIXELS)):
-        raise ValueError(f"population/{name} holds values that are no numbers of a floc's")
-    return values
 
 
 def _fits(count, group):
