@@ -142,11 +142,14 @@ def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:
     """The Contents of a file whose kind has an ability, a field of Contents; FileError for one of
     another kind, or that is absent or damaged. What does not say its kind is read as the first."""
     name = kind_of(path)
-    if name and (name not in FILES or getattr(contents_of(name), ability) is None):
-        able = [each for each in FILES if getattr(contents_of(each), ability) is not None]
+    if name in FILES and getattr(contents_of(name), ability) is not None:
+        found: Contents = contents_of(name)
+        return found
+    able = [each for each in FILES if getattr(contents_of(each), ability) is not None]
+    if name:
         raise FileError(f"{path} holds a {name}: name a file of {' or '.join(able)}")
-    found: Contents = contents_of(name or next(iter(FILES)))
-    return found
+    first: Contents = contents_of(able[0])
+    return first
 
 
 def studies() -> list[Contents]:

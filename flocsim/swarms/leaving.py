@@ -17,7 +17,6 @@ from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Gauge
 
 KEEP, REMOVE, REENTER = "keep", "remove", "reenter"
-RULES = (KEEP, REMOVE, REENTER)
 
 MOST_TRIALS = 200
 """Places tried for what comes back, before it is put further out."""

@@ -67,17 +67,23 @@ def table(results: Results) -> str:
 
 
 def conditions(results: Results) -> Facts:
-    """[(name, value)] of what was simulated."""
-    vertices = (f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)
-    facts = [
-        ("preset", preset(results.run)),
-        ("types", ", ".join(results.types)),
-        ("vertices", ", ".join(vertices)),
-        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
-        ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
-    ]
+    """What was simulated."""
     over = stored(results.run, "overrides")
-    return [*facts, ("over the config", json.dumps(over))] if over else facts
+    return [
+        ("preset", preset(results.run)),
+        *axes_of(results),
+        ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
+        *([("over the config", json.dumps(over))] if over else []),
+    ]
+
+
+def axes_of(results: Results) -> Facts:
+    """The conditions."""
+    return [
+        ("types", ", ".join(results.types)),
+        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
+        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+    ]
 
 
 def sizes(results: Overview) -> Facts:
@@ -151,9 +157,7 @@ def so_far(found: Any) -> Facts:
     planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
     counts = results.probabilities["n_total"]
     return [
-        ("types", ", ".join(results.types)),
-        ("vertices", ", ".join(f"{n} (sphere)" if n == 1 else str(n) for n in results.vertices)),
-        ("delta / delta_max", ", ".join(f"{share:g}" for share in results.delta)),
+        *axes_of(results),
         ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
          f"{planned}"),
         ("numerical error", checked_line(results) or "unknown: none was run again yet"),

@@ -58,15 +58,6 @@ class Study:
         self.sources = sources or Sources(text)
         self.config: Config = load_any_config(path, overrides, self.sources)
 
-    @classmethod
-    def of_text(
-        cls, path: str | os.PathLike, text: str, overrides: Mapping[str, Any] | None = None
-    ) -> "Study":
-        """The Study of a file's text, whatever lies at its path, and of what is laid over it."""
-        study = cls.__new__(cls)
-        study._take(Path(path), text, dict(overrides or {}))
-        return study
-
     def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> "Study":
         """A new Study with other values: a nested dict, dotted keys, or top-level keys by name.
 

@@ -90,6 +90,8 @@ def read_sweep(
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept names no keys")
         joined, lengths = next((each for each in known if each[0].keys() <= nodes.keys()), ({}, {}))
+        if not joined:
+            raise ValueError("it has no groups that a sweep joins")
         declared = {name: joined_group(each, name, about, nodes) for name, each in joined.items()}
         wanted = {name: group.arrays for name, group in declared.items()}
         hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, list(joined), lengths)
