@@ -133,7 +133,7 @@ def test_info_and_plot_know_the_joined_file(swept, capsys, tmp_path):
     _, path = swept
     assert main(["info", str(path)]) == 0
     told = capsys.readouterr().out
-    assert f"{HAMAKER} (as hamaker): 1e-18, 1e-20 J" in told
+    assert f"{HAMAKER} (as hamaker)  1e-18, 1e-20 J" in told
     assert [line.split()[:5] for line in told.splitlines()[-2:]] == [
         [value, "I", "1", "0", "2"] for value in ("1e-18", "1e-20")
     ]
