@@ -1,0 +1,1 @@
+"""A trial kind of study: single flocs that settle alone past an upright wall."""
