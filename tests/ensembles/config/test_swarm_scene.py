@@ -11,7 +11,7 @@ from tests.helpers.swarm_study import SWARM, swarm_config, write_swarm_study
 
 def test_a_swarm_is_a_scene_of_its_own(tmp_path):
     config = swarm_config(tmp_path)
-    assert config.is_swarm and isinstance(config.scene, SwarmScene)
+    assert isinstance(config.scene, SwarmScene)
     assert (config.scene.number, config.scene.interval) == (12, 0.1)
     every = swarm_config(tmp_path, {"scene": {"every": "auto"}}).scene.interval
     assert every == pytest.approx(0.03)
@@ -57,7 +57,7 @@ def test_tables_for_pairs_are_refused(tmp_path, table):
 def test_commands_for_pairs_say_who_runs_it(tmp_path, command, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     path = write_swarm_study(tmp_path)
-    with pytest.raises(ConfigError, match="run it with `flocsim swarm`"):
+    with pytest.raises(ConfigError, match="run it with `flocsim ensemble`"):
         load_config(path)
     assert main([command, str(path)]) == ConfigError.exit_code
     assert "run it with `flocsim swarm`" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from flocsim.commands.strength import places
 from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, table_of
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run, run_to_file
-from flocsim.ensembles.strength import survey as module
+from flocsim.ensembles.strength import kind as module
 from flocsim.ensembles.strength.kind import (
     Bonds,
     Bound,
