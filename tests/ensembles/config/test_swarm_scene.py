@@ -60,4 +60,4 @@ def test_commands_for_pairs_say_who_runs_it(tmp_path, command, monkeypatch, caps
     with pytest.raises(ConfigError, match="run it with `flocsim ensemble`"):
         load_config(path)
     assert main([command, str(path)]) == ConfigError.exit_code
-    assert "run it with `flocsim swarm`" in capsys.readouterr().err
+    assert "run it with `flocsim ensemble`" in capsys.readouterr().err
