@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import FileError, UsageError
 from flocsim.io.labelled import Column, Labelled, Tables
@@ -77,6 +76,8 @@ def identity_in(results: Any) -> dict[str, Any]:
 
 def changes_between(first: Any, second: Any) -> tuple[str, ...]:
     """Lines on what the studies of two files differ in."""
+    from flocsim.ensembles.storage.identity import differences  # which needs the engine
+
     lines = differences(*map(identity_in, (first, second)))
     return tuple(
         line.replace(" in the file, ", " in the first, ").replace(" now", " in the second")

@@ -5,6 +5,7 @@ Each kind gives its Contents, by which `open`, `info`, `plot`, `report`, `compar
 table of all.
 """
 
+import importlib
 import os
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -92,8 +93,6 @@ class Contents:
 
     title: str
     """What a file holds, in words."""
-    results: type | None = None
-    """Of what class is what `opened` gives; None where `flocsim.open` is not for it."""
     read: Callable[[Any], Any]
     """(path) → found; FileError for a file that is absent, damaged, or of another kind."""
     summary: Callable[[Any], Summary]
@@ -117,7 +116,7 @@ class Contents:
     mark: Callable[[Any], str] = lambda found: ""
     """(found) → what each figure has to say, as that it is not complete."""
     opened: Any = None
-    """(path, folder, sources) → what a script has of it, where there are ``results``."""
+    """(path, folder, sources) → what a script has of it; its ``format`` is that of the file."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     compared: Mapping[str, str] = attrs.Factory(dict)
@@ -136,6 +135,14 @@ class Contents:
     """(found) → scalars of the group ``run``."""
     so_far: Any = None
     """(Unfinished) → facts of a study that has not ended."""
+
+
+def later(module: str, name: str) -> Callable[..., Any]:
+    """A function of a module of flocsim that is loaded when it is called: what shows a file has no
+    need of the engine."""
+    return lambda *args, **more: getattr(importlib.import_module(f"flocsim.{module}"), name)(
+        *args, **more
+    )
 
 
 def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:

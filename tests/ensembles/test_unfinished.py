@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.ensembles import pairs
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.estimates.statistics import tabulate
+from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.unfinished import read_unfinished
 from flocsim.errors import FileError
 from flocsim.io.journal.journal import Journal, journal_of

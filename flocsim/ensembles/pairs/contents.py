@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.config.toml_text import parse
-from flocsim.ensembles.contents import Contents, Facts, Figures, Joined, Summary, in_words, origin
-from flocsim.ensembles.pairs.comparison import compare
-from flocsim.ensembles.pairs.examples import examples_of
-from flocsim.ensembles.pairs.opened import StudyResults, open_results
+from flocsim.ensembles.contents import (
+    Contents,
+    Facts,
+    Figures,
+    Joined,
+    Summary,
+    in_words,
+    later,
+    origin,
+)
 from flocsim.ensembles.pairs.page import tables_of
 from flocsim.ensembles.report import (
     change_lines,
@@ -23,7 +29,6 @@ from flocsim.ensembles.report import (
     touch_lines,
     undecided_line,
 )
-from flocsim.ensembles.storage.plan import AXES
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, visible
 from flocsim.io.plots.kernel import KERNEL_FIGURES
@@ -186,28 +191,31 @@ def figures(results: Results) -> Figures:
     return FIGURES if results.kernel is None else KERNEL_FIGURES
 
 
-def asked(results: StudyResults) -> dict[str, Any]:
+def asked(results: Any) -> dict[str, Any]:
     """The axes of results, and how many replicates each condition has."""
-    axes = {axis: np.asarray(getattr(results, axis)).tolist() for axis in AXES}
-    return axes | {"replicates": results.count}
+    return {"types": list(results.types), "vertices": results.vertices.tolist(),
+            "delta": results.delta.tolist(), "replicates": results.count}  # fmt: skip
 
+
+OPENED = later("ensembles.pairs.opened", "open_results")
 
 CONTENTS = Contents(
-    title="results of a collision ensemble", results=StudyResults,
+    title="results of a collision ensemble",
     read=partial(read_results, replicates=False), overview=read_overview, summary=summary,
-    table=table, figures=figures, tables=tables_of, examples=examples_of,
+    table=table, figures=figures, tables=tables_of,
+    examples=later("ensembles.pairs.examples", "examples_of"),
     drawn={
         "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":
             FIGURES,
         "a kernel study": KERNEL_FIGURES,
     },
     with_rows=with_rows, rows_drawn=OF_ROWS, so_far=so_far, run=lambda found: found.run,
-    opened=open_results, compare=compare, compared=COMPARED,
+    opened=OPENED, compare=later("ensembles.pairs.comparison", "compare"), compared=COMPARED,
     joined=Joined(
         {name: GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows, SWEEP_FIGURES,
         asked, {axis: len(words) for axis, words in LAST_AXES.items()}, tuple(RADII),
         lambda swept: graze_lines(swept.labelled("probabilities").axes["delta"].values),
     ),
     rates=lambda found: found.kernel,
-    water=lambda path: [water_words(each) for each in open_results(path).in_water()],
+    water=lambda path: [water_words(each) for each in OPENED(path).in_water()],
 )  # fmt: skip

@@ -37,6 +37,7 @@ from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import read_results, read_row
+from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import GROUPS, Results
 from flocsim.trajectories.trajectory import Trajectory
 
@@ -59,6 +60,7 @@ class StudyResults(Tables):
     """
 
     indices = INDICES
+    format = FORMAT
 
     def __init__(
         self, results: Results, source: str | os.PathLike, folder: Path | None,

@@ -24,7 +24,7 @@ def facts_of(found: Strengths) -> Facts:
 
 
 CONTENTS = Contents(
-    title="strengths of bonds", results=Strengths, read=read_strengths,
+    title="strengths of bonds", read=read_strengths,
     summary=lambda found: Summary(facts_of(found)), table=table_of,
     figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
     mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",

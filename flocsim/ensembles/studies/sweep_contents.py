@@ -3,6 +3,7 @@
 import os
 from typing import Any
 
+from flocsim.ensembles.config.kinds import STUDIES, contents_of
 from flocsim.ensembles.contents import Contents, Facts, Figures, Joined, Summary, in_words, studies
 from flocsim.io.groups import Group
 from flocsim.io.results.sweep_file import SweepResults, read_sweep
@@ -21,8 +22,9 @@ def all_joined() -> dict[str, Group]:
 
 def joined_of(results: Any) -> Joined | None:
     """What is joined of results; None for those of a kind that sweeps cannot run."""
-    found = [each.joined for each in studies() if isinstance(results, each.results or ())]
-    return next(iter(found), None)
+    name = getattr(results, "format", "")
+    found: Joined | None = contents_of(name).joined if name in STUDIES else None
+    return found
 
 
 def read_joined(path: str | os.PathLike) -> SweepResults:
@@ -58,7 +60,7 @@ def figures(found: SweepResults) -> Figures:
 
 
 CONTENTS = Contents(
-    title="a sweep", results=SweepResults, read=read_joined, summary=summary, table=table,
+    title="a sweep", read=read_joined, summary=summary, table=table,
     figures=figures,
     drawn={"the joined file of flocsim sweep":
            {name: draw for each in kinds_joined() for name, draw in each.figures.items()}},

@@ -12,10 +12,10 @@ from flocsim.ensembles.contents import (
     Summary,
     Table,
     in_words,
+    later,
     origin,
 )
 from flocsim.ensembles.storage.stored_json import stored
-from flocsim.ensembles.swarms.comparison import compare
 from flocsim.errors import UsageError, visible
 from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
 from flocsim.io.plots.sweep import SWARM_SWEEP_FIGURES
@@ -104,10 +104,11 @@ def asked(results: SwarmResults) -> dict[str, Any]:
 
 
 CONTENTS = Contents(
-    title="results of a swarm study", results=SwarmResults, read=read_swarm, summary=summary,
+    title="results of a swarm study", read=read_swarm, summary=summary,
     table=table_of, figures=figures, drawn={"a swarm study": SWARM_FIGURES}, tables=tables,
     so_far=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
-    opened=lambda path, folder=None, sources=None: read_swarm(path), compare=compare,
+    opened=lambda path, folder=None, sources=None: read_swarm(path),
+    compare=later("ensembles.swarms.comparison", "compare"),
     compared={name: words for name, (_, _, words) in COUNTS.items()},
     joined=Joined({"counts": GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
     animate=write_swarm_animation, motion=first_swarm,

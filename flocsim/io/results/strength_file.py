@@ -89,6 +89,7 @@ class Strengths(Tables):
     doublets: Labelled
     conditions: Labelled
     indices = INDICES
+    format = FORMAT
 
     @property
     def complete(self) -> bool:

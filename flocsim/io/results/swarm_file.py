@@ -148,6 +148,7 @@ class SwarmResults(Tables):
     groups: dict[str, dict[str, np.ndarray]]
     run: dict[str, Any]
     indices = INDICES
+    format = FORMAT
 
     def __repr__(self) -> str:
         shape = self.groups["snapshots"]["cluster"].shape

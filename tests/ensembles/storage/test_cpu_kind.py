@@ -8,7 +8,8 @@ import sys
 import pytest
 
 from flocsim.compiler.processor import cpu_kind
-from flocsim.ensembles import pairs, runner
+from flocsim.ensembles import runner
+from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.cpu_kind import (

@@ -99,7 +99,7 @@ def compare(first: LoneResults, second: LoneResults) -> LoneComparison:
 FIGURES = {"speeds": speeds}
 
 CONTENTS = Contents(
-    title="results of single flocs past a wall", results=LoneResults, read=read_lone,
+    title="results of single flocs past a wall", read=read_lone,
     summary=lambda found: Summary(facts_of(found), origin(found.run)), table=table,
     figures=lambda found: FIGURES, drawn={"a study of single flocs": FIGURES},
     so_far=lambda found: facts_of(found.results), run=lambda found: found.run,

@@ -37,6 +37,7 @@ class LoneResults(Tables):
     columns: dict[str, np.ndarray]
     run: dict[str, Any]
     indices = INDICES
+    format = FORMAT
 
     @property
     def count(self) -> int:
