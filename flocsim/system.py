@@ -149,6 +149,11 @@ class System:
             return "compounds"
         return "spheres" if self.spheres_only else "polygons"
 
+    @property
+    def has_outlines(self) -> bool:
+        """Whether a force acts all along outlines."""
+        return "outline_pressure" in self.pieces.laws
+
     def scene(self, *, jit: bool = True) -> Scene:
         """The bodies as arrays for the drivers, with the laws that their forces add up to.
 
@@ -194,7 +199,7 @@ class System:
         shapes = FAMILIES[self.family]
         needless = left_out(
             math.inf if grows else len(self.bodies),
-            outlines="outline_pressure" in self.pieces.laws, plain=self.pieces.plain_bodies,
+            outlines=self.has_outlines, plain=self.pieces.plain_bodies,
         )  # fmt: skip
         filled = {**self.integrator.fillings, **needless, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
