@@ -370,6 +370,31 @@ class BodyView(NamedTuple):
     strain_xy_s: float = 0.0
 
 
+class PlainBodyView(NamedTuple):
+    """BodyView without the numbers of its shape, where no kernel of a scene reads any."""
+
+    time: float
+    x: float
+    y: float
+    angle: float
+    vx: float
+    vy: float
+    spin: float
+    mass: float
+    buoyant_mass: float
+    inertia: float
+    radius: float
+    elongation: float
+    long_axis: float
+    kick_x: float
+    kick_y: float
+    kick_turn: float
+
+
+NUMBERS_OF_SHAPES = frozenset(BodyView._fields) - frozenset(PlainBodyView._fields)
+"""What a BodyView has besides."""
+
+
 class PairView(NamedTuple):
     """Two bodies, as a CentreForce or SurfaceForce kernel sees them.
 

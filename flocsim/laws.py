@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, OutlineView, PairView
+from flocsim.arrays import BodyView, ContactView, OutlineView, PairView, PlainBodyView
 from flocsim.compiler.composer import compile_law
 from flocsim.compiler.constants import Intrinsic
 from flocsim.hooks import hook
@@ -119,27 +119,32 @@ def outline_pressure(scene, view):
 
 
 VIEWS = (BodyView,) * 3 + (PairView,) * 4 + (ContactView,) * 4 + (OutlineView,)
-"""What each law is given, beside the parameters."""
+"""What each law is given, beside the parameters; those of bodies may be PlainBodyViews."""
 
 NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1
 """How many numbers each law returns."""
 
 
+def view_of(index: int, plain: bool) -> Any:
+    """What a law is given; ``plain``: whether no kernel reads the numbers of shapes."""
+    return PlainBodyView if plain and VIEWS[index] is BodyView else VIEWS[index]
+
+
 @functools.cache
-def signature(index: int) -> Any:
+def signature(index: int, plain: bool) -> Any:
     """The numba signature of a law."""
     from numba import types
 
-    number, view, count = types.float64, VIEWS[index], NUMBERS[index]
+    number, view, count = types.float64, view_of(index, plain), NUMBERS[index]
     returned = number if count == 1 else types.UniTuple(number, count)
     more = (types.int64,) if index == CONTACT_EVENT else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
     return returned(given, types.CPointer(number), *more)
 
 
-def signature_text(index: int) -> str:
+def signature_text(index: int, plain: bool) -> str:
     """The same in words, for what is kept of it."""
-    return f"{LAWS[index]} {VIEWS[index]._fields} {NUMBERS[index]}"
+    return f"{LAWS[index]} {view_of(index, plain)._fields} {NUMBERS[index]}"
 
 
 def has_address(scene, law):
@@ -148,12 +153,13 @@ def has_address(scene, law):
 
 
 @functools.cache
-def compiled_calls() -> dict[Callable, Callable]:
-    """{hook: function} that let the compiled engine call laws by their addresses."""
+def compiled_calls(plain: bool) -> dict[Callable, Callable]:
+    """{hook: function} that let the compiled engine call laws by their addresses; ``plain``:
+    whether those of bodies are given PlainBodyViews."""
     calls: dict[Callable, Callable] = {has: has_address}
     for index, law in enumerate(LAWS):
         more = ", which" if index == CONTACT_EVENT else ""
-        call = Intrinsic(signature_text(index), functools.partial(call_of, index))
+        call = Intrinsic(signature_text(index, plain), functools.partial(call_of, index, plain))
         names: dict[str, Any] = {"call": call, "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
@@ -165,24 +171,28 @@ def compiled_calls() -> dict[Callable, Callable]:
 
 
 @functools.cache
-def call_of(index):
+def call_of(index, plain):
     """What calls a law by its address, for numba."""
     from flocsim.compiler.numba_internals import call_by_address
 
-    return call_by_address(signature(index))
+    return call_by_address(signature(index, plain))
 
 
-def law_table(functions: dict[str, Callable], *, jit: bool) -> Any:
-    """The laws {name: plain function} as ``scene.laws``: addresses, or the functions themselves.
+def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False) -> Any:
+    """The laws {name: plain function} as ``scene.laws``: addresses, or the functions themselves;
+    ``plain``: as for compiled_calls.
 
     KernelError for a law that cannot be compiled.
     """
     if not jit:
         return tuple(functions.get(name) for name in LAWS)
     addresses = [
-        compile_law(functions[name], signature_text(index), functools.partial(signature, index))
+        compile_law(
+            functions[name], signature_text(index, plain),
+            functools.partial(signature, index, plain),
+        )
         if name in functions
         else 0
         for index, name in enumerate(LAWS)
-    ]
+    ]  # fmt: skip
     return np.array(addresses, dtype=np.int64)

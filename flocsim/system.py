@@ -1,5 +1,6 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -25,10 +26,10 @@ from flocsim.forces.thermal import key_of, kicks_of
 from flocsim.geometry.contact import compounds, spheres_only
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
-from flocsim.integrators import few_bodies
 from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
 from flocsim.plausibility.doubts import warn_of
@@ -148,6 +149,11 @@ class System:
             return "compounds"
         return "spheres" if self.spheres_only else "polygons"
 
+    @property
+    def has_outlines(self) -> bool:
+        """Whether a force acts all along outlines."""
+        return "outline_pressure" in self.pieces.laws
+
     def scene(self, *, jit: bool = True) -> Scene:
         """The bodies as arrays for the drivers, with the laws that their forces add up to.
 
@@ -171,11 +177,12 @@ class System:
         KernelError for one that cannot be compiled: it names the force.
         """
         try:
-            return law_table(self.pieces.laws, jit=jit)
+            return law_table(self.pieces.laws, jit=jit, plain=self.pieces.plain_bodies)
         except KernelError as error:
             for name, force in self.pieces.used.items():
                 try:
-                    law_table(laws_of([force], self.fluid).laws, jit=jit)
+                    its = laws_of([force], self.fluid)
+                    law_table(its.laws, jit=jit, plain=its.plain_bodies)
                 except KernelError as its_own:
                     raise KernelError(f"{name}: {its_own}") from None
             raise error from None
@@ -190,8 +197,11 @@ class System:
         """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
         to serve any number of bodies, not these alone."""
         shapes = FAMILIES[self.family]
-        few = {} if grows else few_bodies.left_out(len(self.bodies))
-        filled = {**self.integrator.fillings, **few, **shapes, **(observer or {})}
+        needless = left_out(
+            math.inf if grows else len(self.bodies),
+            outlines=self.has_outlines, plain=self.pieces.plain_bodies,
+        )  # fmt: skip
+        filled = {**self.integrator.fillings, **needless, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "
@@ -199,11 +209,16 @@ class System:
             )
         return filled
 
+    @property
+    def compiled_calls(self) -> Fillings:
+        """{hook: function} that let a compiled driver call the laws of the scene."""
+        return compiled_calls(self.pieces.plain_bodies)
+
     def compose(
         self, entry: Callable = advance, observer: Fillings | None = None, *, jit: bool = True
     ) -> Callable:
         """The driver of this family of scenes as one function, compiled unless ``jit=False``."""
-        calls = compiled_calls() if jit else {}
+        calls = self.compiled_calls if jit else {}
         what = f"the engine for {self.family}"
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 

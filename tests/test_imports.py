@@ -60,7 +60,7 @@ INNER_ROWS = {
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit"],
-        ["parts", "few_bodies"],
+        ["parts", "left_out"],
         ["backward_euler"],
         ["loop", "radau"],
         ["events"],

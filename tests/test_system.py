@@ -221,6 +221,21 @@ def test_few_bodies_leave_out_what_only_many_need():
     assert System(row, [ELASTIC]).fillings() == System(row[:6], [ELASTIC]).fillings(grows=True)
 
 
+def test_a_scene_leaves_out_what_no_force_of_it_asks_for():
+    def reached(*forces):
+        driver = System(head_on(), [ELASTIC, *forces]).compose(jit=False)
+        return {name.rpartition("_")[0] for name in names_reached(driver)}
+
+    plain, full = (
+        reached(StokesDrag()),
+        reached(StokesDrag(law="shape"), VanDerWaals(law="outline")),
+    )
+    assert plain >= {"plain_body_view", "add_none"}
+    assert not plain & {"body_view", "sum_along"}
+    assert full >= {"body_view", "sum_along", "add_outlines"}
+    assert not full & {"plain_body_view", "add_none"}
+
+
 CLOSE_FORCES = [
     Gravity(), StokesDrag(), VanDerWaals(1e-18, gap="surface"), VanDerWaals(1e-18),
     DoubleLayer(15e-3, 1e-8, gap="surface"), Contact(k_n=20.0, k_t=2.0, friction=0.3),
@@ -254,6 +269,6 @@ class Meddling(VelocityVerlet):
 def test_only_hooks_can_be_replaced():
     with pytest.raises(UsageError, match=r"points\.least_listed_gap cannot be replaced: flocsim"):
         System(head_on(), [ELASTIC], Meddling()).run(1e-6)
-    marked = set(System(head_on(), [ELASTIC]).fillings()) | set(compiled_calls())
+    marked = set(System(head_on(), [ELASTIC]).fillings()) | set(compiled_calls(True))
     assert marked <= set(HOOKS.values())
     assert "flocsim.hooks.attempt" in HOOKS

@@ -75,7 +75,7 @@ class Study(StudyKind):
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
-    drivers: dict[tuple[str, type, bool], Callable] = attrs.field(init=False, factory=dict)
+    drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
     exact: dict[str, Integrator | None] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -177,7 +177,8 @@ class Study(StudyKind):
         """
         system = encounter.system
         method = method or system.integrator
-        kind = system.family, type(method), bool(encounter.kick_energy)
+        forces = system.has_outlines, system.pieces.plain_bodies
+        kind = system.family, forces, type(method), bool(encounter.kick_energy)
         if kind not in self.drivers:
             made = attrs.evolve(system, integrator=method)
             self.drivers[kind] = made.compose(observer=encounter.observer)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 
 import attrs
 
-from flocsim.arrays import PairView
+from flocsim.arrays import NUMBERS_OF_SHAPES, PairView
 from flocsim.body import NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
@@ -27,6 +27,7 @@ from flocsim.forces.differences import (
     body_change,
     changed_body,
     changed_contact,
+    changed_plain_body,
     contact_change,
     pressed_contact,
 )
@@ -37,7 +38,9 @@ from flocsim.laws import LAWS
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
 PLACES_OF_PAIRS = {"centres": "centre", "surfaces": "surface", "outlines": "outline"}
-CHANGES = body_change, changed_body, contact_change, changed_contact, pressed_contact
+CHANGES = (
+    body_change, changed_body, changed_plain_body, contact_change, changed_contact, pressed_contact,
+)  # fmt: skip
 
 ROOM = 64
 """Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
@@ -49,7 +52,7 @@ class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
     gap of outlines is smoothed (smoothing.py), how far those all along them look (outline.py), how
-    many events its contact forces have, and which
+    many events its contact forces have, whether its body forces are given PlainBodyViews, and which
     forces are used and left out, {name: force} and {name: why}, each by a name of its own
     (base.names_of)."""
 
@@ -60,6 +63,7 @@ class Pieces:
     smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
     outlines: tuple[float, float, float, float] = NO_OUTLINES
     events: int = 0
+    plain_bodies: bool = True
     used: dict[str, Force] = attrs.Factory(dict)
     left_out: dict[str, str] = attrs.Factory(dict)
 
@@ -134,29 +138,34 @@ def difference_text(call, field, size):
     return f"({shifted[0]} - {shifted[1]}) / (2.0 * {size})"
 
 
-def differences_text(name, force, view, parts, axes, keep):
+def differences_text(name, force, view, parts, axes, keep, changed=None):
     """Source of a function with the one-sided differences of a sum of forces by some axes.
 
-    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis.
+    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis;
+    ``changed``: what changes a view, of differences.py, where its name does not tell.
     """
+    changed = changed or f"changed_{view}"
     lines = [f"def {name}({view}, parameters):", f"    now = {force}({view}, parameters)"]
     found = [f"now[{part}]" for part in range(parts)] if keep else []
     for axis in axes:
         lines += [
             f"    size_{axis} = {view}_change({view}, {axis})",
-            f"    new_{axis} = {force}(changed_{view}({view}, {axis}, size_{axis}), parameters)",
+            f"    new_{axis} = {force}({changed}({view}, {axis}, size_{axis}), parameters)",
         ]
         found += [f"(new_{axis}[{part}] - now[{part}]) / size_{axis}" for part in range(parts)]
     return "\n".join([*lines, f"    return {', '.join(found)}"]) + "\n"
 
 
 def write_body_laws(source, forces):
-    """Body forces, and derivatives of those parts of them that depend on velocity or place."""
+    """Body forces, and derivatives of those parts of them that depend on velocity or place; whether
+    they are given PlainBodyViews."""
+    plain = True
     terms = {"body_force": [], "velocity_force": [], "position_force": []}
     for force in forces:
         kernel = force.kernel_in(source.fluid)
         call = source.call(force, kernel, "body")
         reads = fields_read(force, source.fluid, kernel, SAMPLE_BODIES)
+        plain = plain and not reads & NUMBERS_OF_SHAPES
         terms["body_force"].append(("", call))
         if reads & VELOCITIES:
             terms["velocity_force"].append(("", call))
@@ -168,7 +177,10 @@ def write_body_laws(source, forces):
     for name, axes in (("position", range(3)), ("velocity", range(3, 6))):
         if terms[f"{name}_force"]:
             law = f"{name}_derivatives", f"{name}_force"
-            source.functions.append(differences_text(*law, "body", 3, axes, keep=False))
+            changed = "changed_plain_body" if plain else "changed_body"
+            text = differences_text(*law, "body", 3, axes, keep=False, changed=changed)
+            source.functions.append(text)
+    return plain
 
 
 def write_pair_laws(source, forces, kind):
@@ -281,7 +293,7 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
     sources = {kind: Source(fluid) for kind in kinds}
-    write_body_laws(sources["body"], kinds["body"])
+    pieces.plain_bodies = write_body_laws(sources["body"], kinds["body"])
     write_pair_laws(sources["centre"], kinds["centre"], "centre")
     write_pair_laws(sources["surface"], kinds["surface"], "surface")
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])

@@ -3,7 +3,7 @@
 The laws take the differences themselves: one call of a law costs less than one for every shift.
 """
 
-from flocsim.arrays import BodyView, ContactView
+from flocsim.arrays import BodyView, ContactView, PlainBodyView
 
 
 def body_change(view, axis):
@@ -26,6 +26,17 @@ def changed_body(view, axis, by):
         view.resistance_xs, view.resistance_ys, view.resistance_ss,
         view.strain_xx_x, view.strain_xx_y, view.strain_xx_s,
         view.strain_xy_x, view.strain_xy_y, view.strain_xy_s,
+    )  # fmt: skip
+
+
+def changed_plain_body(view, axis, by):
+    """The same of a PlainBodyView."""
+    return PlainBodyView(
+        view.time,
+        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
+        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
+        view.mass, view.buoyant_mass, view.inertia, view.radius,
+        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
     )  # fmt: skip
 
 

@@ -22,7 +22,6 @@ from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
-from flocsim.laws import compiled_calls
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.islands import run_islands, watch_paths
 from flocsim.swarms.leaving import Leaving
@@ -159,7 +158,7 @@ class Swarm:
         """A Progress to a time [s] that has yet to begin; ``leaving``: what becomes of bodies that
         leave the box."""
         scene = self.system.scene()._replace(box=self.box)
-        fillings = {**compiled_calls(), **self.fillings()}
+        fillings = {**self.system.compiled_calls, **self.fillings()}
         what = f"the engine for swarms of {self.system.family}"
         runner = Runner(
             compose(find_islands, {}), compose(run_islands, fillings, what=what), self.integrator,

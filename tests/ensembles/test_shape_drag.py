@@ -1,5 +1,6 @@
 """Studies with the drag of shapes: which are refused, in one line, and which are made ready."""
 
+import attrs
 import pytest
 
 import flocsim.arrays as at
@@ -7,6 +8,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError, UsageError
+from flocsim.forces import StokesDrag
 
 STUDY = """\
 preset = "tang2014"
@@ -54,3 +56,15 @@ def test_pairs_in_a_flow_are_drawn_with_it(tmp_path, meeting):
     draws = [study.draw(0, 4, 0.5, each) for each in range(2)]
     for draw in draws:
         assert draw.encounter.scene.bodies[:, at.RESISTANCE].min() > 0.0
+
+
+def test_an_engine_for_drag_of_shapes_is_not_taken_for_pairs_without(tmp_path):
+    """A pilot runs pairs of a study with other forces, too."""
+    study = Study(written(tmp_path, 'meeting = "shear"\nrate = "10 1/s"'))
+    encounter = study.draw(0, 4, 0.5, 0).encounter
+    others = [
+        StokesDrag() if isinstance(each, StokesDrag) else each for each in encounter.system.forces
+    ]
+    without = attrs.evolve(encounter, system=attrs.evolve(encounter.system, forces=others))
+    assert study.driver(encounter) is study.driver(encounter)
+    assert study.driver(encounter) is not study.driver(without)

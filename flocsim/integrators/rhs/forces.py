@@ -6,6 +6,7 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
+from flocsim.hooks import hook
 from flocsim.integrators.rhs.grazing import grazing_force
 from flocsim.integrators.rhs.outline_sum import outlines_in
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
@@ -73,6 +74,7 @@ def add_surface_forces(scene, work, time, state):
         row = end
 
 
+@hook
 def add_outline_forces(scene, work, time, state):
     for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]

@@ -15,6 +15,7 @@ import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.geometry.contact.points import row_radii
 from flocsim.geometry.contact.separation import separation
+from flocsim.hooks import hook
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
@@ -285,6 +286,7 @@ NUDGE = 1e-3
 """Of the gap of two outlines, by which they are moved to see how their forces change."""
 
 
+@hook
 def add_outlines(scene, work, time):
     """Derivatives of the forces between outlines by the places of both, from differences: all three
     follow from those by j's place, forces going with the bodies."""

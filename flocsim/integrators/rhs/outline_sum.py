@@ -21,6 +21,7 @@ from flocsim.geometry.surfaces.distances import (
     placed,
 )
 from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
+from flocsim.hooks import hook
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.laws import outline_pressure
 
@@ -269,6 +270,7 @@ def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
     return c * across - s * up, s * across + c * up, own, -torque
 
 
+@hook
 def outlines_apart(scene, work, time, a, b, way):
     """What pushes two bodies apart along the line of centres [N], a being moved out along it from
     where it is now by a way [m]."""

@@ -3,13 +3,14 @@
 import math
 
 import flocsim.arrays as at
-from flocsim.arrays import BodyView, ContactView, PairView
+from flocsim.arrays import BodyView, ContactView, PairView, PlainBodyView
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import row_radii
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.hooks import hook
 
 
+@hook
 def body_view(scene, work, time, state, body):
     motion, known = work.motion, scene.bodies
     return BodyView(
@@ -26,6 +27,20 @@ def body_view(scene, work, time, state, body):
         known[body, at.RESISTANCE + 6], known[body, at.RESISTANCE + 7],
         known[body, at.RESISTANCE + 8], known[body, at.RESISTANCE + 9],
         known[body, at.RESISTANCE + 10], known[body, at.RESISTANCE + 11],
+    )  # fmt: skip
+
+
+def plain_body_view(scene, work, time, state, body):
+    """The same without the numbers of its shape."""
+    motion, known = work.motion, scene.bodies
+    return PlainBodyView(
+        time,
+        motion[state, body, at.X], motion[state, body, at.Y], motion[state, body, at.ANGLE],
+        motion[state, body, at.VX], motion[state, body, at.VY], motion[state, body, at.SPIN],
+        known[body, at.MASS], known[body, at.BUOYANT_MASS], known[body, at.INERTIA],
+        known[body, at.EQUIVALENT_RADIUS], known[body, at.ELONGATION], known[body, at.LONG_AXIS],
+        work.bodies[body, at.KICK_X], work.bodies[body, at.KICK_X + 1],
+        work.bodies[body, at.KICK_X + 2],
     )  # fmt: skip
 
 

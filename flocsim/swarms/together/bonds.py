@@ -38,7 +38,6 @@ from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
-from flocsim.laws import compiled_calls
 from flocsim.plausibility.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Neighbours
@@ -126,7 +125,9 @@ class BondGauge:
         self.bodies = swarm.bodies
         self.scene = swarm.system.scene()._replace(box=swarm.box)
         self.judge = compose(
-            judge_bonds, {**compiled_calls(), **swarm.fillings()}, what="the proofs of bonds"
+            judge_bonds,
+            {**swarm.system.compiled_calls, **swarm.fillings()},
+            what="the proofs of bonds",
         )
         self.free = np.array([not body.fixed for body in swarm.bodies])
         self.work = self.work_for(64, 1)

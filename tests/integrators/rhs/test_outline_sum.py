@@ -18,7 +18,6 @@ from flocsim.geometry.surfaces.energy import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines
-from flocsim.laws import compiled_calls
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.matrices import whole_matrix
 
@@ -63,7 +62,7 @@ class Pair:
 
     def loads(self, x, y, angle, turn=0.0):
         """(fx, fy, torque on the later, on the earlier)."""
-        entry = compose(between_outlines, compiled_calls())
+        entry = compose(between_outlines, self.system.compiled_calls)
         found = entry(self.scene, self.work, 0.0, 1, 0, float(x), float(y), float(angle), turn)
         return np.array(found)
 
