@@ -164,7 +164,7 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     assert not any(found.shifts.values())
     # They may have come to anything, and so may as many of those that were not run again.
     told = numerical_parts({(0, 0, 0, 0): found}, (1, 1, 1, 1))[0, 0, 0, 0]
-    assert told["beta2_change_low"] == -found.values["beta2"]
+    assert told["beta2_change_low"] < -0.9 * found.values["beta2"]
 
 
 def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
