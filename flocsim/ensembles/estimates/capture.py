@@ -219,7 +219,7 @@ def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, flo
 class Estimated:
     """The numbers of one condition, but for what numerics do: ``values`` {name: number}; ``shifts``
     {name: by how much what was run again changes it}, ``largest`` {name: by how much a further
-    point that flips does at most}; ``kinds`` as in kind_counts (kind, 3) and ``changes`` {name of
+    point that flips does at most}; ``kinds`` as in kind_counts (kind, 4) and ``changes`` {name of
     `counted`: as in kind_changes (kind, 4)}."""
 
     values: dict[str, float]
@@ -377,7 +377,7 @@ def of_what(name: str) -> str:
 def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> dict[tuple, dict]:
     """{place: {name_change_low, name_change_high, name_numerical}} of all conditions, by mechanism:
     axis 0 of the shape."""
-    kinds = np.zeros((len(KINDS), 3, *shape))
+    kinds = np.zeros((len(KINDS), 4, *shape))
     for place, each in found.items():
         kinds[:, :, *place] = each.kinds
     most = {}

@@ -56,10 +56,11 @@ def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndar
 
 
 def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:
-    """Whole numbers (kind, 3, …): how many of each kind there are, were run a second, and a third
-    time; ``kinds`` as in kinds_of."""
+    """Whole numbers (kind, 4, …): how many of each kind there are, were run a second, and a third
+    time, and were run again without an outcome; ``kinds`` as in kinds_of."""
+    lost_sight = run_so(again) & np.isin(most_exact(again, third)[0], WITHOUT_OUTCOME)
     return np.stack([
-        (kinds & each).sum(axis=-1) for each in (True, run_so(again), run_so(third))
+        (kinds & each).sum(axis=-1) for each in (True, run_so(again), run_so(third), lost_sight)
     ], axis=1)  # fmt: skip
 
 
@@ -136,10 +137,10 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
 
     Without any third run second ones are taken for exact.
     """
-    members, checked, thrice = np.moveaxis(counts, 1, 0)
+    members, checked, thrice, lost_sight = np.moveaxis(counts, 1, 0)
     found = []
     for side in range(len(SIDES)):
-        more = further_of_kinds(of_kinds[:, side], checked, members - checked)
+        more = further_of_kinds(of_kinds[:, side], checked, members - checked + lost_sight)
         if thrice.any():
             more = more + further_of_all(of_kinds[:, 2 + side], thrice, members - thrice)
         found.append(more)
@@ -202,11 +203,20 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
 
 
 def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
-    """The same where rates are compared among all kinds and conditions: of third runs, which are
-    few."""
+    """The same where rates are compared among all kinds and conditions, and with SEEN_BEFORE: of
+    third runs, which are few."""
     if flipped.ndim > checked.ndim:
         return of_each_class(further_of_all, flipped, checked, exposed)
-    return further_flips(flipped, checked, exposed, EACH_SIDE).sum(axis=0)
+    f, c, u = (
+        np.append(each.ravel(), before)
+        for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, 0.0))
+    )
+    return further_flips(f, c, u, EACH_SIDE)[:-1].reshape(flipped.shape).sum(axis=0)
+
+
+SEEN_BEFORE = 1, 500
+"""How many third runs ended otherwise than second ones, of so many, where this was looked at before
+(benchmarks.accuracy.numerical_error): it counts as one condition more."""
 
 
 def of_each_class(more_of, flipped, *others):

@@ -110,7 +110,7 @@ def change_of_differences(
     would change if both studies were run exactly, over the replicates that count in both.
 
     ``first``, ``second``: codes of first, second and third runs of the same replicates in two
-    studies, (type, vertices, delta, replicate); ``of`` gives the Events of codes. What was run
+    studies, (type, vertices, delta, replicate); ``of`` gives Events, not of classes. What was run
     again in both counts, where it changes the one otherwise than the other: what errs alike is no
     error of the difference. A replicate is of the kind of the two that flips more easily.
     """
