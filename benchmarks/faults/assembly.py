@@ -59,6 +59,7 @@ def made_up_rows(seed, count):
     found = np.maximum(found - (rows["checked_inside"] % 10 == 0), 0)
     for name in ("outcome", "inside", "bond"):
         rows[f"checked_{name}"] = np.where(again, rows[name][found], NOT_APPLICABLE)
+        rows[f"third_{name}"] = NOT_APPLICABLE
     rows["floc_i"] = rows["floc_j"] = -1
     return rows
 

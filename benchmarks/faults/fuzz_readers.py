@@ -223,7 +223,7 @@ class JournalReader:
         for name in SHAPE_COLUMNS:
             rows[name] = 1.0
         for name in ("outcome", "inside", "bond"):
-            rows[f"checked_{name}"] = rows[name][0], 255
+            rows[f"checked_{name}"], rows[f"third_{name}"] = (rows[name][0], 255), 255
         return rows
 
     def make(self, rng, folder):

@@ -13,7 +13,8 @@ from pathlib import Path
 from statistics import mean
 from typing import NamedTuple
 
-from flocsim.ensembles.collision.checking import count_checks
+from flocsim.ensembles.collision.checking import MORE_STEPS, count_checks
+from flocsim.ensembles.collision.draw import CHECKED
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels.study import study_of
 
@@ -71,7 +72,7 @@ def measured(study, vertices, replicates):
     """The Costs of a Study."""
     names, config = study.config.scene.names, study.config
     places = [len(names) // 4, len(names) // 2, (3 * len(names)) // 4]
-    steps, exact = config.integrator.max_steps, study.exact[names[0]]
+    steps, exact = config.integrator.max_steps, study.exact[names[0]][0]
     study.run(places[0], vertices, 1.0, 0)
     pair, first, second, flips = [], [], [], 0
     for place in places:
@@ -86,7 +87,7 @@ def measured(study, vertices, replicates):
             first.append(time.process_time() - began)
             if k % EVERY == 0:
                 began = time.process_time()
-                again = study.run_again(draw, exact)
+                again = study.run_again(draw, exact, MORE_STEPS * steps, CHECKED)
                 second.append(time.process_time() - began)
                 flips += again["checked_outcome"] != row["outcome"]
     share = count_checks(config.seed, POINTS, "auto") / POINTS

@@ -1,7 +1,8 @@
 """Figures, tables and claims of a finished study: what reproduce.py writes at its end."""
 
 import numpy as np
-from claims import FIT_CLAIMS, check_claims
+from claims import COLLISION_CLAIMS, check_claims
+from claims.several import read_touches
 from claims.table import claims_table
 from exceptions import exceptions_figure
 from output import save_all, write_page, write_table
@@ -41,7 +42,8 @@ def write(folder, config, library, readings):
     held = hold_readings(readings)
     if held:
         write_readings(folder / "readings.md", held)
-    write_summary(folder, study, changes, check_claims(study, entries), held, zones_of(config))
+    findings = check_claims(study, entries, read_touches(folder / "several.csv"))
+    write_summary(folder, study, changes, findings, held, zones_of(config))
 
 
 def zones_of(config):
@@ -98,7 +100,7 @@ def hold_readings(readings):
     """{name: (Results, Findings of the claims about collisions)}."""
     results = {name: read_results(file) for name, file in readings.items()}
     return {
-        name: (each, [found for found in check_claims(each) if found.number not in FIT_CLAIMS])
+        name: (each, [found for found in check_claims(each) if found.number in COLLISION_CLAIMS])
         for name, each in results.items()
     }
 

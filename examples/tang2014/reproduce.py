@@ -171,6 +171,8 @@ def main():
     changes = changes_of(arguments, vertices)
     ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
     readings = run_readings(arguments) if arguments.readings else {}
+    if not (folder / "several.csv").exists():
+        steps.call(folder, "several", sys.executable, HERE / "several.py", "-o", folder)
     write_pages(arguments, changes, readings)
 
 

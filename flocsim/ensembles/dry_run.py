@@ -6,7 +6,7 @@ from math import inf
 
 import numpy as np
 
-from flocsim.ensembles.collision.checking import EASILY, count_checks, exact_method
+from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import Config
@@ -129,7 +129,8 @@ def checks_of(config, count, how):
     )
     return (
         f"{count} of the {config.replicates} replicates of each condition "
-        f"({100.0 * count / config.replicates:.2g} %){more or ','} at {how}"
+        f"({100.0 * count / config.replicates:.2g} %){more or ','} at {how}; "
+        f"one in {THIRD_OF} of these a third time, more exactly still"
     )
 
 

@@ -162,9 +162,9 @@ def kernel_row(kernel, place):
             return "-" if np.isnan(high) else f"[{form(low)}, {form(high)}]"
         return form(value) + (f" +-{spread(max(value - low, high - value))}" if spread else "")
 
-    numerical, few = found["alpha_numerical"], "{:.3g}".format
+    few, (least, most) = "{:.3g}".format, (found[f"alpha_change{end}"] for end in ("_low", "_high"))
     added = "" if np.isnan(found["alpha"]) else (
-        " -" if np.isnan(numerical) else f" +-{share(numerical)}"
+        " -" if np.isnan(least) else f" {signed(least)} {signed(most)}"
     )  # fmt: skip
     return (
         visible(kernel.labels[place[2]], ""), visible(kernel.labels[place[3]], ""),
@@ -172,6 +172,11 @@ def kernel_row(kernel, place):
         told("alpha", share, spread=share) + added, told("beta2", few),
         told("beta3", few, spread="{:.1g}".format), told("efficiency3", "{:.3f}".format),
     )  # fmt: skip
+
+
+def signed(change):
+    """ "-.040" or "+.040"."""
+    return f"{'-' if change < 0.0 else '+'}{share(abs(change))}"
 
 
 def touch_lines(results: Results) -> list[str]:
@@ -195,6 +200,9 @@ def touch_lines(results: Results) -> list[str]:
 
 MOST_UNDECIDED = "most_undecided"
 """Name in the group ``run`` of the share of a condition that may be undecided or failed."""
+
+SCRAMBLES = "scrambles"
+"""Name there of how many scrambles of a Sobol sequence replicates are points of; 0 for none."""
 
 
 def most_undecided(results: Results) -> float:
@@ -261,9 +269,12 @@ def checked_line(results: Results) -> str:
     if not checked:
         return ""
     low, high = (100.0 * float(end) for end in wilson(flipped, checked))
+    thrice, late = (int(table[name].sum()) for name in ("n_third", "n_third_flipped"))
+    third = f"; {thrice} of them were run a third time, {late} of which ended otherwise than in the"
     return (
         f"{checked} replicates were run again more exactly, {flipped} of them flipped: "
         f"{100.0 * flipped / checked:.2g} % [{low:.2g}, {high:.2g}]"
+        f"{f'{third} second' if thrice else ''}"
     )
 
 

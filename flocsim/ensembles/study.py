@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
-from flocsim.ensembles.collision.checking import MORE_STEPS, exact_method, is_checked
-from flocsim.ensembles.collision.draw import CHECKED, Draw
+from flocsim.ensembles.collision.checking import MORE_STEPS, exact_methods, further_runs
+from flocsim.ensembles.collision.draw import CHECKED, THIRD, Draw
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
@@ -76,11 +76,11 @@ class Study(StudyKind):
     floc_pool: FlocPool = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
-    exact: dict[str, Integrator | None] = attrs.field(init=False)
+    exact: dict[str, tuple[Integrator, Integrator] | None] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         config = self.config
-        self.exact = {name: exact_method(method) for name, method in self.methods.items()}
+        self.exact = {name: exact_methods(method) for name, method in self.methods.items()}
         self.floc_pool = pool_of(config.shapes, self.flocs)
         self.pairings = pairings_of(config, self.flocs, self.floc_pool)
         self.zones = {
@@ -202,10 +202,15 @@ class Study(StudyKind):
             return row
         easily = bool(flips_easily(row["outcome"], row["bond"]))
         wanted = self.config.integrator.check_share
-        if not is_checked(self.config.seed, replicate, wanted, easily):
-            return row
-        found = self.run_again(draw, exact, halted)
-        return None if found is None else row | found
+        runs = list(zip(exact, (CHECKED, THIRD), strict=True))
+        steps = self.config.integrator.max_steps
+        for method, columns in runs[: further_runs(self.config.seed, replicate, wanted, easily)]:
+            steps *= MORE_STEPS
+            found = self.run_again(draw, method, steps, columns, halted)
+            if found is None:
+                return None
+            row |= found
+        return row
 
     def second_attempt(self, condition: int, row: dict) -> tuple[int, Integrator | None] | None:
         """(steps, method) by which a replicate is tried again whose row says nothing of its
@@ -217,7 +222,8 @@ class Study(StudyKind):
         exact = self.exact[self.pairings[condition].name]
         if FAILURES[row["failure"]] not in TRIED_AGAIN or (exact is None and not ran_out):
             return None
-        return MORE_STEPS * self.config.integrator.max_steps, None if ran_out else exact
+        method = None if ran_out or exact is None else exact[0]
+        return MORE_STEPS * self.config.integrator.max_steps, method
 
     def tried_again(
         self, draw: Draw, attempt: tuple[int, Integrator | None], row: dict,
@@ -229,16 +235,17 @@ class Study(StudyKind):
         return found if found is None or says_outcome(found) else row
 
     def run_again(
-        self, draw: Draw, exact: Integrator, halted: Callable[[], bool] | None = None
-    ) -> dict | None:
-        """What a replicate's row holds of its second, more exact run; None where it was given up.
+        self, draw: Draw, exact: Integrator, steps: int, columns: dict[str, str],
+        halted: Callable[[], bool] | None = None,
+    ) -> dict | None:  # fmt: skip
+        """What a replicate's row holds of a more exact run of so many steps at most, in
+        ``columns``, CHECKED or THIRD; None where it was given up.
 
-        An exception costs no more than this: the second run has failed, the first is as it was.
+        An exception costs no more than this: that run has failed, the first is as it was.
         """
-        attempt = MORE_STEPS * self.config.integrator.max_steps, exact
-        failed = dict.fromkeys(CHECKED.values(), NOT_APPLICABLE) | {"outcome": FAILED}
-        row = self.run_carefully(draw, attempt, halted, failed)
-        return None if row is None else {name: row[column] for name, column in CHECKED.items()}
+        failed = dict.fromkeys(columns.values(), NOT_APPLICABLE) | {"outcome": FAILED}
+        row = self.run_carefully(draw, (steps, exact), halted, failed)
+        return None if row is None else {name: row[column] for name, column in columns.items()}
 
     def run_carefully(
         self, draw: Draw, attempt: tuple[int, Integrator | None],

@@ -206,6 +206,30 @@ def scrambled_worth(sums: np.ndarray, scrambles: int) -> tuple[np.ndarray, np.nd
 LEAST_SCATTER = 0.25
 """Square of half a point."""
 
+
+def scrambled_difference(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(difference, low, high) of two paired proportions, here minus there, over independent
+    scrambles.
+
+    ``cells``: whole numbers (…, scramble, 4) of replicates in both, here only, there only, in
+    neither. D = Σ d/Σ m, d the difference of a scramble's two counts and m its replicates; the
+    interval is Student's of the scrambles, each taken to scatter by half a point at least.
+    """
+    from scipy.special import stdtrit
+
+    _, here, there, _ = np.moveaxis(np.asarray(cells, dtype=float), -1, 0)
+    m = np.sum(cells, axis=-1, dtype=float)
+    count = m.shape[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        difference = np.sum(here - there, axis=-1) / m.sum(axis=-1)
+        spread = np.sum((here - there - difference[..., np.newaxis] * m) ** 2, axis=-1)
+        spread = np.maximum(spread, LEAST_SCATTER * (count - 1.0))
+        half = np.sqrt(count * spread / (count - 1.0)) / m.sum(axis=-1)
+        half *= float(stdtrit(count - 1, 0.975))
+    low, high = np.maximum(difference - half, -1.0), np.minimum(difference + half, 1.0)
+    return difference, low, high
+
+
 SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
 MEANS = np.geomspace(1e-5, 0.3, 16)
 """Gamma distributions of rates over conditions: from a few that flip to all alike."""

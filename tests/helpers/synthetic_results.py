@@ -30,14 +30,17 @@ def draw_codes(rng, shape):
 
 
 def draw_second_runs(first, seed=11):
-    """Codes of second runs of a fifth of these replicates, a tenth of which end as another did."""
+    """Codes of second runs of a fifth of these replicates, a tenth of which end as another did, and
+    of third runs, alike, of some of these."""
     rng, outcome = np.random.default_rng(seed), first[0]
     checked = rng.random(outcome.shape) < 0.2
     other = rng.permuted(np.arange(outcome.size)).reshape(outcome.shape)
     place = np.where(rng.random(outcome.shape) < 0.1, other, np.arange(outcome.size).reshape(
         outcome.shape))  # fmt: skip
+    thrice = checked & (rng.random(outcome.shape) < 0.3)
     return {
-        f"checked_{name}": np.where(checked, codes.ravel()[place], NOT_APPLICABLE)
+        f"{run}_{name}": np.where(chosen, codes.ravel()[place], NOT_APPLICABLE)
+        for run, chosen in (("checked", checked), ("third", thrice))
         for name, codes in zip(("outcome", "inside", "bond"), first, strict=True)
     }
 

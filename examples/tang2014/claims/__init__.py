@@ -1,6 +1,6 @@
 """What the paper claims, each claim a small pure function of results: `check_claims`."""
 
-from . import fits, robust, soft
+from . import fits, robust, several, soft
 from .resampling import counts_of
 from .verdicts import Finding, MissingData
 
@@ -42,18 +42,26 @@ COLLISION_CLAIMS = {
 }
 """Number → (words, function of Results and their Counts that yields Parts)."""
 
+SWARM_CLAIMS = {
+    26: ("several collisions are a sequence of binary ones", several.sequence),
+}
+"""Number → (words, function of the first touches in swarms, several.py's rows)."""
 
-def check_claims(results=None, entries=None):
+
+def check_claims(results=None, entries=None, touches=None):
     """The Findings of all claims, in the order of their numbers.
 
-    ``results``: Results that hold their replicates; ``entries``: a shape library's. A claim about
-    what is not there has no parts, a note that says so, and is undecided.
+    ``results``: Results that hold their replicates; ``entries``: a shape library's; ``touches``:
+    those of swarms, as several.read_touches has them. A claim about what is not there has no parts,
+    a note that says so, and is undecided.
     """
     fitted = (entries,) if entries else None
+    together = (touches,) if touches else None
     enough = results is not None and results.count >= FEWEST
     collided = (results, counts_of(results)) if enough else None
     found = [check(number, *claim, fitted) for number, claim in FIT_CLAIMS.items()]
     found += [check(number, *claim, collided) for number, claim in COLLISION_CLAIMS.items()]
+    found += [check(number, *claim, together) for number, claim in SWARM_CLAIMS.items()]
     return sorted(found, key=lambda finding: finding.number)
 
 
@@ -62,7 +70,7 @@ def check(number, claim, parts_of, data):
     try:
         if data is None:
             what = "a shape library" if number in FIT_CLAIMS else f"{FEWEST} replicates at least"
-            raise MissingData(f"needs {what}")
+            raise MissingData(f"needs {'swarms' if number in SWARM_CLAIMS else what}")
         return Finding(number, claim, tuple(parts_of(*data)))
     except MissingData as lack:
         return Finding(number, claim, (), str(lack))

@@ -4,10 +4,12 @@ The choice follows from the seed, the replicate's index and how it ended: whatev
 later extensions there are, the same ones are run again. An index does nothing but name random
 numbers, so that a choice which does not look at them is a random sample of those that ended alike.
 More are taken of those that flip easily (`io.results.events.flips_easily`), and each kind counts
-for as many as there are of it (`estimates.numerical`).
+for as many as there are of it (`estimates.numerical`). One in THIRD_OF of these is run a third
+time, more exactly still: first and second runs may lie on one plateau.
 """
 
 import math
+from collections.abc import Callable
 from functools import cache
 
 import attrs
@@ -18,11 +20,21 @@ from flocsim.integrators.base import Integrator
 TIGHTER = 0.01
 """Tolerance of a second run over that of the first."""
 
+THIRD_TIGHTER, FINEST, LEAST_TIGHTER = 1e-3, 1e-12, 0.1
+"""Tolerance of a third run over that of the second; the tolerance [m] at which it ends, unless it
+is to be tighter than the second at least by the last."""
+
 SHORTER = 0.25
 """The same for a fixed step: 16 times less error of a method of second order."""
 
 MORE_STEPS = 5
-"""By how much a second run may take more steps than a first."""
+"""By how much a run may take more steps than the one before."""
+
+THIRD_OF = 16
+"""One in so many second runs has a third one behind it."""
+
+THIRD_COST = 4.0
+"""CPU time of a third run over that of a second (benchmarks.accuracy.numerical_error)."""
 
 Z = 1.959963984540054
 """Normal quantile of 95 % intervals."""
@@ -59,15 +71,18 @@ def beginning(seed: int) -> float:
     return float(np.random.Generator(np.random.Philox(stream)).random())
 
 
-def is_checked(seed: int, replicate: int, share: float | str, easily: bool = False) -> bool:
-    """Whether a replicate is run again: a systematic sample from a random beginning.
+def further_runs(seed: int, replicate: int, share: float | str, easily: bool = False) -> int:
+    """How often a replicate is run again, up to twice: a systematic sample from a random beginning.
 
     Of the first n of any condition expected_checks(n) would be, up or down to a whole number, if
-    all ended alike; ``easily``: whether it is of those that flip easily.
+    all ended alike, the first of these and one in THIRD_OF twice; ``easily``: whether it is of
+    those that flip easily.
     """
     start = beginning(seed)
-    before, after = (expected_checks(n, share, easily) for n in (replicate, replicate + 1))
-    return math.floor(after + start) > math.floor(before + start)
+    before, after = (
+        math.floor(expected_checks(n, share, easily) + start) for n in (replicate, replicate + 1)
+    )
+    return 0 if after == before else 1 if before % THIRD_OF else 2
 
 
 def count_checks(seed: int, replicates: int, share: float | str) -> int:
@@ -75,14 +90,29 @@ def count_checks(seed: int, replicates: int, share: float | str) -> int:
     return math.floor(expected_checks(replicates, share) + beginning(seed))
 
 
-def exact_method(method: Integrator) -> Integrator | None:
+def exact_method(
+    method: Integrator, tighter: Callable[[float], float] = lambda value: TIGHTER * value
+) -> Integrator | None:
     """The method with a 100 times tighter tolerance, or a quarter of its step; None for neither.
 
-    A class of a user's own has them as parameters of these names, or cannot be checked.
+    ``tighter`` gives another tolerance. A class of a user's own has them as parameters of these
+    names, or cannot be checked.
     """
     names = {field.alias for field in attrs.fields(type(method)) if field.init}
-    for name, factor in (("tolerance", TIGHTER), ("step", SHORTER)):
+    for name, smaller in (("tolerance", tighter), ("step", lambda value: SHORTER * value)):
         value = getattr(method, name, math.inf)
         if name in names and value < math.inf:
-            return attrs.evolve(method, **{name: float(f"{factor * value:.15g}")})
+            return attrs.evolve(method, **{name: float(f"{smaller(value):.15g}")})
     return None
+
+
+def third_tolerance(second: float) -> float:
+    """That of a third run behind a second one [m]."""
+    return max(THIRD_TIGHTER * second, min(FINEST, LEAST_TIGHTER * second))
+
+
+def exact_methods(method: Integrator) -> tuple[Integrator, Integrator] | None:
+    """Those of the second and the third run; None where a method cannot be made more exact."""
+    second = exact_method(method)
+    third = None if second is None else exact_method(second, third_tolerance)
+    return None if second is None or third is None else (second, third)

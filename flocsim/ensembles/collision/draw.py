@@ -14,8 +14,11 @@ from flocsim.run import Run
 from flocsim.system import System
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 
-CHECKED = {f"checked_{name}": name for name in ("outcome", "inside", "bond")}
-"""Column of a second run → the same of the first."""
+CHECKED, THIRD = (
+    {f"{run}_{name}": name for name in ("outcome", "inside", "bond")}
+    for run in ("checked", "third")
+)
+"""Column of a second or third run → the same of the first."""
 
 
 @attrs.frozen(eq=False)
@@ -66,7 +69,8 @@ class Draw:
 
     def row(self, run: Run, status: Status) -> dict:
         """The row of a Run that has ended so; failed where a force gives no number."""
-        row = replicate_row(status, self.angles, run) | dict.fromkeys(CHECKED, NOT_APPLICABLE)
+        row = replicate_row(status, self.angles, run)
+        row |= dict.fromkeys(CHECKED | THIRD, NOT_APPLICABLE)
         row |= dict(zip(("floc_i", "floc_j"), self.flocs, strict=True))
         row |= self.encounter.measures
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):

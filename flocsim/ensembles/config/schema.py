@@ -363,7 +363,8 @@ class IntegratorConfig:
         "step: at a quarter of it); the outcomes that change are the numerical error of the "
         'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
         "of a flip rate of 0 as narrow as a sampling interval, and at least 1 %, of hooks, rests "
-        "and misses, which flip most, three times as many; 0: none",
+        "and misses, which flip most, three times as many; one in sixteen of these is run a third "
+        "time, tighter still; 0: none",
     )
 
     def __attrs_post_init__(self):

@@ -13,8 +13,9 @@ exact for spheres without forces, where β₃ is π R² |Δw|, 4/3 G R³ and 8/3
 for shapes (they lie in the plane) and for forces in a flow.
 
 Of S scrambles each gives a mean; the interval is Student's of these (`half_width`). Where all
-points agree, it is Wilson's at their number. What numerics do is bounded by the share of points
-that flip where run again (`estimates.numerical`), times the largest weight of a point.
+points agree, it is Wilson's at their number. What numerics change follows as for probabilities
+(`estimates.numerical`): what was run again is known, and of the others so many may gain and lose as
+there, each with the largest weight of a point.
 
 A point that is undecided or has failed has no χ, or only χ_c, where it had touched. What it could
 do is in the interval (Manski's bounds): its low end is that of χ = 0 at all such points, its high
@@ -28,6 +29,7 @@ longest.
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -36,17 +38,26 @@ from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
-from flocsim.ensembles.estimates.numerical import SECOND_RUNS, further_of_kinds
+from flocsim.ensembles.estimates.numerical import (
+    Codes,
+    further,
+    gains_and_losses,
+    kind_changes,
+    kind_counts,
+    most_exact,
+    run_so,
+)
+from flocsim.ensembles.estimates.statistics import COUNTED, by_runs
 from flocsim.ensembles.kernels.sampling import as_draws
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.confidence import wilson
-from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, kinds_of
+from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, Events, kinds_of
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
-COLUMNS = ("outcome", "inside", "bond", "checked_outcome", "checked_inside", "floc_i", "floc_j")
+COLUMNS = (*COUNTED, "floc_i", "floc_j")
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
 
@@ -138,6 +149,17 @@ def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, Chi]:
     }
 
 
+def counted(codes: Codes) -> dict[str, Events]:
+    """{c, inside, a, alpha: Events} of outcome, inside and bond."""
+    found = became(*codes[:2])
+    told = {
+        name: Events(each.known, each.known & each.least, ~each.known)
+        for name, each in found.items()
+    }
+    touched, stays = found["c"], found["a"]
+    return told | {"alpha": Events(touched.least & stays.known, stays.least, ~stays.known)}
+
+
 def student(scrambles: int) -> float:
     """Half the width of a 95 % interval over the standard error of so many means."""
     from scipy.special import stdtrit
@@ -195,18 +217,16 @@ def widened(ends: Sequence[float], bound: int, touched: int) -> tuple[float, flo
 
 @attrs.define(eq=False)
 class Estimated:
-    """The numbers of one condition, but for what numerics do: ``values`` {name: number},
-    ``flipped`` and ``checked`` {X: how many of each kind (kind,), of those that are known both
-    times}, ``members`` (kind,), how many there are, and ``trials``;
-    ``largest`` {name: how much a point that flips changes the estimate, over the share of those
-    that do}."""
+    """The numbers of one condition, but for what numerics do: ``values`` {name: number}; ``shifts``
+    {name: by how much what was run again changes it}, ``largest`` {name: by how much a further
+    point that flips does at most}; ``kinds`` as in kind_counts (kind, 4) and ``changes`` {name of
+    `counted`: as in kind_changes (kind, 4)}."""
 
     values: dict[str, float]
-    flipped: dict[str, np.ndarray]
-    checked: dict[str, np.ndarray]
-    members: np.ndarray
-    trials: int
     largest: dict[str, float]
+    shifts: dict[str, float]
+    kinds: np.ndarray
+    changes: dict[str, np.ndarray]
 
 
 def flow_width(plane: float, factor: float) -> float:
@@ -227,13 +247,36 @@ def estimate(
 ) -> Estimated:  # fmt: skip
     """What the points of a condition come to; ``most_unknown``: share of the flux that may be
     unknown where there is an estimate."""
-    chi = became(rows["outcome"], rows["inside"])
+    first, *runs = by_runs([rows[name] for name in COUNTED])
+    exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
+    known = run_so(exact) & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
+    moved = [np.where(known, *pair) for pair in zip(exact, first, strict=True)]
+    values, largest = values_of(points, first, meeting, rate, scrambles, most_unknown)
+    shifted, _ = values_of(points, moved, meeting, rate, scrambles, most_unknown)
+    shifts = {name: shifted[name] - values[name] for name in ESTIMATES}
+    counts = [counted(each) for each in (first, *runs)]
+    changes = {
+        name: kind_changes(kinds, runs, [
+            gains_and_losses(before[name], after[name]) for before, after in pairwise(counts)
+        ]) for name in counts[0]
+    }  # fmt: skip
+    now = counted(exact)
+    values["checked"] = float(run_so(exact).sum())
+    for name in WHAT:
+        both = run_so(exact) & counts[0][name].trials & now[name].trials
+        flips = both & (counts[0][name].successes != now[name].successes)
+        values[f"flips_{name}"] = float(flips.sum()) / both.sum() if both.any() else math.nan
+    return Estimated(values, largest, shifts, kind_counts(kinds, *runs), changes)
+
+
+def values_of(
+    points: Weighted, codes: Codes, meeting: str, rate: float | None, scrambles: int,
+    most_unknown: float,
+) -> tuple[dict[str, float], dict[str, float]]:  # fmt: skip
+    """({name: number}, {estimate: by how much a point that flips changes it at most}) by these
+    outcomes of a condition's points."""
+    chi = became(*codes[:2])
     n = len(points.plane)
-    again = became(rows["checked_outcome"], rows["checked_inside"])
-    run_again = rows["checked_outcome"] != NOT_APPLICABLE
-    checked = {name: run_again & chi[name].known & again[name].known for name in WHAT}
-    flipped = {name: checked[name] & (chi[name].least != again[name].least) for name in WHAT}
-    kinds = kinds_of(rows["outcome"], rows["bond"])
 
     def parts(values: np.ndarray) -> np.ndarray:
         """The means of the scrambles, which replicates belong to in turn."""
@@ -298,23 +341,17 @@ def estimate(
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         below = float(parts(under).mean())
         largest[name] = float(weight.max()) / below if below > 0.0 else math.nan
-    unknown = np.isin(rows["outcome"], WITHOUT_OUTCOME)
+    unknown = np.isin(codes[0], WITHOUT_OUTCOME)
     caught = float(np.sum(points.plane * stays.least))
     edge = float(np.sum(points.plane * stays.least * points.edge))
     values |= {
         "beta2_reference": float(points.reference[0].mean()),
         "beta3_reference": float(points.reference[1].mean()),
         "speed": float(points.speed.mean()),
-        "checked": float(run_again.sum()),
         "undecided": float(np.sum(points.plane * unknown) / np.sum(points.plane)),
         "edge": edge / caught if caught else 0.0,
     }
-    flips, checks = ({name: np.sum(kinds & each, axis=-1) for name, each in flags.items()}
-                     for flags in (flipped, checked))  # fmt: skip
-    for name in WHAT:
-        count = int(checked[name].sum())
-        values[f"flips_{name}"] = int(flipped[name].sum()) / count if count else math.nan
-    return Estimated(values, flips, checks, kinds.sum(axis=-1), n, largest)
+    return values, {name: each / n for name, each in largest.items()}
 
 
 def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi, most_unknown: float) -> float:
@@ -328,34 +365,42 @@ def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi, most_unknown: float) 
     return float(np.sum(weight * stays.least)) / flux
 
 
-def of_what(name: str) -> Sequence[str]:
-    """Which χ an estimate follows from."""
+def of_what(name: str) -> str:
+    """Which of `counted` an estimate follows from."""
     if name == "alpha":
-        return ("a", "c")
-    if name.startswith("width_"):
-        return (name.removeprefix("width_"),)
-    return ("c",) if name.endswith("_c") else ("a",)
+        return name
+    return name.removeprefix("width_") if name.startswith("width_") else (
+        "c" if name.endswith("_c") else "a"
+    )  # fmt: skip
 
 
 def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> dict[tuple, dict]:
-    """{place: {name_numerical: bound}} of all conditions, by mechanism: axis 0 of the shape."""
-    bounds = {}
-    for what in WHAT:
-        f, c, members = (np.zeros((len(KINDS), *shape)) for _ in range(3))
-        trials = np.ones(shape)
+    """{place: {name_change_low, name_change_high, name_numerical}} of all conditions, by mechanism:
+    axis 0 of the shape."""
+    kinds = np.zeros((len(KINDS), 4, *shape))
+    for place, each in found.items():
+        kinds[:, :, *place] = each.kinds
+    most = {}
+    for what in (*WHAT, "alpha"):
+        changes = np.zeros((len(KINDS), 4, *shape))
         for place, each in found.items():
-            at = (slice(None), *place)
-            f[at], c[at], members[at] = each.flipped[what], each.checked[what], each.members
-            trials[place] = each.trials
-        more = further_of_kinds(f, c, members - (1.0 - SECOND_RUNS) * c)
-        bounds[what] = np.minimum((f.sum(axis=0) + more) / trials, 1.0)
+            changes[:, :, *place] = each.changes[what]
+        most[what] = further(changes, kinds)
     told: dict[tuple, dict] = {}
     for place, each in found.items():
         told[place] = {}
         for name in ESTIMATES:
-            shares = [float(bounds[what][place]) for what in of_what(name)]
-            # alpha = A/C changes by no more than (ΔA + α ΔC)/C, and α is at most 1.
-            told[place][f"{name}_numerical"] = sum(shares) * each.largest[name]
+            gained, lost = (float(side[place]) for side in most[of_what(name)])
+            value, largest = each.values[name], each.largest[name]
+            shift = each.shifts[name]
+            if math.isnan(shift) and not math.isnan(value):
+                # What was run again leaves nothing to divide by.
+                shift = 0.0
+            low, high = max(shift - lost * largest, -value), shift + gained * largest
+            if name == "alpha":
+                high = min(high, 1.0 - value)
+            ends = {"_change_low": low, "_change_high": high, "_numerical": max(abs(low), high)}
+            told[place] |= {f"{name}{end}": bound for end, bound in ends.items()}
     return told
 
 

@@ -2,27 +2,25 @@
 
 A replicate run again at a tighter tolerance has *flipped*, for one probability, if it is counted
 otherwise: as a success, as a failure, or not at all. It has then raised the probability, *gained*,
-or lowered it, *lost*.
+or lowered it, *lost*. A share of second runs is run a third time, tighter still: an outcome may lie
+on a plateau, the same at the first two tolerances and another one at the third.
 
-Where all were run exactly, S of M would be S' of M'. What was run again is known: S' and M' with
-these alone make the one part of the change. Of the others, and of the second runs, which are not
-exact either, so many may gain, and so many lose, as `flocsim.io.confidence.further_flips` says from
-what did of the same kind (`io.results.events.KINDS`), at most 1/M each: the interval of the change
-goes from the first part less what may be lost to the first part and what may be gained.
+Where all were run exactly, S of M would be S' of M'. What was run again is known: S' and M' by the
+most exact run of each of these alone make the one part of the change. Of the others so many may
+gain, and so many lose, as `flocsim.io.confidence.further_flips` says from what did of the same kind
+(`io.results.events.KINDS`) between first and second runs; and of all that were not run a third
+time, as it says from what changed between second and third ones. Each counts at most 1/M: the
+interval of the change goes from the first part less what may be lost to the first part and what may
+be gained.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from flocsim.ensembles.collision.checking import TIGHTER
 from flocsim.io.confidence import further_flips
-from flocsim.io.results.events import WITHOUT_OUTCOME, events, events_of, kinds_of
+from flocsim.io.results.events import WITHOUT_OUTCOME, Events, events, events_of, kinds_of
 from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES, last_axis
-
-SECOND_RUNS = TIGHTER**0.5
-"""Flips of a second run, run more exactly still, over those of a first: the rate of flips falls
-with about the root of the tolerance (`pilot/model.py`; benchmarks.accuracy.numerical_error)."""
 
 EACH_SIDE = 0.975
 """Probability of each end of an interval."""
@@ -32,68 +30,140 @@ OF_KINDS, SHIFTED = "of kinds", "shifted"
 counts of kinds stand under KIND_COUNTS."""
 KIND_COUNTS = "kinds"
 
+Codes = Sequence[np.ndarray]
+"""Outcome, inside and bond of runs as in the results file, (…, replicate); the outcome of what was
+not run is NOT_APPLICABLE."""
+
+
+def run_so(codes: Codes) -> np.ndarray:
+    """Which replicates were run, flags."""
+    return codes[0] != NOT_APPLICABLE
+
+
+def most_exact(again: Codes, third: Codes) -> list[np.ndarray]:
+    """The codes of third runs that say something of the outcome, of second runs elsewhere."""
+    says = run_so(third) & ~np.isin(third[0], WITHOUT_OUTCOME)
+    return [np.where(says, *pair) for pair in zip(third, again, strict=True)]
+
+
+def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndarray]:
+    """Which replicates raise a probability, and which lower it, counted as ``after``: flags."""
+    fails, fails_after = before.trials & ~before.successes, after.trials & ~after.successes
+    return (
+        (after.successes & ~before.successes) | (fails & ~after.trials),
+        (before.successes & ~after.successes) | (~before.trials & fails_after),
+    )
+
+
+def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:
+    """Whole numbers (kind, 4, …): how many of each kind there are, were run a second, and a third
+    time, and were run again without an outcome; ``kinds`` as in kinds_of."""
+    lost_sight = run_so(again) & np.isin(most_exact(again, third)[0], WITHOUT_OUTCOME)
+    return np.stack([
+        (kinds & each).sum(axis=-1) for each in (True, run_so(again), run_so(third), lost_sight)
+    ], axis=1)  # fmt: skip
+
+
+def kind_changes(
+    kinds: np.ndarray, runs: Sequence[Codes], counted: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """Whole numbers (kind, 4, …): how many of each kind gain and lose by the second run, and by the
+    third one after it.
+
+    ``runs``: second and third ones; ``counted``: gains_and_losses of each. A run without an outcome
+    may have come to either.
+    """
+    found = []
+    for codes, sides in zip(runs, counted, strict=True):
+        lost_sight = np.isin(codes[0], WITHOUT_OUTCOME)
+        found += [(each | lost_sight) & run_so(codes) for each in sides]
+    return np.stack([np.stack([(kind & each).sum(axis=-1) for each in found]) for kind in kinds])
+
 
 def count_changes(
-    first: Sequence[np.ndarray], again: Sequence[np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Whole-number counts n_checked, n_flipped, and those of CHANGES, over the last axis.
+    first: Codes, again: Codes, third: Codes | None = None,
+    of: Callable[..., dict[str, Events]] = events,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Whole-number counts n_checked, n_flipped, n_third, n_third_flipped and those of CHANGES, over
+    the last axis.
 
-    ``first``, ``again``: outcome, inside and bond of first and second runs, codes as in the results
-    file, (…, replicate); what was not run again has NOT_APPLICABLE for an outcome. And what
-    `change_intervals` follows from: KIND_COUNTS (kind, 2, …), of how many so many were run again;
-    "pr_a of kinds" (kind, 2, …), how many of these gained and lost; "pr_a shifted" (2, …), by how
-    much trials and successes changed.
+    ``first``, ``again``, ``third``: codes of first, second and third runs, none of the last by
+    default; ``of`` gives the Events of codes. And what `change_intervals` follows from:
+    KIND_COUNTS, see kind_counts; "pr_a of kinds" (kind, 4, …), see kind_changes; "pr_a shifted"
+    (2, …), by how much the most exact runs change trials and successes.
     """
-    checked = again[0] != NOT_APPLICABLE
-    flipped = checked & ((first[0] != again[0]) | (first[1] != again[1]))
-    counts = {"n_checked": np.sum(checked, axis=-1), "n_flipped": np.sum(flipped, axis=-1)}
-    kinds = kinds_of(first[0], first[2])
-    lost_sight = checked & np.isin(again[0], WITHOUT_OUTCOME)
-    counts[KIND_COUNTS] = np.stack([kinds.sum(axis=-1), (kinds & checked).sum(axis=-1)], axis=1)
-    second = events(*again)
-    for name, (trial, success, _) in events(*first).items():
-        trial_again, success_again, _ = second[name]
-        gained = checked & ((success_again & ~success) | (trial & ~success & ~trial_again))
-        lost = checked & ((success & ~success_again) | (~trial & trial_again & ~success_again))
-        last = bool(last_axis(name))
+    runs = again, (np.full_like(again[0], NOT_APPLICABLE),) * 3 if third is None else third
+    exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
+    checked, thrice = map(run_so, runs)
+    differ = [(one[0] != other[0]) | (one[1] != other[1])
+              for one, other in ((first, exact), runs)]  # fmt: skip
+    flags = {"n_checked": checked, "n_flipped": checked & differ[0], "n_third": thrice,
+             "n_third_flipped": thrice & differ[1]}  # fmt: skip
+    counts = {name: np.sum(each, axis=-1) for name, each in flags.items()}
+    counts[KIND_COUNTS] = kind_counts(kinds, *runs)
+    known = checked & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
+    of_first, of_again, of_third, of_exact = (of(*each) for each in (first, *runs, exact))
+    for name, before in of_first.items():
+        after = of_exact[name]
+        sides = [
+            gains_and_losses(*pair)
+            for pair in (
+                (before, after),
+                (before, of_again[name]),
+                (of_again[name], of_third[name]),
+            )
+        ]
 
-        def total(flags: np.ndarray, last: bool = last) -> np.ndarray:
-            found = np.asarray(np.sum(flags, axis=-1, dtype=np.int64))
-            return np.moveaxis(found, 0, -1) if last else found
+        def behind(values: np.ndarray, axis: int, last: bool = bool(last_axis(name))) -> np.ndarray:
+            """With the axis of classes or bonds behind those of the conditions."""
+            return np.moveaxis(values, axis, -1) if last else values
 
-        flags = {"checked": checked & (trial | trial_again), "gained": gained, "lost": lost}
-        counts |= {f"n_{kind}_{name}": total(each) for kind, each in flags.items()}
-        # A second run without an outcome may have come to anything.
-        known = checked & ~lost_sight & kinds.any(axis=0)
-        counts[f"{name} {SHIFTED}"] = np.stack([
-            total((known & trial_again).astype("i8") - (known & trial)),
-            total((known & success_again).astype("i8") - (known & success)),
-        ])  # fmt: skip
-        counts[f"{name} {OF_KINDS}"] = np.stack([
-            np.stack([total(kind & (each | lost_sight)) for each in (gained, lost)])
-            for kind in kinds
-        ])  # fmt: skip
+        flags = {"checked": checked & (before.trials | after.trials)}
+        flags |= {kind: checked & each for kind, each in zip(SIDES, sides[0], strict=True)}
+        counts |= {f"n_{kind}_{name}": behind(np.sum(each, axis=-1), 0)
+                   for kind, each in flags.items()}  # fmt: skip
+        shifts = [(known & now).sum(axis=-1) - (known & then).sum(axis=-1)
+                  for now, then in zip(after[:2], before[:2], strict=True)]  # fmt: skip
+        counts[f"{name} {SHIFTED}"] = behind(np.stack(shifts), 1)
+        counts[f"{name} {OF_KINDS}"] = behind(kind_changes(kinds, runs, sides[1:]), 2)
     return counts
 
 
+SIDES = ("gained", "lost")
+
+
+def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
+    """[how many more gain at most, and lose] of kind_changes and kind_counts (…).
+
+    Without any third run second ones are taken for exact.
+    """
+    members, checked, thrice, lost_sight = np.moveaxis(counts, 1, 0)
+    found = []
+    for side in range(len(SIDES)):
+        more = further_of_kinds(of_kinds[:, side], checked, members - checked + lost_sight)
+        if thrice.any():
+            more = more + further_of_all(of_kinds[:, 2 + side], thrice, members - thrice)
+        found.append(more)
+    return found
+
+
 def change_intervals(
-    counts: Mapping[str, np.ndarray],
+    counts: Mapping[str, np.ndarray], totals: Mapping[str, Events] | None = None
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """{probability: (low, high)}: 95 % interval of its change if all replicates were run exactly.
 
-    ``counts`` of conditions (type, vertices, …), or sums over displacements: see count_changes.
-    NaN where there are no trials, or nothing was run again.
+    ``counts`` of conditions (type, vertices, …), or sums over displacements: see count_changes;
+    ``totals``: how many trials and successes there are, by default from the counts of a results
+    file. NaN where there are no trials, or nothing was run again.
     """
     found = {}
-    members, checked = np.moveaxis(counts[KIND_COUNTS], 1, 0)
-    exposed = members - (1.0 - SECOND_RUNS) * checked
-    for name, (trials, successes, _) in events_of(counts).items():
-        kinds, shifted = counts[f"{name} {OF_KINDS}"], counts[f"{name} {SHIFTED}"]
-        gained, lost = (further_of_kinds(kinds[:, side], checked, exposed) for side in (0, 1))
+    for name, (trials, successes, _) in (totals or events_of(counts)).items():
+        gained, lost = further(counts[f"{name} {OF_KINDS}"], counts[KIND_COUNTS])
+        more_trials, more_successes = counts[f"{name} {SHIFTED}"]
         with np.errstate(divide="ignore", invalid="ignore"):
             share = successes / trials
-            again = (successes + shifted[1]) / (trials + shifted[0])
-            change = np.where(trials + shifted[0] > 0, again - share, 0.0)
+            again = (successes + more_successes) / (trials + more_trials)
+            change = np.where(trials + more_trials > 0, again - share, 0.0)
             low = np.maximum(change - lost / trials, -share)
             high = np.minimum(change + gained / trials, 1.0 - share)
         found[name] = np.where(trials > 0, low, np.nan), np.where(trials > 0, high, np.nan)
@@ -119,9 +189,7 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
     Of a kind of which none was run again at this N all may flip; NaN where no replicate was.
     """
     if flipped.ndim > checked.ndim:
-        each = [further_of_kinds(flipped[..., k], checked, exposed)
-                for k in range(flipped.shape[-1])]  # fmt: skip
-        return np.stack(each, axis=-1)
+        return of_each_class(further_of_kinds, flipped, checked, exposed)
     total = np.zeros(flipped.shape[1:])
     together: list = [...]
     if total.ndim > 1:
@@ -134,18 +202,25 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
     return total
 
 
-def share_that_flips(
-    flipped: np.ndarray, checked: np.ndarray, kinds: np.ndarray, trials: np.ndarray
-) -> np.ndarray:
-    """95 % bound of the flips over ``trials`` of conditions (type, vertices, …), at most 1.
+def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
+    """The same where rates are compared among all kinds and conditions, and with SEEN_BEFORE: of
+    third runs, which are few."""
+    if flipped.ndim > checked.ndim:
+        return of_each_class(further_of_all, flipped, checked, exposed)
+    f, c, u = (
+        np.append(each.ravel(), before)
+        for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, 0.0))
+    )
+    return further_flips(f, c, u, EACH_SIDE)[:-1].reshape(flipped.shape).sum(axis=0)
 
-    ``flipped`` and ``checked`` flags of replicates (…, replicate), ``kinds`` those of kinds_of.
-    """
-    f, c = ((kinds & flags).sum(axis=-1) for flags in (flipped, checked))
-    more = further_of_kinds(f, c, kinds.sum(axis=-1) - (1.0 - SECOND_RUNS) * c)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bound = np.minimum((f.sum(axis=0) + more) / trials, 1.0)
-    return np.where(trials > 0, bound, np.nan)
+
+SEEN_BEFORE = 1, 500
+"""How many third runs ended otherwise than second ones, of so many, where this was looked at before
+(benchmarks.accuracy.numerical_error): it counts as one condition more."""
+
+
+def of_each_class(more_of, flipped, *others):
+    return np.stack([more_of(flipped[..., k], *others) for k in range(flipped.shape[-1])], axis=-1)
 
 
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -6,12 +6,13 @@ number of independent events which the spread between replicates shows (a ratio 
 W. G. Cochran, Sampling Techniques, 1977, ch. 6).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.ensembles.estimates.paired import of_each_scramble
 from flocsim.errors import UsageError
 from flocsim.io.confidence import (
     bounded_sums,
@@ -39,30 +40,39 @@ __all__ = ["probabilities", "tabulate", "wilson"]
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
 
-COUNTED = (*CODES, *(f"checked_{name}" for name in CODES))
+COUNTED = tuple(f"{run}{name}" for run in ("", "checked_", "third_") for name in CODES)
 """All columns that are counted."""
+
+
+def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:
+    """CODES of first, second and third runs, from columns in the order of COUNTED."""
+    return [columns[k : k + len(CODES)] for k in range(0, len(COUNTED), len(CODES))]
 
 
 def tabulate(
     outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike,
     checked_outcome: ArrayLike = NOT_APPLICABLE, checked_inside: ArrayLike = NOT_APPLICABLE,
-    checked_bond: ArrayLike = NOT_APPLICABLE,
+    checked_bond: ArrayLike = NOT_APPLICABLE, third_outcome: ArrayLike = NOT_APPLICABLE,
+    third_inside: ArrayLike = NOT_APPLICABLE, third_bond: ArrayLike = NOT_APPLICABLE,
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Counts and probabilities of every condition, over the last axis of the arrays.
 
     ``outcome``, ``inside``, ``bond``: codes as in the results file, (…, replicate), in practice
     (type, vertices, delta, replicate). Returns a dict of arrays (…), (…, 4) for the classes A–D and
     (…, 3) for the kinds of bond: the counts ``n_*`` (see `count`, `count_changes`), the
-    probabilities of `probabilities` and their `numerical_errors`. ``checked_…``: those of second
-    runs, none by default. Raises UsageError for unknown codes, and where they contradict each
-    other.
+    probabilities of `probabilities` and their `numerical_errors`. ``checked_…``, ``third_…``:
+    those of second and third runs, none by default. Raises UsageError for unknown codes, and where
+    they contradict each other.
     """
     first = checked_codes(outcome, inside, bond)
-    again = tuple(
-        np.broadcast_to(np.asarray(codes), first[0].shape)
-        for codes in (checked_outcome, checked_inside, checked_bond)
+    again, third = (
+        tuple(np.broadcast_to(np.asarray(codes), first[0].shape) for codes in run)
+        for run in (
+            (checked_outcome, checked_inside, checked_bond),
+            (third_outcome, third_inside, third_bond),
+        )
     )
-    sums = count(*first) | count_changes(first, again)
+    sums = count(*first) | count_changes(first, again, third)
     counts = {name: values for name, values in sums.items() if name.startswith("n_")}
     return counts | probabilities(counts) | numerical_errors(sums)
 
@@ -172,8 +182,8 @@ def scrambled_sums(
     found = {}
     for name, each in events(*codes).items():
         flags = np.stack(each)
-        parts = [flags[..., (s - first) % scrambles :: scrambles].sum(axis=-1, dtype=np.int64)
-                 for s in range(scrambles)]  # fmt: skip
+        parts = [flags[..., part].sum(axis=-1, dtype=np.int64)
+                 for part in of_each_scramble(first, scrambles)]  # fmt: skip
         sums = np.stack(parts, axis=-1)
         found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if last_axis(name) else sums
     return found

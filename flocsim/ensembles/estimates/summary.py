@@ -15,9 +15,9 @@ from flocsim.ensembles.estimates.numerical import (
 )
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
-    CODES,
     COUNTED,
     OF_SCRAMBLES,
+    by_runs,
     checked_codes,
     count,
     pooled_probabilities,
@@ -82,13 +82,13 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
         columns = codes(start, min(start + step, stop))
-        first_codes, again = columns[: len(CODES)], columns[len(CODES) :]
+        first_codes, again, third = by_runs(columns)
         outcome, inside, bond = checked_codes(*first_codes)
         found = {
             **count(outcome, inside, bond),
-            **count_changes((outcome, inside, bond), again),
+            **count_changes((outcome, inside, bond), again, third),
             **pooled_sums(outcome, inside, bond),
-            JOINT: joint_counts(outcome, inside),
+            JOINT: joint_counts(outcome, inside, start, scrambles),
             **scrambled_sums((outcome, inside, bond), start, scrambles),
         }
         sums = added(sums, found)
@@ -126,7 +126,7 @@ def tables_of(sums: Sums) -> AllTables:
         pooled_probabilities(pooled)
         | scrambled_probabilities(of_scrambles, pooled=True)
         | {name: values for name, values in together.items() if name in POOLED},
-        paired_differences(sums[JOINT]),
+        paired_differences(sums[JOINT], bool(of_scrambles)),
         change_columns(changes),
     )
 

@@ -1,21 +1,27 @@
 """Two results files of pairs compared: differences of probabilities, condition by condition."""
 
+from collections.abc import Sequence
+
 import attrs
 import numpy as np
 
 from flocsim.ensembles.comparison import Differences, changes_between, common, labelled_of, starred
-from flocsim.ensembles.estimates.numerical import share_that_flips
-from flocsim.ensembles.estimates.paired import between, bounded_cells, bounded_newcombe
-from flocsim.ensembles.pairs.opened import StudyResults
-from flocsim.io.labelled import Column, Labelled, about_of
-from flocsim.io.results.events import Events, approaches, events, kinds_of
-from flocsim.io.results.schema import (
-    AXES,
-    COMPARED,
-    COORDINATES,
-    NOT_APPLICABLE,
-    PER_APPROACH,
+from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
+from flocsim.ensembles.estimates.paired import (
+    between,
+    bounded_cells,
+    bounded_difference,
+    change_of_differences,
+    joined,
+    of_each_scramble,
 )
+from flocsim.ensembles.estimates.statistics import COUNTED, by_runs
+from flocsim.ensembles.pairs.opened import StudyResults
+from flocsim.ensembles.report import SCRAMBLES
+from flocsim.io.confidence import proportion, scrambled_proportion
+from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.results.events import Events, approaches, events
+from flocsim.io.results.schema import AXES, COMPARED, COORDINATES, PER_APPROACH
 
 MEANINGS = {
     "first": "the probability in the first file",
@@ -23,7 +29,8 @@ MEANINGS = {
     "difference": "second minus first",
     "difference_low": "difference, lower 95 % bound",
     "difference_high": "difference, upper 95 % bound",
-    "numerical": "what numerics add on either side, of both files together",
+    "change_low": "by how much the difference would change, run exactly: lower 95 % bound",
+    "change_high": "by how much the difference would change, run exactly: upper 95 % bound",
     "n_first": "replicates that count in the first file",
     "n_second": "replicates that count in the second file",
 }
@@ -62,16 +69,15 @@ class Comparison(Differences):
         lines = [*self.changes, f"{COMPARED[probability]}, second minus first: {self.how}", ""]
         lines.append(
             f"{'type':>10} {'N':>5} {'delta':>6} {'n':>13} {'first':>6} {'second':>6}  "
-            "difference [95 %] num."
+            "difference [95 %] numerics"
         )
         for place in np.ndindex(*(len(each) for each in (self.types, self.vertices, self.delta))):
             each = {name: column.values[place] for name, column in arrays.items()}
-            low, high, added = each["difference_low"], each["difference_high"], each["numerical"]
-            widened = 0.0 if np.isnan(added) else added
-            star = starred(low - widened, high + widened)
+            ends = [float(each[f"{name}{end}"]) for name in ("difference", "change")
+                    for end in ENDS]  # fmt: skip
             numbers = f"{each['n_first']}/{each['n_second']}"
             found = "-" if np.isnan(each["difference"]) else (
-                f"{each['difference']:+.3f} [{low:+.3f}, {high:+.3f}] +-{added:.3f}{star}"
+                f"{each['difference']:+.3f} {with_change(*ends)}"
             )  # fmt: skip
             lines.append(
                 f"{self.types[place[0]]:>10} {self.vertices[place[1]]:>5} "
@@ -79,6 +85,17 @@ class Comparison(Differences):
                 f"{each['second']:>6.3f}  {found}"
             )
         return "\n".join(lines)
+
+
+ENDS = ("_low", "_high")
+
+
+def with_change(low: float, high: float, change_low: float, change_high: float) -> str:
+    """ "[+0.010, +0.050] -0.004 +0.010 *": an interval and what numerics may change, a star where
+    0 is outside both together."""
+    added = np.nan_to_num([change_low, change_high])
+    star = starred(low + added[0], high + added[1])
+    return f"[{low:+.3f}, {high:+.3f}] {change_low:+.3f} {change_high:+.3f}{star}"
 
 
 def compare(first: StudyResults, second: StudyResults) -> Comparison:
@@ -91,23 +108,20 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
         np.array_equal(rows[0][name][..., :pairs], rows[1][name][..., :pairs], equal_nan=True)
         for name in ("angle_i", "angle_j")
     )
-    trials = [
-        events(each["outcome"], each["inside"], each["bond"])
-        | {PER_APPROACH: approaches(each["outcome"])}
-        for each in rows
-    ]
+    scrambles = [int(each.run.get(SCRAMBLES, 0)) for each in (first, second)]
+    kept = pairs if paired else None
+    codes = [by_runs([each[name][..., :kept] for name in COUNTED]) for each in rows]
+    trials = [compared_events(*each[0]) for each in codes]
+    changes = (
+        change_of_differences(codes[0], codes[1], compared_events)
+        if paired
+        else changes_apart(codes)
+    )
     arrays = {}
     for name in COMPARED:
-        found = differences_of(trials[0][name], trials[1][name], pairs if paired else None)
-        added = (
-            [numerical_per_approach(each) for each in rows]
-            if name == PER_APPROACH
-            else [
-                each.probabilities[f"{name}_numerical"][np.ix_(*places(each, wanted))]
-                for each in (first, second)
-            ]
-        )
-        arrays[name] = found | {"numerical": np.sum(added, axis=0)}
+        both = trials[0][name], trials[1][name]
+        found = paired_of(*both, scrambles[0]) if paired else apart_of(both, scrambles)
+        arrays[name] = found | dict(zip(("change_low", "change_high"), changes[name], strict=True))
     return Comparison(
         paired, pairs if paired else 0, arrays, changes_between(first, second),
         types=tuple(wanted[0]), vertices=np.array(wanted[1]), delta=np.array(wanted[2]),
@@ -128,38 +142,78 @@ def places(results, wanted):
 def picked(results, wanted):
     """The columns that are compared, at the wanted conditions."""
     at = np.ix_(*places(results, wanted))
-    names = ("angle_i", "angle_j", "outcome", "inside", "bond", "checked_outcome")
-    return {name: results.replicates[name][at] for name in names}
+    return {name: results.replicates[name][at] for name in ("angle_i", "angle_j", *COUNTED)}
 
 
-def numerical_per_approach(rows):
-    """What numerics add to Pr[aggregation | decided approach]: flips of what was run again."""
-    again = rows["checked_outcome"]
-    checked = again != NOT_APPLICABLE
-    (trial, success, _), (trial_again, success_again, _) = map(approaches, (rows["outcome"], again))
-    flipped = checked & ((trial != trial_again) | (success != success_again))
-    kinds = kinds_of(rows["outcome"], rows["bond"])
-    return share_that_flips(flipped, checked, kinds, trial.sum(axis=-1))
+def compared_events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, Events]:
+    """The Events of COMPARED."""
+    found = events(outcome, inside, bond) | {PER_APPROACH: approaches(outcome)}
+    return {name: found[name] for name in COMPARED}
 
 
-def differences_of(first, second, pairs):
-    """The arrays of MEANINGS but ``numerical``, of the Events of two files.
+def changes_apart(files: Sequence[Sequence[Codes]]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """{probability: (low, high)} of by how much its difference would change, run exactly, where
+    the replicates of two files are independent."""
+    changes = [
+        change_intervals(count_changes(runs[0], runs[1], runs[2], compared_events), {
+            name: Events(*(flags.sum(axis=-1) for flags in each))
+            for name, each in compared_events(*runs[0]).items()
+        }) for runs in files
+    ]  # fmt: skip
+    return {
+        name: (changes[1][name][0] - changes[0][name][1], changes[1][name][1] - changes[0][name][0])
+        for name in COMPARED
+    }
 
-    Over the replicates that count in both, among the first ``pairs``; of independent samples where
-    that is None. What is unknown may have come to anything.
-    """
-    if pairs is None:
-        (n, s, u), (m, t, v) = (Events(*(each.sum(axis=-1) for each in one))
-                                for one in (first, second))  # fmt: skip
-        difference = between(t, m, s, n)[0]
-        low, high = between(t, m + v, s + u, n + u)[1], between(t + v, m + v, s, n + u)[2]
+
+def paired_of(first: Events, second: Events, scrambles: int) -> dict[str, np.ndarray]:
+    """The arrays of MEANINGS but what numerics change, of the Events of the same replicates in two
+    files, over those that count in both. What is unknown may have come to anything."""
+    parts = of_each_scramble(0, scrambles) or [slice(None)]
+    cut = [[Events(*(flags[..., part] for flags in each)) for each in (second, first)]
+           for part in parts]  # fmt: skip
+    joint = np.stack([bounded_cells(ours, theirs) for ours, theirs in cut], axis=-2)
+    cells = joint[0].sum(axis=-2)
+    ends = bounded_difference(joint if scrambles else joint[..., 0, :], bool(scrambles))
+    both, here, there, _ = np.moveaxis(cells, -1, 0)
+    n = cells.sum(axis=-1)
+    return told(both + there, n, both + here, n, ends)
+
+
+def apart_of(files: Sequence[Events], scrambles: Sequence[int]) -> dict[str, np.ndarray]:
+    """The same of independent replicates."""
+    (n, s, u), (m, t, v) = (Events(*(each.sum(axis=-1) for each in one)) for one in files)
+    difference = between(t, m, s, n)[0]
+    if not any(scrambles):
+        ends = between(t, m + v, s + u, n + u)[1], between(t + v, m + v, s, n + u)[2]
     else:
-        ours = (Events(*(each[..., :pairs] for each in one)) for one in (second, first))
-        joint = bounded_cells(*ours)
-        difference, low, high = bounded_newcombe(joint)
-        both, here, there, _ = np.moveaxis(joint[0], -1, 0)
-        n = m = joint[0].sum(axis=-1)
-        s, t = both + there, both + here
+        (p, p_low, p_high), (q, q_low, q_high) = map(interval_of, files, scrambles)
+        down, up = joined(q - q_low, p_high - p, 0.0), joined(q_high - q, p - p_low, 0.0)
+        ends = difference - down, difference + up
+    return told(s, n, t, m, (difference, *ends))
+
+
+def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(share, low, high) of the flags of one file's replicates."""
+    trials, successes, unknown = (flags.sum(axis=-1) for flags in each)
+    found = proportion(successes, trials, unknown=unknown)
+    if not scrambles:
+        return found
+    sums = [
+        np.stack(
+            [
+                flags[..., part].sum(axis=-1, dtype=np.int64)
+                for part in of_each_scramble(0, scrambles)
+            ],
+            axis=-1,
+        )
+        for flags in each
+    ]
+    return found[0], *scrambled_proportion(sums[1], sums[0], sums[2])[:2]
+
+
+def told(s, n, t, m, ends):
+    difference, low, high = ends
     with np.errstate(divide="ignore", invalid="ignore"):
         return {
             "first": s / n, "second": t / m, "difference": difference, "difference_low": low,

@@ -38,6 +38,7 @@ from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
+    SCRAMBLES,
     change_lines,
     checked_line,
     format_table,
@@ -130,6 +131,7 @@ def facts(study: Study) -> dict[str, Any]:
     given = study.config, study.flocs
     return {
         MOST_UNDECIDED: study.config.stop.undecided,
+        SCRAMBLES: study.scrambles,
         "size_classes": json.dumps(class_facts(study.pairings)),
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),

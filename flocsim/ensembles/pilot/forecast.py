@@ -15,7 +15,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.checking import MORE_STEPS, expected_checks
+from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
 from flocsim.ensembles.pilot.trials import Job, Trial, is_flip, try_out
@@ -116,7 +116,7 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
     exact = study.exact[name] if again else None
     if exact is None:
         return Timed(task, first)
-    return Timed(task, first, try_out(study, Job(task, exact, MORE_STEPS * steps))[0])
+    return Timed(task, first, try_out(study, Job(task, exact[0], MORE_STEPS * steps))[0])
 
 
 def time_replicates(
@@ -219,7 +219,8 @@ def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) 
     groups, checks = [], []
     for place in range(len(config.scene.names)):
         mine = [run for run in runs if run.task.condition == place]
-        seconds = [run.second.cpu if run.second else math.nan for run in mine]
+        third = 1.0 + THIRD_COST / THIRD_OF
+        seconds = [third * run.second.cpu if run.second else math.nan for run in mine]
         groups.append(Spent(np.array([run.first.cpu for run in mine]), np.array(seconds)))
         checks.append(cells * second_runs(mine, count, config.integrator.check_share))
     work, again = estimated(groups, cells * count, checks, fixed, config.seed)

@@ -8,7 +8,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from flocsim.ensembles.pairs.comparison import Comparison, compare
+from flocsim.ensembles.pairs.comparison import Comparison, compare, with_change
 from flocsim.ensembles.pairs.opened import open_results
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.ensembles.studies.sweep import parts_folder, sweep, value_of
@@ -25,7 +25,7 @@ class Elasticities:
     """dPr[A]/d ln p of parameters: ``keys`` and their ``values`` (SI); ``ratio`` of the larger to
     the smaller value that was run, the geometric mean of which is the value; ``types``,
     ``vertices``, ``delta`` the conditions; ``value``, ``low``, ``high`` (key, type, vertices,
-    delta), the 95 % interval paired; ``numerical`` what numerics add on either side."""
+    delta), the 95 % interval paired; ``change_low``, ``change_high`` what numerics change."""
 
     keys: tuple[str, ...]
     values: tuple[float, ...]
@@ -36,26 +36,28 @@ class Elasticities:
     value: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    numerical: np.ndarray
+    change_low: np.ndarray
+    change_high: np.ndarray
 
     def matters(self, place: tuple[int, ...]) -> bool:
-        """Whether 0 is outside the interval of sampling; numerics are said beside it, and err
-        alike on the same draws."""
-        return bool(self.low[place] > 0.0 or self.high[place] < 0.0)
+        """Whether 0 is outside the interval, numerics included."""
+        return self.words(place).endswith("*")
+
+    def words(self, place: tuple[int, ...]) -> str:
+        """The interval of sampling, and what numerics change."""
+        ends = self.low, self.high, self.change_low, self.change_high
+        return with_change(*(float(each[place]) for each in ends))
 
     def table(self) -> str:
         """A row for each parameter and condition; a star where 0 is outside the interval."""
-        rows = [("parameter", "at", "type", "N", "delta", "dPr[A]/dln p", "[95 %]", "num.", "")]
+        rows = [("parameter", "at", "type", "N", "delta", "dPr[A]/dln p", "[95 %] numerics")]
         for place in np.ndindex(self.value.shape):
             k, t, v, d = place
             names = (self.keys[k], f"{self.values[k]:g}", self.types[t], str(self.vertices[v]),
                      f"{self.delta[d]:g}")  # fmt: skip
-            value, low, high = (each[place] for each in (self.value, self.low, self.high))
-            found = ("-", "-", "-", "") if math.isnan(value) else (
-                f"{value:+.3f}", f"[{low:+.3f}, {high:+.3f}]", f"+-{self.numerical[place]:.3f}",
-                "*" if self.matters(place) else "",
-            )  # fmt: skip
-            rows.append((*names, *found))
+            value = float(self.value[place])
+            known = not math.isnan(value)
+            rows.append((*names, *((f"{value:+.3f}", self.words(place)) if known else ("-", "-"))))
         return "\n".join(aligned(rows))
 
 
@@ -97,7 +99,7 @@ def elasticities(
 
 COLUMNS = {
     "value": "difference", "low": "difference_low", "high": "difference_high",
-    "numerical": "numerical",
+    "change_low": "change_low", "change_high": "change_high",
 }  # fmt: skip
 
 

@@ -39,7 +39,9 @@ def elasticities(found: Any) -> Figure:
                     if np.isnan(value):
                         continue
                     at = row - dodge(index, len(conditions))
-                    axes.plot([low, high], [at, at], color=colour, linewidth=0.8)
+                    axes.plot([low, high], [at, at], color=colour, linewidth=1.0)
+                    down, up = np.nan_to_num([found.change_low[place], found.change_high[place]])
+                    axes.plot([low + down, high + up], [at, at], color=colour, linewidth=0.4)
                     axes.plot(value, at, marker=marker, color=colour, ms=4.0,
                               mfc=colour if found.matters(place) else "white")  # fmt: skip
             axes.set_title(title)
@@ -51,6 +53,6 @@ def elasticities(found: Any) -> Figure:
             word = f"N = {found.vertices[v]}, δ = {found.delta[d]:g}"
             panels[-1].plot([], [], color=colours[index], marker=MARKERS[index % len(MARKERS)],
                             label=word)  # fmt: skip
-        panels[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0),
-                          title="bars: 95 %, paired\nhollow: may be 0")  # fmt: skip
+        title = "bars: 95 %, paired; thin:\nplus numerics; hollow: may be 0"
+        panels[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title=title)
         return figure

@@ -42,7 +42,7 @@ def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = GRO
 
     ``groups``: as the version of the file has them.
     """
-    declared = {**groups, "kernel": KERNEL_GROUP, "flocs": FLOCS}
+    declared = {"kernel": KERNEL_GROUP, **groups, "flocs": FLOCS}
     wanted = {name: group.arrays for name, group in declared.items()}
     wanted["run"] = scalars_in(nodes, "run")
     known = {axis: len(words) for axis, words in WORDS.items()}
@@ -97,7 +97,9 @@ def check_tables(results: Results) -> None:
         or np.any(table["n_inside"] > table["n_collided"])
         or np.any(table["n_bond"].sum(axis=-1) != table["n_class"][..., BOUND_CLASSES].sum(axis=-1))
         or np.any(table["n_checked"] > results.count)
-        or np.any(table["n_flipped"] > table["n_checked"]),
+        or np.any(table["n_flipped"] > table["n_checked"])
+        or np.any(table["n_third"] > table["n_checked"])
+        or np.any(table["n_third_flipped"] > table["n_third"]),
         "counts that contradict each other",
     )
     for name, values in results.pooled.items():
@@ -133,13 +135,18 @@ def check_rows(
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
-    for name in ("inside", "crossed_zone", "checked_inside"):
-        codes = column(name)
-        refuse_row((codes > 1) & (codes != NOT_APPLICABLE), name)
-    again = column("checked_outcome")
-    refuse_row((again >= len(OUTCOMES)) & (again != NOT_APPLICABLE), "checked_outcome")
-    again = column("checked_bond")
-    refuse_row(((again < 1) | (again > len(BONDS))) & (again != NOT_APPLICABLE), "checked_bond")
+    for names, least, most in (
+        (("inside", "crossed_zone", "checked_inside", "third_inside"), 0, 1),
+        (("checked_outcome", "third_outcome"), 0, len(OUTCOMES) - 1),
+        (("checked_bond", "third_bond"), 1, len(BONDS)),
+    ):
+        for name in names:
+            codes = column(name)
+            refuse_row(((codes < least) | (codes > most)) & (codes != NOT_APPLICABLE), name)
+    refuse_row(
+        (column("third_outcome") != NOT_APPLICABLE) & (column("checked_outcome") == NOT_APPLICABLE),
+        "third_outcome",
+    )
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")

@@ -41,6 +41,10 @@ BOUNDS = {
     "_high": ", upper 95 % bound, undecided and failed points taken for captures",
     "_numerical": ", by how much numerics change it: 95 % bound",
 }
+CHANGE = {
+    "_change_low": ", by how much it would change, run exactly: lower 95 % bound",
+    "_change_high": ", by how much it would change, run exactly: upper 95 % bound",
+}
 FLIPS = {
     f"flips_{name}": ("f8", "1", f"share of points run again that flip: encounters {words} or not")
     for name, words in WHAT.items()
@@ -58,7 +62,7 @@ BESIDES = {
 KERNEL = {
     name + suffix: (kind, unit, text + bound)
     for name, (kind, unit, text) in ESTIMATES.items()
-    for suffix, bound in BOUNDS.items()
+    for suffix, bound in (BOUNDS | CHANGE).items()
 } | FLIPS | BESIDES  # fmt: skip
 """{name: (type, units, long name)} of arrays (mechanism, vertices, i, j)."""
 
@@ -122,14 +126,18 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def read_kernel(file: Any) -> Kernel | None:
-    """The group of an open file, None where it has none; ValueError for values that cannot be."""
+def read_kernel(file: Any, group: Group = KERNEL_GROUP) -> Kernel | None:
+    """The group of an open file, None where it has none; ValueError for values that cannot be.
+
+    ``group``: as the version of the file has it; what it lacks is NaN.
+    """
     if "kernel" not in file:
         return None
-    found = KERNEL_GROUP.read(file["kernel"])
+    found = group.read(file["kernel"])
     if found["i"].tolist() != found["j"].tolist():
         raise ValueError("kernel/i and kernel/j name other classes")
-    arrays = {name: found[name] for name in KERNEL}
+    blank = np.full_like(found["alpha"], np.nan)
+    arrays = {name: found.get(name, blank) for name in KERNEL}
     check_kernel(arrays)
     return Kernel(
         tuple(found["mechanism"]), found["vertices"], tuple(found["i"]), found["r_eq"], arrays
@@ -139,5 +147,6 @@ def read_kernel(file: Any) -> Kernel | None:
 def check_kernel(arrays: Mapping[str, np.ndarray]) -> None:
     """ValueError for values that no study can have given."""
     for name, values in arrays.items():
-        if np.any(values < SMALLEST) or np.any(np.isinf(values)):
+        least = -np.inf if "_change_" in name else SMALLEST
+        if np.any(values < least) or np.any(np.isinf(values)):
             raise ValueError(f"there are impossible values in kernel/{name}")

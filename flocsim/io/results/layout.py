@@ -17,7 +17,7 @@ from flocsim.io.groups import write_labelled
 from flocsim.io.results.schema import FLOCS, REPLICATES, Results
 
 FORMAT = "flocsim results"
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 
 
 class SparseImage(io.RawIOBase):

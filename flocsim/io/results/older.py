@@ -20,15 +20,16 @@ from flocsim.io.groups import Group, scalar_of, values_of
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.opening import parsed
 from flocsim.io.results.checks import check_coordinates, check_structure
+from flocsim.io.results.kernel_group import CHANGE, ESTIMATES, KERNEL_GROUP, read_kernel
 from flocsim.io.results.layout import SCHEMA_VERSION, image_of
 from flocsim.io.results.schema import (
     BLANKS,
     BONDS,
     BOUNDS,
     CHANGES,
-    COORDINATES,
     DIFFERENCES,
     GROUPS,
+    NUMERICS,
     POOLED,
     PROBABILITIES,
     RADII,
@@ -89,6 +90,14 @@ ADDED = {
         {"replicates": frozenset(SHAPE_COLUMNS)},
         "they do not have the shape measures of the bodies",
     ),
+    7: Addition(
+        {
+            "probabilities": frozenset({"n_third", "n_third_flipped"}),
+            "replicates": frozenset({"third_outcome", "third_inside", "third_bond"}),
+            "kernel": frozenset(f"{name}{end}" for name in ESTIMATES for end in CHANGE),
+        },
+        "none was run a third time",
+    ),
 }  # fmt: skip
 """Version → what it added to that before it."""
 
@@ -116,11 +125,13 @@ def why_apart(file: Any) -> str:
 def groups_of(version: int) -> dict[str, Group]:
     """The groups as an older version had them."""
     found = {}
-    for name, group in GROUPS.items():
+    for name, group in (GROUPS | {"kernel": KERNEL_GROUP}).items():
         missing = lacking(version, name)
         columns = {key: each for key, each in group.columns.items() if key not in missing}
         beside = {key: each for key, each in group.beside.items() if key not in missing}
-        found[name] = Group.of(columns, COORDINATES, beside)
+        used = {axis for each in columns.values() for axis in each.axes}
+        scales = {axis: each for axis, each in group.scales.items() if axis in used}
+        found[name] = Group(columns, scales, beside)
     return found
 
 
@@ -143,7 +154,9 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
 
 def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
     """The Results in an open file of an older version."""
-    found = {name: group.read(file[name]) for name, group in groups.items() if name in file}
+    kernel = read_kernel(file, groups["kernel"])
+    found = {name: group.read(file[name]) for name, group in groups.items()
+             if name in file and name != "kernel"}  # fmt: skip
     table, rows = found["probabilities"], found["replicates"]
     shape = len(table["type"]), len(table["vertices"]), len(table["delta"])
     blank = {name: np.full((*shape, *tail_of(name)), blank_of(TABLE[name])) for name in TABLE}
@@ -165,7 +178,9 @@ def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
         pooled=filled(pooled, found["pooled"]) if "pooled" in found else {},
         differences={name: found["differences"][name] for name in DIFFERENCES}
         if "differences" in found else {},
-        radii=filled(radii, table),
+        numerics={name: found["numerics"][name] for name in NUMERICS}
+        if "numerics" in found else {},
+        radii=filled(radii, table), kernel=kernel,
     )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ CLASSES = OUTCOMES[:4]
 AGGREGATED = ("A", "C")
 NOT_APPLICABLE = 255
 """In ``inside`` and ``crossed_zone``: the outlines never touched; in ``bond``: nothing is bound; in
-``checked_outcome``: the replicate was not run again."""
+``checked_outcome`` and ``third_outcome``: the replicate was not run again, or not a third time."""
 
 AXES = ("type", "vertices", "delta")
 
@@ -49,6 +49,9 @@ REPLICATES = {  # name: (dtype, units, long name)
     "checked_outcome": ("u1", "1", "outcome at the tighter tolerance"),
     "checked_inside": ("u1", "1", "centre distance below D_0 at the collision, when run again"),
     "checked_bond": ("u1", "1", "what holds an aggregated pair, when run again"),
+    "third_outcome": ("u1", "1", "outcome of the third run, at a tolerance tighter still"),
+    "third_inside": ("u1", "1", "centre distance below D_0 at the collision, in the third run"),
+    "third_bond": ("u1", "1", "what holds an aggregated pair, in the third run"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
@@ -82,6 +85,8 @@ COUNTS = {
     "n_checked": "replicates that were run again at a tighter tolerance",
     "n_flipped": "replicates run again that ended with another outcome, or on the other side of "
     "the zone",
+    "n_third": "of these, replicates that were run a third time",
+    "n_third_flipped": "of these, replicates whose third run ended otherwise than the second",
 }
 PROBABILITIES = {
     "pr_inside": "Pr[inside | collision]",
@@ -163,6 +168,7 @@ FLAGS = {
     "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
     "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
+FLAGS |= {f"third_{name}": FLAGS[f"checked_{name}"] for name in ("outcome", "inside", "bond")}
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),

@@ -1,14 +1,18 @@
 """Which replicates are run again and how: few, random, and the same whatever else is asked for."""
 
+import math
+
 import attrs
 import numpy as np
 import pytest
 
 from flocsim.ensembles.collision.checking import (
+    THIRD_OF,
     count_checks,
     exact_method,
+    exact_methods,
     expected_checks,
-    is_checked,
+    further_runs,
 )
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILED, run_safely
@@ -23,21 +27,26 @@ from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.small_study import small_config, small_study
 
 POLYGONS = {"shapes": {"vertices": (4,), "pool": 2}, "scene": {"types": ("I",), "delta": (0.0,)}}
-CHECKS = ("checked_outcome", "checked_inside", "checked_bond")
+CHECKS, THIRDS = (
+    tuple(f"{run}_{name}" for name in ("outcome", "inside", "bond")) for run in ("checked", "third")
+)
 
 
 @pytest.mark.parametrize("share", ["auto", 0.0, 0.03, 0.5, 1.0])
 @pytest.mark.parametrize("seed", [1, 2, 77])
 def test_of_the_first_so_many_just_as_many_are_checked_as_are_said_to_be(seed, share):
-    chosen = np.cumsum([is_checked(seed, k, share) for k in range(3000)])
+    runs = np.array([further_runs(seed, k, share) for k in range(3000)])
+    chosen, third = np.cumsum(runs > 0), np.sum(runs > 1)
     for count in (1, 2, 10, 100, 999, 3000):
         assert chosen[count - 1] == count_checks(seed, count, share)
         assert abs(chosen[count - 1] - expected_checks(count, share)) < 1.0
     assert chosen[-1] == {0.0: 0, 1.0: 3000}.get(share, chosen[-1])
+    # Of these the first, and then one in THIRD_OF.
+    assert third == math.ceil(chosen[-1] / THIRD_OF) and (share == 0.0 or max(runs[:40]) == 2)
 
 
 def test_the_seed_chooses():
-    chosen = {tuple(is_checked(seed, k, "auto") for k in range(40)) for seed in range(30)}
+    chosen = {tuple(further_runs(seed, k, "auto") for k in range(40)) for seed in range(30)}
     assert len(chosen) > 10
 
 
@@ -56,6 +65,8 @@ def test_methods_are_made_more_exact_and_no_other():
         exact = exact_method(method)
         assert exact == attrs.evolve(method, tolerance=1e-11)
     assert exact_method(VelocityVerlet(4e-8)) == VelocityVerlet(1e-8)
+    for first, third in ((1e-6, 1e-11), (1e-7, 1e-12), (1e-9, 1e-12), (1e-12, 1e-15)):
+        assert exact_methods(Implicit(first))[1] == Implicit(third)
 
 
 @attrs.frozen
@@ -96,16 +107,24 @@ def test_the_dry_run_says_how_many_and_at_what(tmp_path):
 def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(tmp_path):
     all_of_them = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 1.0}})
     none = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 0.0}})
-    tight = {"integrator": {"check_share": 0.0, "tolerance": 1e-11}}
-    exact = small_study(tmp_path, POLYGONS | tight)
+    exact, most_exact = (
+        small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 0.0, "tolerance": each}})
+        for each in (1e-11, 1e-12)
+    )
     place = all_of_them.places[0]
     for k in range(6):
         row, plain, tighter = (each.run(*place, k) for each in (all_of_them, none, exact))
-        assert [plain[name] for name in CHECKS] == [NOT_APPLICABLE] * 3
-        assert [row[name] for name in CHECKS] == [
-            tighter[name] for name in ("outcome", "inside", "bond")
-        ]
-        assert {**row, **dict.fromkeys(CHECKS, NOT_APPLICABLE)} == pytest.approx(plain, nan_ok=True)
+        assert [plain[name] for name in CHECKS + THIRDS] == [NOT_APPLICABLE] * 6
+        codes = [tighter[name] for name in ("outcome", "inside", "bond")]
+        assert [row[name] for name in CHECKS] == codes
+        if k == 0:
+            third = most_exact.run(*place, k)
+            codes = [third[name] for name in ("outcome", "inside", "bond")]
+            assert [row[name] for name in THIRDS] == codes
+        else:
+            assert [row[name] for name in THIRDS] == [NOT_APPLICABLE] * 3
+        blank = dict.fromkeys(CHECKS + THIRDS, NOT_APPLICABLE)
+        assert {**row, **blank} == pytest.approx(plain, nan_ok=True)
         assert tighter["steps"] > plain["steps"]
 
 

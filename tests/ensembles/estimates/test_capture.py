@@ -12,6 +12,7 @@ from flocsim.ensembles.estimates.capture import (
     flow_width,
     kernel_of,
     mean_of,
+    numerical_parts,
     ratio_of,
     weighted,
     widened,
@@ -38,14 +39,14 @@ def made_up(study, place, catches, flips=()):
     rows["outcome"] = np.where(caught, 0, OUTCOMES.index("missed"))
     rows["inside"] = np.where(caught, 1, NOT_APPLICABLE)
     rows["bond"] = np.where(caught, 1, NOT_APPLICABLE)
-    rows["checked_outcome"] = np.full(count, NOT_APPLICABLE)
-    rows["checked_inside"] = np.full(count, NOT_APPLICABLE)
-    checked = np.arange(0, count, 8)
-    for name in ("outcome", "inside"):
-        rows[f"checked_{name}"][checked] = rows[name][checked]
-    for k in flips:
-        rows["checked_outcome"][k] = OUTCOMES.index("missed")
-        rows["checked_inside"][k] = NOT_APPLICABLE
+    for which, every in (("checked", 8), ("third", 32)):
+        checked = np.arange(0, count, every)
+        for name in ("outcome", "inside", "bond"):
+            again = rows[f"{which}_{name}"] = np.full(count, NOT_APPLICABLE)
+            again[checked] = rows[name][checked]
+            again[[k for k in flips if k % every == 0]] = (
+                OUTCOMES.index("missed") if name == "outcome" else NOT_APPLICABLE
+            )
     return weighted(study, (place, 1), rows, points), rows
 
 
@@ -84,15 +85,35 @@ def test_both_signs_count_by_themselves(tmp_path):
     assert found["width_a"] == pytest.approx(0.3 * 3e-5, rel=0.01)
 
 
-def test_flips_are_counted_and_bound_the_change(tmp_path):
-    config = kernel_config(tmp_path, replicates=512)
-    points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9)
+@pytest.mark.parametrize(("meeting", "rate"), CASES)
+def test_flips_change_rates_by_their_weight_and_with_their_sign(tmp_path, meeting, rate):
+    scene = "" if meeting == "settling" else f"rate = {rate}"
+    config = kernel_config(tmp_path, meeting=f'"{meeting}"', scene=scene, replicates=512)
+    study = study_of(config)
+    points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.9)
     caught = np.flatnonzero((rows["outcome"] == 0) & (rows["checked_outcome"] == 0))[:2]
-    points, rows = made_up(study_of(config), 0, lambda b: np.abs(b) < 0.9, flips=caught)
-    found = estimate(points, rows, "settling", None, 4)
-    assert {name: each.sum() for name, each in found.flipped.items()} == dict.fromkeys(WHAT, 2)
+    points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.9, flips=caught)
+    found = estimate(points, rows, meeting, config.scene.rate, 4)
+    # Both fall out, by the second run; the third says the same.
+    lost = {name: each[:, 1].sum() for name, each in found.changes.items()}
+    assert lost == dict.fromkeys((*WHAT, "alpha"), 2)
+    assert not any(each[:, [0, 2, 3]].any() for each in found.changes.values())
     assert found.values["flips_a"] == pytest.approx(2 / 64)
-    assert found.largest["width_a"] == pytest.approx(points.width.max())
+    exactly = np.delete(np.arange(512), caught)
+    weight = points.plane
+    now = np.sum((weight * (rows["outcome"] == 0))[exactly])
+    assert found.shifts["beta2"] == pytest.approx(now / 512 - found.values["beta2"])
+    assert found.largest["beta2"] == pytest.approx(weight.max() / 512)
+    told = numerical_parts({(0, 0, 0, 0): found}, (1, 1, 1, 1))[0, 0, 0, 0]
+    for name in ESTIMATES:
+        low, high = (told[f"{name}_change{end}"] for end in ("_low", "_high"))
+        if math.isnan(found.values[name]):
+            assert math.isnan(low)
+            continue
+        assert low <= found.shifts[name] * (1.0 + 1e-9) + 1e-30 and high >= found.shifts[name]
+        assert told[f"{name}_numerical"] == max(abs(low), high)
+        assert low >= -found.values[name]
+    assert abs(told["beta2_change_low"]) > told["beta2_change_high"]
 
 
 UNDECIDED = OUTCOMES.index("undecided")
@@ -136,10 +157,14 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     rows["checked_outcome"][:] = np.where(
         rows["checked_outcome"] == NOT_APPLICABLE, NOT_APPLICABLE, UNDECIDED
     )
-    rows["checked_inside"][:] = NOT_APPLICABLE
+    for name in ("checked_inside", "third_outcome", "third_inside"):
+        rows[name][:] = NOT_APPLICABLE
     found = estimate(points, rows, "settling", None, 4)
-    assert not any(each.any() for each in (*found.flipped.values(), *found.checked.values()))
     assert np.isnan(found.values["flips_a"]) and found.values["checked"] == 64
+    assert not any(found.shifts.values())
+    # They may have come to anything, and so may as many of those that were not run again.
+    told = numerical_parts({(0, 0, 0, 0): found}, (1, 1, 1, 1))[0, 0, 0, 0]
+    assert told["beta2_change_low"] < -0.9 * found.values["beta2"]
 
 
 def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):

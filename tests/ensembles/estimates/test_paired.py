@@ -5,9 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.ensembles.estimates.paired import joint_counts, newcombe, paired_differences
+from flocsim.ensembles.estimates.paired import (
+    change_of_differences,
+    joint_counts,
+    newcombe,
+    paired_differences,
+)
 from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums, tabulate
-from flocsim.io.confidence import wilson
+from flocsim.io.confidence import scrambled_difference, wilson
+from flocsim.io.results.events import events
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.synthetic_results import bonds_of, draw_codes
 
@@ -124,3 +130,45 @@ def test_no_events_pooled_give_nan():
         pooled_sums(outcome, *[np.full(outcome.shape, NOT_APPLICABLE)] * 2)
     )
     assert all(np.isnan(values).all() for values in table.values())
+
+
+def test_differences_of_scrambles_cover_and_tell_more_than_independent_points():
+    """Points of a scramble are even: both events depend on a grid shifted at random."""
+    rng = np.random.default_rng(2)
+    places = (np.arange(32) + rng.random((400, 16, 1))) / 32.0
+    here, there = places < 0.63, places < 0.5
+    flags = (here & there, here & ~there, ~here & there, ~here & ~there)
+    cells = np.stack([np.sum(each, axis=-1) for each in flags], axis=-1)
+    difference, low, high = scrambled_difference(cells)
+    assert 0.93 < np.mean((low <= 0.13) & (high >= 0.13)) <= 1.0
+    np.testing.assert_allclose(scrambled_difference(cells[..., [0, 2, 1, 3]])[0], -difference)
+    _, plain_low, plain_high = newcombe(*np.moveaxis(cells.sum(axis=1), -1, 0))
+    assert np.mean(high - low) < 0.5 * np.mean(plain_high - plain_low)
+
+
+def test_joint_counts_of_scrambles_add_up_to_those_of_all():
+    codes = draw_codes(np.random.default_rng(6), (2, 2, 3, 64))[:2]
+    whole = joint_counts(*codes)
+    parts = joint_counts(*codes, 0, 16)
+    np.testing.assert_array_equal(parts.sum(axis=-2), whole)
+    late = [each[..., 5:] for each in codes]
+    early = joint_counts(*(each[..., :5] for each in codes), 0, 16)
+    np.testing.assert_array_equal(early + joint_counts(*late, 5, 16), parts)
+    found = paired_differences(parts, scrambled=True)
+    np.testing.assert_array_equal(found["n_pairs"], paired_differences(whole)["n_pairs"])
+
+
+def test_what_errs_alike_is_no_error_of_the_difference():
+    codes = draw_codes(np.random.default_rng(8), (1, 1, 1, 400))
+    departs = np.where(codes[0] == 0, 1, codes[0])
+    exact = departs, codes[1], bonds_of(departs)
+
+    def change(*files):
+        return change_of_differences(*files, lambda *each: {"pr_a": events(*each)["pr_a"]})["pr_a"]
+
+    alike = change((codes, exact, exact), (codes, exact, exact))
+    assert alike[0][0, 0, 0] == alike[1][0, 0, 0] == 0.0
+    # Where the first alone is wrong, the difference rises by what it loses.
+    low, high = change((codes, exact, exact), (codes, codes, codes))
+    lost = np.sum(codes[0] == 0) / np.sum(codes[0] < 4)
+    assert low[0, 0, 0] == high[0, 0, 0] == pytest.approx(lost)

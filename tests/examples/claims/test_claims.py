@@ -12,7 +12,17 @@ from tests.helpers.paper_like import DELTA, TYPES, VERTICES, paper_fits, paper_r
 
 def verdicts(results=None, entries=None):
     """{number: verdict}."""
-    return {each.number: each.verdict for each in check_claims(results, entries)}
+    touches = first_touches() if results and entries else None
+    return {each.number: each.verdict for each in check_claims(results, entries, touches)}
+
+
+def first_touches(thirds=30, alike=600, count=600):
+    """Rows of several.py: so many collisions with a third floc, and alone the same outcome."""
+    return [
+        {"area fraction": fraction, "third": float(k < thirds), "together": 1.0,
+         "alone": float(k < alike)}
+        for fraction in (0.01, 0.04) for k in range(count)
+    ]  # fmt: skip
 
 
 def failing(results=None, entries=None):
@@ -22,7 +32,7 @@ def failing(results=None, entries=None):
 
 def test_all_claims_hold_where_made_to():
     found = verdicts(paper_results(), paper_fits())
-    assert list(found) == list(range(1, 26))
+    assert list(found) == list(range(1, 27))
     assert set(found.values()) == {"holds"}, found
 
 
@@ -162,6 +172,18 @@ def test_sizes_of_which_most_are_large_are_seen():
     assert verdicts(entries=entries)[25] == "fails"
 
 
+def test_swarms_are_judged_by_how_often_and_by_how_a_third_floc_matters():
+    def parts(**changes):
+        return check_claims(touches=first_touches(**changes))[25].parts
+
+    assert [part.verdict for part in parts(thirds=180)] == ["fails", "fails", "holds", "holds"]
+    assert [part.verdict for part in parts(thirds=2)[:2]] == ["holds", "holds"]
+    # Two rows each of a third floc do not decide alone.
+    assert parts(thirds=2)[3].verdict == "undecided"
+    assert parts(thirds=200, alike=300)[2].verdict == "fails"
+    assert parts(thirds=0) == ()
+
+
 def test_one_spheroradius_leaves_its_claim_open():
     found = check_claims(entries=paper_fits(radii=(1.0,)))
     assert found[2].verdict == "undecided"
@@ -196,7 +218,7 @@ def test_the_table_of_readings_has_a_column_each():
     lines = verdicts_table(readings).splitlines()
     assert lines[0] == "| claim | one | other |"
     assert lines[2].endswith("| - | holds |")
-    assert len(lines) == 2 + 25
+    assert len(lines) == 2 + 26
 
 
 def test_missing_types_are_said():
