@@ -209,6 +209,11 @@ def library_text(path, entries):
     facts = [
         ("shapes", f"{len(entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+        *(
+            [("outlines", "as cut, and at both ends of their bands (--band)")]
+            if all(entry.is_banded for entry in entries)
+            else []
+        ),
         *((name.replace("_", " "), str(value)) for name, value in read_settings(path).items()),
     ]
     heading = f"{path}: a shape library"
@@ -254,7 +259,8 @@ def results_text(path, results, totals):
         lines += ["", *(f"failed: {visible(line, '')}" for line in said.failed[:MOST_FAILURES])]
     if len(said.failed) > MOST_FAILURES:
         lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
-    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    axes = results.types, results.vertices, results.delta
+    table = format_table(*axes, results.probabilities, results.outlines)
     if results.kernel is not None:
         return "\n".join([*lines, "", *kernel_lines(results.kernel)])
     return "\n".join([*lines, *efficiency_block(results), "", table])

@@ -9,7 +9,7 @@ import numpy as np
 from flocsim.ensembles.collision.checking import EASILY, count_checks, exact_method
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BAND, Config
 from flocsim.ensembles.doubts import (
     IMPLIED,
     paper_weight,
@@ -246,6 +246,14 @@ def piloted(config, ranks):
         return [f"none could be run: {type(error).__name__}: {words}"]
 
 
+BAND_WORDS = {
+    BAND: "every replicate run three times, with outlines as cut, and cut closer and wider",
+    "closer": "outlines cut closer",
+    "wider": "outlines cut wider",
+}
+"""What `[shapes] outlines` means, where it is not as they were cut."""
+
+
 def way_words(scene):
     """How the bodies of a scene meet, in words."""
     if scene.meeting == BROWNIAN:
@@ -266,6 +274,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         flocs += f", drawn by {scene.weight}" if scene.is_measured else ""
     elif shapes.own is None:
         flocs += f", spheroradius {1e6 * shapes.radius:.4g} um"
+    if shapes.outlines in BAND_WORDS:
+        flocs += f", {BAND_WORDS[shapes.outlines]}"
     if shapes.pairs_alike_in == "error":
         flocs += ", the receiver with the N whose RE is nearest to that of the approaching floc"
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"

@@ -20,6 +20,7 @@ from flocsim.io.confidence import (
     scrambled_proportion,
     wilson,
 )
+from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import (
     AGGREGATED,
     HELD,
@@ -39,8 +40,9 @@ __all__ = ["probabilities", "tabulate", "wilson"]
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
 
-COUNTED = (*CODES, *(f"checked_{name}" for name in CODES))
-"""All columns that are counted."""
+COUNTED = tuple(f"{run}{name}" for run in ("", *(f"{each}_" for each in FURTHER_RUNS))
+                for name in CODES)  # fmt: skip
+"""All columns that are counted: of first runs, of those run again, of outlines cut otherwise."""
 
 
 def tabulate(

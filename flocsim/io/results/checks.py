@@ -12,6 +12,7 @@ from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.schema import (
     AGGREGATED,
     AXES,
+    BAND_ENDS,
     BONDS,
     CLASSES,
     EVENTS,
@@ -28,8 +29,10 @@ from flocsim.io.results.schema import (
     Results,
 )
 
-OPTIONAL = ("pooled", "differences", "numerics", "flocs", "kernel")
+OPTIONAL = ("pooled", "differences", "numerics", "outlines", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
+FURTHER_RUNS = ("checked", *BAND_ENDS)
+"""What stands before the names of columns of a replicate's further runs."""
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
@@ -66,7 +69,7 @@ def check_coordinates(file: Any) -> None:
     for name in {*RADII} & first.keys() if "pooled" in file else ():
         if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
             raise ValueError(f"pooled/{name} is not probabilities/{name}")
-    lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics")
+    lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics", "outlines")
              for axis, words in LAST_AXES.items()}  # fmt: skip
     for path, words in (lists | {"differences/event": EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
@@ -106,8 +109,9 @@ def check_tables(results: Results) -> None:
     for name, values in results.differences.items():
         least, most = (0, np.inf) if name.startswith("n_") else (-1.0, 1.0)
         refuse(beyond(values, least, most), f"values outside [-1, 1] in differences/{name}")
-    for name, values in results.numerics.items():
-        refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in numerics/{name}")
+    for group in ("numerics", "outlines"):
+        for name, values in getattr(results, group).items():
+            refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in {group}/{name}")
     refuse(len(results.failures) > 256, "too many reasons")
 
 
@@ -133,13 +137,15 @@ def check_rows(
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
-    for name in ("inside", "crossed_zone", "checked_inside"):
+    runs = [run for run in FURTHER_RUNS if f"{run}_outcome" not in lacking]
+    for name in ("inside", "crossed_zone", *(f"{run}_inside" for run in runs)):
         codes = column(name)
         refuse_row((codes > 1) & (codes != NOT_APPLICABLE), name)
-    again = column("checked_outcome")
-    refuse_row((again >= len(OUTCOMES)) & (again != NOT_APPLICABLE), "checked_outcome")
-    again = column("checked_bond")
-    refuse_row(((again < 1) | (again > len(BONDS))) & (again != NOT_APPLICABLE), "checked_bond")
+    for run in runs:
+        again = column(f"{run}_outcome")
+        refuse_row((again >= len(OUTCOMES)) & (again != NOT_APPLICABLE), f"{run}_outcome")
+        again = column(f"{run}_bond")
+        refuse_row(((again < 1) | (again > len(BONDS))) & (again != NOT_APPLICABLE), f"{run}_bond")
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")

@@ -22,6 +22,7 @@ from flocsim.io.opening import parsed
 from flocsim.io.results.checks import check_coordinates, check_structure
 from flocsim.io.results.layout import SCHEMA_VERSION, image_of
 from flocsim.io.results.schema import (
+    BAND_ENDS,
     BLANKS,
     BONDS,
     BOUNDS,
@@ -88,6 +89,12 @@ ADDED = {
     6: Addition(
         {"replicates": frozenset(SHAPE_COLUMNS)},
         "they do not have the shape measures of the bodies",
+    ),
+    7: Addition(
+        {"replicates": frozenset(
+            f"{end}_{name}" for end in BAND_ENDS for name in ("outcome", "inside", "bond")
+        )},
+        "none was run with outlines cut closer and wider",
     ),
 }  # fmt: skip
 """Version → what it added to that before it."""
