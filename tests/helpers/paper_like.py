@@ -51,7 +51,7 @@ def blank_replicates(shape):
     from flocsim.io.results.schema import REPLICATES
 
     blank = {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
-    again = [name for name in REPLICATES if name.startswith("checked_")]
+    again = [name for name in REPLICATES if name.startswith(("checked_", "closer_", "wider_"))]
     return blank | {name: np.full(shape, 255, "u1") for name in again}
 
 
