@@ -13,7 +13,7 @@ import sys
 
 from benchmarks.reporting import ROOT
 
-PAGES = [ROOT / "docs" / f"{name}.md" for name in ("benchmarks", "images", "cluster")]
+PAGES = [ROOT / "docs" / f"{name}.md" for name in ("benchmarks", "cluster")]
 BLOCK = re.compile(r"(<!-- (\w+): (python [^>]*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from flocsim.system import System
     from flocsim.trajectories.trajectory import State, Trajectory
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 HOMES = {
     "Body": "body",

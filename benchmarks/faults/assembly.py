@@ -25,6 +25,7 @@ import numpy as np
 from benchmarks.faults.job import KINDS, STUDY, Job, Tally
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.chunks import COLUMNS, ROW, chunk_record, layout
+from flocsim.ensembles.collision.draw import FURTHER
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pairs.kind import KIND
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
@@ -59,7 +60,9 @@ def made_up_rows(seed, count):
     found = np.maximum(found - (rows["checked_inside"] % 10 == 0), 0)
     for name in ("outcome", "inside", "bond"):
         rows[f"checked_{name}"] = np.where(again, rows[name][found], NOT_APPLICABLE)
-        rows[f"third_{name}"] = NOT_APPLICABLE
+    for column in FURTHER:
+        if not column.startswith("checked_"):  # none a third time, or cut otherwise
+            rows[column] = NOT_APPLICABLE
     rows["floc_i"] = rows["floc_j"] = -1
     return rows
 

@@ -23,7 +23,7 @@ from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
-from flocsim.io.shapes.fit_report import format_errors, plural, summary_text
+from flocsim.io.shapes.fit_report import coarse_line, format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
 from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.ranges import PIXEL_SIZE
@@ -68,6 +68,9 @@ def add_parser(subparsers: Any) -> None:
     add("--holes", action="store_true",
         help="keep the holes of flocs, the largest ones: the vertices are shared among the outline "
         "and them, and area and centroid are those of what is left")  # fmt: skip
+    add("--band", action="store_true",
+        help="fit every floc three times, as it is cut and at both ends of its band, for "
+        '[shapes] outlines = "band": what the cut does to a probability')  # fmt: skip
     add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
     add("--masks", action="store_true",
         help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
@@ -152,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
     if doubt:
         report(f"warning: {doubt}")
     try:
-        pictures, fits, lost = fit_pictures(paths, options)
+        pictures, fits, bands, lost = fit_pictures(paths, options)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
@@ -171,9 +174,10 @@ def run(args: argparse.Namespace) -> int:
             radius,
             several,
             picture.measures[region.label],
+            tuple(each[radius] for each in band),
         )
         for radius in options.radii
-        for (picture, region), fit in zip(flocs, fits, strict=True)
+        for (picture, region), fit, band in zip(flocs, fits, bands, strict=True)
     ]
     table = summary_text(pictures, fits).encode()
     if not entries:
@@ -192,6 +196,8 @@ def run(args: argparse.Namespace) -> int:
     if args.fits is not None:
         draw_fits(args.fits, pictures, fits, options, drawn)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
+    if coarse := coarse_line({each.floc_id: each.errors for each in entries}):
+        report(f"warning: {coarse} (--vertices)")
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:
@@ -210,6 +216,11 @@ def read_options(args):
         raise UsageError(
             "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
             "its floc has less than its area"
+        )
+    if args.band and (args.masks or args.holes):
+        raise UsageError(
+            "--band goes without --masks, which say nothing of where else an outline might lie, "
+            "and without --holes"
         )
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
     endless = args.max_blur.strip() == "inf"
@@ -243,6 +254,7 @@ def read_options(args):
         preserve_area=args.preserve_area,
         inscribed=args.inscribed,
         holes=args.holes,
+        band=args.band,
         max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
         masks=args.masks,
         background=args.background,

@@ -7,9 +7,10 @@ from math import inf
 import numpy as np
 
 from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
+from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BAND, Config
 from flocsim.ensembles.doubts import (
     IMPLIED,
     paper_weight,
@@ -43,6 +44,7 @@ from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.run_words import choice_lines, class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.shapes.fit_report import coarse_line
 from flocsim.io.terminal import duration
 
 NOTHING_RUN = (
@@ -247,6 +249,23 @@ def piloted(config, ranks):
         return [f"none could be run: {type(error).__name__}: {words}"]
 
 
+BAND_WORDS = {
+    BAND: "every replicate run three times, with outlines as cut, and cut closer and wider",
+    "closer": "outlines cut closer",
+    "wider": "outlines cut wider",
+}
+"""What `[shapes] outlines` means, where it is not as they were cut."""
+
+
+def coarse_lines(config, measured):
+    """What to say where the largest N of a study is too small for the flocs of its library."""
+    if config.shapes.source != "library":
+        return []
+    flocs = measured or read_flocs(config.shapes)
+    line = coarse_line({floc.name: floc.errors for floc in flocs})
+    return [f"warning: {line}"] if line else []
+
+
 def way_words(scene):
     """How the bodies of a scene meet, in words."""
     if scene.meeting == BROWNIAN:
@@ -267,6 +286,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         flocs += f", drawn by {scene.weight}" if scene.is_measured else ""
     elif shapes.own is None:
         flocs += f", spheroradius {1e6 * shapes.radius:.4g} um"
+    if shapes.outlines in BAND_WORDS:
+        flocs += f", {BAND_WORDS[shapes.outlines]}"
     if shapes.pairs_alike_in == "error":
         flocs += ", the receiver with the N whose RE is nearest to that of the approaching floc"
     accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"
@@ -292,6 +313,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
             for name, pair in sphere_pairs(config, measured)
             for line in scale_lines(pair.system)
         ),
+        *coarse_lines(config, measured),
         *([f"note: {IMPLIED}"] if paper_weight(config) else []),
         *(f"warning: {line}" for line in said_doubts(config, study_doubts(config, measured))),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),

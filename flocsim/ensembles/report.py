@@ -36,7 +36,8 @@ HEADER = (
     ("of A", "hang"),
     *(("", name) for name in CLASSES),
 )
-
+SHAPE_COLUMN = 7
+"""Where the error by the shape stands, behind Pr[A]."""
 
 WIDTH = 110
 """Columns of a wide terminal; the table is set more openly where this leaves room."""
@@ -48,10 +49,13 @@ EFFICIENCY = "aggregations per approach over delta, in the plane and axially [95
 def format_table(
     types: Sequence[str], vertices: Sequence[int] | np.ndarray,
     delta: Sequence[float] | np.ndarray, table: Mapping[str, np.ndarray],
+    outlines: Mapping[str, np.ndarray] | None = None,
 ) -> str:  # fmt: skip
-    """Counts and probabilities with both errors, one row per condition, a block per type.
+    """Counts and probabilities with their errors, one row per condition, a block per type.
 
-    Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound).
+    Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound); of a
+    study whose outlines were cut closer and wider as well, ``outlines`` (OUTLINES), between what
+    Pr[A] would change by that (95 %).
 
     ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
     arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
@@ -61,8 +65,11 @@ def format_table(
     """
     conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
     ends = [name for name in ENDS if name != "n_held" or np.any(table[name])]
-    rows = [condition_row(vertices, delta, table, place, ends) for place in conditions]
-    upper, lower = zip(*HEADER, *(ENDS[name] for name in ends), strict=True)
+    rows = [condition_row(vertices, delta, table, place, ends, outlines) for place in conditions]
+    header = list(HEADER)
+    if outlines:
+        header.insert(SHAPE_COLUMN, ("of Pr[A]", "shape"))
+    upper, lower = zip(*header, *(ENDS[name] for name in ends), strict=True)
     widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
     if sum(widths) + 2 * len(widths) <= WIDTH:
         widths = [width + 1 for width in widths]
@@ -279,15 +286,27 @@ def checked_line(results: Results) -> str:
 
 
 def change_lines(results: Results) -> list[str]:
-    """Between what Pr[A] would change if all were run exactly, in the conditions where it is most.
+    """Between what Pr[A] would change if all were run exactly, and if outlines were cut otherwise,
+    in the conditions where it is most.
 
-    One line, or none where it is not known.
+    A line for each of the two that is known.
     """
-    if not results.numerics:
-        return []
-    low, high = (results.numerics[f"pr_a_change{end}"] for end in ("_low", "_high"))
-    if not np.isfinite(low).any():
-        return []
+    shape = "shape: with outlines cut closer or wider, within their bands,"
+    return [
+        f"{what} Pr[A] would change by {worst} at most, 95 %"
+        for what, group, name in (
+            ("run exactly,", results.numerics, "pr_a_change"),
+            (shape, results.outlines, "pr_a_shape"),
+        )
+        if (worst := worst_changes(results, group, name))
+    ]
+
+
+def worst_changes(results, group, name):
+    """The lowest and the highest change in a group of tables, where they are; "" for none."""
+    if not group or not np.isfinite(group[f"{name}_low"]).any():
+        return ""
+    low, high = group[f"{name}_low"], group[f"{name}_high"]
     told = []
     for values, worst in ((low, np.nanargmin(low)), (high, np.nanargmax(high))):
         t, v, d = np.unravel_index(worst, values.shape)
@@ -295,10 +314,10 @@ def change_lines(results: Results) -> list[str]:
             f"{values[t, v, d]:+.3f} (type {visible(results.types[t], '')}, "
             f"N = {results.vertices[v]}, delta {results.delta[d]:g})"
         )
-    return [f"run exactly, Pr[A] would change by {told[0]} to {told[1]} at most, 95 %"]
+    return f"{told[0]} to {told[1]}"
 
 
-def condition_row(vertices, delta, table, place, ends):
+def condition_row(vertices, delta, table, place, ends, outlines):
     _, v, d = place
     counts = ("n_total", "n_collided", "n_inside")
     return (
@@ -307,6 +326,7 @@ def condition_row(vertices, delta, table, place, ends):
         *(str(table[name][place]) for name in counts),
         with_errors(table, "pr_inside", place),
         with_errors(table, "pr_a", place),
+        *([shape_error(outlines, place)] if outlines else []),
         hanging(table, place),
         *(str(number) for number in table["n_class"][place]),
         *(str(table[name][place]) for name in ends),
@@ -326,6 +346,12 @@ def with_errors(table, name, place):
         return "-" if np.isnan(high) else f"[{share(low)}, {share(high)}]"
     added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
     return f"{share(value)} +-{share(max(value - low, high - value))} {added:>6}"
+
+
+def shape_error(outlines, place):
+    """By how much Pr[A] would change with other outlines, e.g. "-.021 +.045"."""
+    low, high = (outlines[f"pr_a_shape{end}"][place] for end in ("_low", "_high"))
+    return "-" if np.isnan(low) else f"-{share(-low)} +{share(high)}"
 
 
 def hanging(table, place):

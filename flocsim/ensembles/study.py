@@ -1,6 +1,7 @@
 """A study: all conditions of a config, and any one replicate of them by its number."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import attrs
@@ -8,7 +9,7 @@ import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_methods, further_runs
-from flocsim.ensembles.collision.draw import CHECKED, THIRD, Draw
+from flocsim.ensembles.collision.draw import CHECKED, THIRD, Draw, columns_of
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
@@ -17,7 +18,7 @@ from flocsim.ensembles.collision.points import point, point_facts
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
@@ -25,7 +26,7 @@ from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.run_words import class_words
-from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
+from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 
 def methods_of(config: Config) -> dict[str, Integrator]:
@@ -46,6 +47,10 @@ def flocs_of(config: Config) -> list[Floc]:
 
 TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 """Failures behind which more steps, or shorter ones, may come to an outcome."""
+
+
+WITHOUT_OUTCOME = dict.fromkeys(CHECKED.values(), NOT_APPLICABLE) | {"outcome": FAILED}
+"""What a further run has come to that met an exception."""
 
 
 def says_outcome(row: dict) -> bool:
@@ -74,6 +79,7 @@ class Study(StudyKind):
     pairings: tuple[Pairing, ...] = attrs.field(init=False)
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
+    pools: dict[str, FlocPool] = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
     exact: dict[str, tuple[Integrator, Integrator] | None] = attrs.field(init=False)
@@ -82,6 +88,8 @@ class Study(StudyKind):
         config = self.config
         self.exact = {name: exact_methods(method) for name, method in self.methods.items()}
         self.floc_pool = pool_of(config.shapes, self.flocs)
+        ends = BAND_ENDS if self.is_banded else ()
+        self.pools = {end: self.floc_pool.cut(end) for end in ends}
         self.pairings = pairings_of(config, self.flocs, self.floc_pool)
         self.zones = {
             each.name: zone_distance(config.zone, config.forces, *each.radii)
@@ -91,8 +99,14 @@ class Study(StudyKind):
     def by_methods(self, methods: dict[str, Integrator]) -> "Study":
         """The same study by other methods; the shapes that have been made are shared."""
         other = type(self)(self.config, flocs=self.flocs, methods=methods)
-        other.floc_pool, other.pairings = self.floc_pool, self.pairings
+        other.floc_pool, other.pools = self.floc_pool, self.pools
+        other.pairings = self.pairings
         return other
+
+    @property
+    def is_banded(self) -> bool:
+        """Whether replicates are also run with their outlines cut closer and wider."""
+        return self.config.shapes.outlines == BAND and bool(self.flocs)
 
     @property
     def radii(self) -> dict[str, np.ndarray]:
@@ -136,15 +150,20 @@ class Study(StudyKind):
         return self.pairings[condition].choose(numbers)
 
     def encounter(
-        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray
+        self, condition: int, vertices: int, numbers: Sequence[float] | np.ndarray, end: str = CUT
     ) -> Encounter:
+        """The Encounter of the flocs that a replicate's random numbers choose; ``end``: their
+        outlines cut closer or wider."""
         name, radii = self.pairings[condition].name, self.pairings[condition].radii
-        flocs = self.choose_flocs(condition, vertices, numbers)
-        key = (name, vertices, *flocs)
+        flocs, pool = self.choose_flocs(condition, vertices, numbers), self.pools.get(end)
+        pool = pool or self.floc_pool
+        if pool.own_size and pool.sizes[flocs[0]] > pool.sizes[flocs[1]]:
+            flocs = flocs[::-1]  # the larger settles faster, and is j
+        key = (name, vertices, *flocs, end)
         if key not in self.encounters:
             counts = self.floc_pool.vertices_of(*flocs, vertices)
             shapes = [
-                self.floc_pool.shape(floc, count, radius)
+                pool.shape(floc, count, radius)
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
             self.encounters[key] = make_encounter(
@@ -160,10 +179,13 @@ class Study(StudyKind):
         radii = (shape.equivalent_radius for shape in shapes)
         return zone_distance(self.config.zone, self.config.forces, *radii)
 
-    def draw(self, condition: int, vertices: int, share: float, replicate: int) -> Draw:
-        """The Draw of a replicate: condition's place, N, share of δ_max, index."""
+    def draw(
+        self, condition: int, vertices: int, share: float, replicate: int, end: str = CUT
+    ) -> Draw:
+        """The Draw of a replicate: condition's place, N, share of δ_max, index; ``end``: with both
+        outlines cut closer or wider."""
         numbers = self.numbers(replicate)
-        encounter = self.encounter(condition, vertices, numbers)
+        encounter = self.encounter(condition, vertices, numbers, end)
         return Draw(
             encounter.keyed(self.config.seed, replicate), encounter.orientations(numbers),
             self.share_of(encounter, share, numbers),
@@ -198,6 +220,8 @@ class Study(StudyKind):
         exact = self.exact[self.pairings[condition].name]
         if row is not None and (attempt := self.second_attempt(condition, row)):
             row = self.tried_again(draw, attempt, row, halted)
+        if row is not None and self.is_banded:
+            row = self.with_band(row, condition, vertices, share, replicate, halted)
         if row is None or exact is None:
             return row
         easily = bool(flips_easily(row["outcome"], row["bond"]))
@@ -210,6 +234,25 @@ class Study(StudyKind):
             if found is None:
                 return None
             row |= found
+        return row
+
+    def with_band(
+        self, row: dict, condition: int, vertices: int, share: float, replicate: int,
+        halted: Callable[[], bool] | None,
+    ) -> dict | None:  # fmt: skip
+        """The row with the outcomes of its replicate run with both outlines cut closer, and wider;
+        None where one was given up."""
+        budget = MORE_STEPS * self.config.integrator.max_steps, None
+        for end in BAND_ENDS:
+            found: dict | None = row
+            if vertices > 1 or self.floc_pool.own_size:  # a sphere of a given size has no outline
+                found = self.run_carefully(
+                    partial(self.draw, condition, vertices, share, replicate, end),
+                    budget, halted, WITHOUT_OUTCOME,
+                )  # fmt: skip
+            if found is None:
+                return None
+            row = row | {column: found[name] for column, name in columns_of(end).items()}
         return row
 
     def second_attempt(self, condition: int, row: dict) -> tuple[int, Integrator | None] | None:
@@ -231,7 +274,7 @@ class Study(StudyKind):
     ) -> dict | None:  # fmt: skip
         """The row of a second attempt where that says something of the outcome, the first where
         not; None where it was given up."""
-        found = self.run_carefully(draw, attempt, halted, row)
+        found = self.run_carefully(lambda: draw, attempt, halted, row)
         return found if found is None or says_outcome(found) else row
 
     def run_again(
@@ -243,20 +286,19 @@ class Study(StudyKind):
 
         An exception costs no more than this: that run has failed, the first is as it was.
         """
-        failed = dict.fromkeys(columns.values(), NOT_APPLICABLE) | {"outcome": FAILED}
-        row = self.run_carefully(draw, (steps, exact), halted, failed)
+        row = self.run_carefully(lambda: draw, (steps, exact), halted, WITHOUT_OUTCOME)
         return None if row is None else {name: row[column] for name, column in columns.items()}
 
     def run_carefully(
-        self, draw: Draw, attempt: tuple[int, Integrator | None],
+        self, made: Callable[[], Draw], attempt: tuple[int, Integrator | None],
         halted: Callable[[], bool] | None, otherwise: dict,
     ) -> dict | None:  # fmt: skip
-        """The row of a replicate run in so many steps by a method; ``otherwise`` for an exception,
-        None where it was given up."""
+        """The row of the Draw that is made, run in so many steps by a method; ``otherwise`` for an
+        exception, None where it was given up."""
         steps, method = attempt
         try:
-            driver = self.driver(draw.encounter)
-            return draw.run(driver, steps, halted=halted, integrator=method)
+            draw = made()
+            return draw.run(self.driver(draw.encounter), steps, halted=halted, integrator=method)
         except MemoryError:
             raise
         except Exception:

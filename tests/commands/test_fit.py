@@ -553,3 +553,21 @@ def test_every_fit_is_drawn(tmp_path, frame):
     assert run(frame, *options, "--fits", tmp_path / "f") == 0
     names = sorted(path.name for path in (tmp_path / "f").iterdir())
     assert names == ["a.png-1.png", "a.png-2.png", "a.png-3.png"]
+
+
+def test_both_ends_of_bands_are_fitted_on_request(tmp_path, frame, capsys):
+    """Closer ones are smaller, wider ones larger; the flocs themselves are as without."""
+    options = ("--pixel-size", "1e-6", "--vertices", "4,16")
+    assert run(frame, *options, "-o", tmp_path / "a.h5") == 0
+    assert run(frame, *options, "--band", "-o", tmp_path / "b.h5") == 0
+    libraries = (read_library(tmp_path / name) for name in ("a.h5", "b.h5"))
+    for plain, banded in zip(*libraries, strict=True):
+        assert not plain.is_banded and list(banded.closer) == [1, 4, 16]
+        np.testing.assert_array_equal(plain.fits[16].vertices, banded.fits[16].vertices)
+        sizes = [each[16].shape.equivalent_radius
+                 for each in (banded.closer, banded.fits, banded.wider)]  # fmt: skip
+        assert sizes == sorted(sizes)
+        assert sizes[0] / 1e-6 == pytest.approx(banded.radius_low, rel=0.05)
+    capsys.readouterr()
+    with pytest.raises(UsageError, match="--band goes without --masks"):
+        run(frame, *options, "--band", "--masks", "-o", tmp_path / "c.h5")

@@ -48,10 +48,12 @@ def paper_results(change=None):
 
 def blank_replicates(shape):
     """The table of replicates without what happened."""
+    from flocsim.io.results.checks import FURTHER_RUNS
     from flocsim.io.results.schema import REPLICATES
 
     blank = {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
-    again = [name for name in REPLICATES if name.startswith(("checked_", "third_"))]
+    further = tuple(f"{run}_" for run in FURTHER_RUNS)
+    again = [name for name in REPLICATES if name.startswith(further)]
     return blank | {name: np.full(shape, 255, "u1") for name in again}
 
 

@@ -37,6 +37,11 @@ def summary(found: Library) -> Summary:
     facts = [
         ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+        *(
+            [("outlines", "as cut, and at both ends of their bands (--band)")]
+            if all(entry.is_banded for entry in found.entries)
+            else []
+        ),
         *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
     ]
     return Summary(facts)

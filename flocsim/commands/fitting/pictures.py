@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from flocsim.io.images.pictures import Region, Segmentation
     from flocsim.io.images.stacks import Plane
 
+    Fits = dict[float, dict[int, Fit]]
+    """The Fit of one mask at every spheroradius [px] and N."""
+
 LOST = FlocsimError.exit_code
 """Exit code where pictures were lost; the library has the others."""
 
@@ -38,7 +41,7 @@ class Options:
 
     Radii, blur and saturation as in flocsim.io.images.pictures.segment; vertices with 1 among them;
     radii: spheroradii [px], rising; pixel_size [m], None: that of each file; pages, channel, crop:
-    which part of a file.
+    which part of a file; band: fit the ends of every outline's band as well.
     """
 
     pixel_size: float | None
@@ -57,6 +60,7 @@ class Options:
     pages: str | None = None
     channel: str | None = None
     crop: tuple[int, int, int, int] | None = None
+    band: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -82,8 +86,10 @@ class MaskFile:
 
 def fit_pictures(
     paths: Sequence[Path], options: Options
-) -> "tuple[list[Picture], list[dict[float, dict[int, Fit]]], list[str]]":
-    """Pictures, for each of their regions {radius: {N: Fit}}, and the names of pictures lost.
+) -> "tuple[list[Picture], list[Fits], list[tuple[Fits, ...]], list[str]]":
+    """Pictures, the Fits of each of their regions, those of the two masks of its band (none unless
+    ``options.band``), and the names of pictures lost.
+
 
     A file that cannot be read as a picture is told and passed over. One that the machine has
     failed on, for want of memory or because a process was killed, is lost, with all its flocs.
@@ -118,7 +124,11 @@ def fit_pictures(
         pictures = pictures if options.masks else weighted(pictures, options)
         check_names(options.correction, [(each.name, each.found) for each in pictures])
         regions = [(each.name, region) for each in pictures for region in each.regions]
-        masks = [(f"{name}#{region.label}", region.mask, options) for name, region in regions]
+        masks = [
+            (f"{name}#{region.label}", (region.mask, *(bands_of(region) if options.band else ())),
+             options)
+            for name, region in regions
+        ]  # fmt: skip
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
         fits = []
         for fit in mapped(fit_region, masks):
@@ -129,7 +139,13 @@ def fit_pictures(
         if isinstance(fit, Lost):
             lose(name, fit)
     fits = [fit for (name, _), fit in zip(regions, fits, strict=True) if name not in lost]
-    return [each for each in pictures if each.name not in lost], fits, list(lost)
+    firsts, bands = [fit[0] for fit in fits], [fit[1:] for fit in fits]
+    return [each for each in pictures if each.name not in lost], firsts, bands, list(lost)
+
+
+def bands_of(region):
+    """The two masks at the ends of a region's band; its own where nothing is known."""
+    return region.band or (region.mask, region.mask)
 
 
 def weighted(pictures, options):
@@ -266,30 +282,33 @@ def largest(regions, count):
 
 
 def fit_region(task):
-    """{radius: {N: Fit}} of (name, mask, Options); ShapeError, with the name, for none."""
+    """The Fits of each mask in (name, masks, Options); ShapeError, with the name, for none."""
     import warnings
 
     from flocsim.geometry.fit.fit import fit_mask
 
-    name, mask, options = task
-    fits = {}
+    name, masks, options = task
     with warnings.catch_warnings():
         # Said once a picture, by warn_of_coarse, not once a floc and N.
         warnings.simplefilter("ignore", UserWarning)
         try:
-            for radius in options.radii:
-                # A circle of a spheroradius above r_eq is larger than the floc already.
-                exact = options.preserve_area and np.pi * radius**2 < mask.sum()
-                fits[radius] = {
-                    count: fit_mask(
-                        mask, vertices=count, radius=radius, method=options.method,
-                        preserve_area=exact, inscribed=options.inscribed, holes=options.holes,
-                    )
-                    for count in options.vertices
-                }  # fmt: skip
+            return [
+                {
+                    radius: {
+                        count: fit_mask(
+                            mask, vertices=count, radius=radius, method=options.method,
+                            # A circle of a radius above r_eq is larger than the floc already.
+                            preserve_area=options.preserve_area and np.pi * radius**2 < mask.sum(),
+                            inscribed=options.inscribed, holes=options.holes,
+                        )
+                        for count in options.vertices
+                    }
+                    for radius in options.radii
+                }
+                for mask in masks
+            ]  # fmt: skip
         except ShapeError as error:
             raise ShapeError(f"{name}: {error}, or leave small flocs out by --min-radius") from None
-    return fits
 
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:

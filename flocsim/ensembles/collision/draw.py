@@ -9,16 +9,21 @@ import flocsim.arrays as at
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, WHY, replicate_row
 from flocsim.integrators.base import Integrator, Status
+from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.schema import NOT_APPLICABLE
 from flocsim.run import Run
 from flocsim.system import System
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 
-CHECKED, THIRD = (
-    {f"{run}_{name}": name for name in ("outcome", "inside", "bond")}
-    for run in ("checked", "third")
-)
-"""Column of a second or third run → the same of the first."""
+
+def columns_of(run: str) -> dict[str, str]:
+    """{column of a replicate's further run: the same of the first}."""
+    return {f"{run}_{name}": name for name in ("outcome", "inside", "bond")}
+
+
+CHECKED, THIRD = map(columns_of, ("checked", "third"))
+FURTHER = tuple(name for run in FURTHER_RUNS for name in columns_of(run))
+"""The columns of all further runs."""
 
 
 @attrs.frozen(eq=False)
@@ -69,8 +74,7 @@ class Draw:
 
     def row(self, run: Run, status: Status) -> dict:
         """The row of a Run that has ended so; failed where a force gives no number."""
-        row = replicate_row(status, self.angles, run)
-        row |= dict.fromkeys(CHECKED | THIRD, NOT_APPLICABLE)
+        row = replicate_row(status, self.angles, run) | dict.fromkeys(FURTHER, NOT_APPLICABLE)
         row |= dict(zip(("floc_i", "floc_j"), self.flocs, strict=True))
         row |= self.encounter.measures
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):

@@ -4,17 +4,17 @@ own; resized to the scene, or as they were measured."""
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.processor import cpu_kind, versions
-from flocsim.ensembles.config.schema import ShapesConfig
+from flocsim.ensembles.config.schema import BAND, CUT, ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.resize import resized
@@ -22,6 +22,10 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
+from flocsim.io.results.schema import BAND_ENDS
+
+if TYPE_CHECKING:
+    from flocsim.io.shapes.library import ShapeEntry
 
 SYNTHETIC_RATIO = 16.0
 """r_eq/r at which synthetic flocs are fitted: between the paper's small and large flocs."""
@@ -36,7 +40,8 @@ class Floc:
     ``ratio`` is r_eq/r, ``errors`` {N: RE [%]} of the fits. ``size``: the measured r_eq [m], for
     which the shapes are in metres; None where nothing was measured. ``weight``: how many flocs it
     stands for among those of its pictures. ``own`` where the shape is the
-    user's: it keeps its form at any size, its radius grows with it.
+    user's: it keeps its form at any size, its radius grows with it. ``band``: the same floc as its
+    outline might have been cut, closer and wider, where a study asks for that.
     """
 
     name: str
@@ -46,6 +51,7 @@ class Floc:
     size: float | None = None
     own: bool = False
     weight: float = 1.0
+    band: dict[str, "Floc"] = attrs.Factory(dict)
 
     def resized(self, vertices: int, equivalent_radius: float, radius: float) -> Shape:
         """The shape of N vertices with r_eq [m], and with the spheroradius [m] if not ``own``."""
@@ -119,22 +125,39 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
                 f"--vertices …`, or change shapes.vertices"
             )
         kept = [n for n in entry.fits if n > 1] if shapes.pairs_alike_in == "error" else wanted
-        flocs.append(
-            Floc(
-                entry.floc_id,
-                entry.equivalent_radius / entry.spheroradius,
-                {n: entry.fits[n].shape for n in kept},
-                {n: entry.fits[n].relative_error for n in kept},
-                entry.measured_radius,
-                weight=entry.weight,
+        if shapes.outlines != CUT and not entry.is_banded:
+            raise ConfigError(
+                f'shapes.outlines = "{shapes.outlines}" needs outlines cut closer and wider, '
+                f"which {shapes.file} does not have: fit the pictures again with `flocsim fit "
+                "--band`, or leave outlines out"
             )
-        )
+        first = CUT if shapes.outlines == BAND else shapes.outlines
+        floc = floc_of(entry, kept, first)
+        if shapes.outlines == BAND:
+            ends = {name: floc_of(entry, kept, name) for name in BAND_ENDS}
+            floc = attrs.evolve(floc, band=ends)
+        flocs.append(floc)
     if shapes.size == "own" and len({floc.size for floc in flocs}) < 2:
         raise ConfigError(
             f'shapes.size = "own" needs flocs of two sizes at least, but {shapes.file} holds '
             f"{len(flocs)} of one size, which never meet: fit more flocs, or leave shapes.size out"
         )
     return flocs
+
+
+def floc_of(entry: "ShapeEntry", counts: Iterable[int], outline: str) -> Floc:
+    """The Floc of an entry of a library at these N, its outline as cut, or cut closer or wider."""
+    radius, fits = {
+        CUT: (entry.equivalent_radius, entry.fits),
+        "closer": (entry.radius_low, entry.closer),
+        "wider": (entry.radius_high, entry.wider),
+    }[outline]
+    found = {n: fits[n] for n in counts}
+    return Floc(
+        entry.floc_id, radius / entry.spheroradius, {n: fit.shape for n, fit in found.items()},
+        {n: fit.relative_error for n, fit in found.items()}, radius * entry.pixel_size,
+        weight=entry.weight,
+    )  # fmt: skip
 
 
 def load_flocs(shapes: ShapesConfig, seed: int) -> list[Floc]:
@@ -174,6 +197,11 @@ class FlocPool:
     def sizes(self) -> list[Any]:
         """What flocs are chosen by: their size [m], or its ratio to the spheroradius."""
         return [floc.size if self.own_size else floc.ratio for floc in self.flocs]
+
+    def cut(self, end: str) -> "FlocPool":
+        """The pool of the same flocs, cut closer or wider."""
+        flocs = [floc.band[end] for floc in self.flocs]
+        return FlocPool(flocs, self.radius, self.pool, self.own_size, self.by_error)
 
     def by_size(self, radius: float) -> list[int]:
         """Places of all flocs, those nearest in size to a body of that radius [m] first."""

@@ -72,6 +72,7 @@ from flocsim.integrators import (
     VelocityVerlet,
 )
 from flocsim.io.results.events import MOST_UNKNOWN
+from flocsim.io.results.schema import BAND_ENDS
 
 
 def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> Any:
@@ -136,6 +137,10 @@ LARGEST_SEED = 2**63 - 1
 MOST_REPLICATES = 10**9
 MOST_STEPS = 10**12
 MOST_VERTICES = 512
+
+
+CUT, BAND = "cut", "band"
+"""`[shapes] outlines`: as they were cut, and with both ends of their bands beside."""
 
 
 @attrs.frozen
@@ -208,6 +213,17 @@ class ShapesConfig:
         help="vertices: both flocs have N vertices; error: the receiver has that number of "
         "vertices, of those it was fitted with, whose relative error RE is nearest to that of the "
         "approaching floc with N",
+    )
+    outlines: str = choice(
+        CUT,
+        *BAND_ENDS,
+        BAND,
+        default=CUT,
+        help="cut: outlines as they were cut from the pictures; closer, wider: at the ends of "
+        "their bands, as another eye might have cut them; band: as cut, and every replicate is run "
+        "twice more, with both outlines cut closer and wider, which gives every probability of a "
+        "study of pairs a third error, shape; all but cut need a library of `flocsim fit --band`",
+        only_for=("source", "library"),
     )
     fractal_dimension: float = quantity(
         "",
@@ -614,6 +630,9 @@ def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
     yield from weight_contradictions(parts["bodies"], parts["fluid"])
     if parts.get("sampling") == SOBOL and isinstance(parts["scene"], tuple(PAIR_SCENES.values())):
         yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
+    if parts["shapes"].outlines == BAND and parts["scene"].kind != "binary":
+        text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
+        yield ("shapes", "outlines"), f"{text}, and compare"
     yield from parts["scene"].problems(parts)
 
 

@@ -247,7 +247,7 @@ def estimate(
 ) -> Estimated:  # fmt: skip
     """What the points of a condition come to; ``most_unknown``: share of the flux that may be
     unknown where there is an estimate."""
-    first, *runs = by_runs([rows[name] for name in COUNTED])
+    first, *runs = by_runs([rows[name] for name in COUNTED])[:3]
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
     known = run_so(exact) & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
     moved = [np.where(known, *pair) for pair in zip(exact, first, strict=True)]

@@ -21,6 +21,7 @@ from flocsim.io.confidence import (
     scrambled_proportion,
     wilson,
 )
+from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import (
     AGGREGATED,
     HELD,
@@ -40,8 +41,10 @@ __all__ = ["probabilities", "tabulate", "wilson"]
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
 
-COUNTED = tuple(f"{run}{name}" for run in ("", "checked_", "third_") for name in CODES)
-"""All columns that are counted."""
+COUNTED = tuple(f"{run}{name}" for run in ("", *(f"{each}_" for each in FURTHER_RUNS))
+                for name in CODES)  # fmt: skip
+"""All columns that are counted: of first runs, of those run again, a third time, and with outlines
+cut otherwise."""
 
 
 def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:

@@ -13,6 +13,7 @@ from flocsim.ensembles.estimates.numerical import (
     numerical_of,
     over_displacements,
 )
+from flocsim.ensembles.estimates.outlines import OF_OUTLINES, outline_changes, outline_sums
 from flocsim.ensembles.estimates.paired import joint_counts, paired_differences
 from flocsim.ensembles.estimates.statistics import (
     COUNTED,
@@ -82,7 +83,7 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
         columns = codes(start, min(start + step, stop))
-        first_codes, again, third = by_runs(columns)
+        first_codes, again, third, *ends = by_runs(columns)
         outcome, inside, bond = checked_codes(*first_codes)
         found = {
             **count(outcome, inside, bond),
@@ -90,14 +91,16 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
             **pooled_sums(outcome, inside, bond),
             JOINT: joint_counts(outcome, inside, start, scrambles),
             **scrambled_sums((outcome, inside, bond), start, scrambles),
+            **outline_sums((outcome, inside, bond), ends),
         }
         sums = added(sums, found)
     return sums
 
 
 def added(sums: Sums, more: Sums) -> Sums:
-    """The sum of two Sums, the first of which may be empty."""
-    return {name: sums[name] + more[name] for name in sums} if sums else more
+    """The sum of two Sums; what only one of them has stands for itself."""
+    both = {name: sums[name] + more[name] for name in sums.keys() & more.keys()}
+    return {name: both.get(name, values) for name, values in {**more, **sums}.items()}
 
 
 @attrs.frozen
@@ -108,6 +111,7 @@ class AllTables:
     pooled: dict[str, np.ndarray]
     differences: dict[str, np.ndarray]
     numerics: dict[str, np.ndarray]
+    outlines: dict[str, np.ndarray]
 
 
 POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
@@ -117,17 +121,20 @@ def tables_of(sums: Sums) -> AllTables:
     """AllTables from the Sums of a whole study."""
     pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
     of_scrambles = {name: values for name, values in sums.items() if name.endswith(OF_SCRAMBLES)}
-    counted = {name: values for name, values in sums.items()
-               if not (name in POOLED_NAMES or name == JOINT or name in of_scrambles)}  # fmt: skip
+    of_outlines = {name: values for name, values in sums.items() if name.endswith(OF_OUTLINES)}
+    apart = {JOINT, *pooled, *of_scrambles, *of_outlines}
+    counted = {name: values for name, values in sums.items() if name not in apart}
     together = numerical_errors(over_displacements(counted))
     changes = change_intervals(counted)
+    table = table_from(counted, changes) | scrambled_probabilities(of_scrambles)
     return AllTables(
-        table_from(counted, changes) | scrambled_probabilities(of_scrambles),
+        table,
         pooled_probabilities(pooled)
         | scrambled_probabilities(of_scrambles, pooled=True)
         | {name: values for name, values in together.items() if name in POOLED},
         paired_differences(sums[JOINT], bool(of_scrambles)),
         change_columns(changes),
+        outline_changes(of_outlines, table),
     )
 
 

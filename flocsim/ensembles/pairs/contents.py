@@ -67,7 +67,8 @@ def table(results: Results) -> str:
     if results.kernel is not None:
         return "\n".join(kernel_lines(results.kernel))
     efficiencies = efficiency_lines(results)
-    counts = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    axes = results.types, results.vertices, results.delta
+    counts = format_table(*axes, results.probabilities, results.outlines)
     return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
 
 

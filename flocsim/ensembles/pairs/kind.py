@@ -20,6 +20,7 @@ from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
+from flocsim.ensembles.estimates.outlines import OF_OUTLINES
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.stop_rule import StopRule
 from flocsim.ensembles.estimates.summary import (
@@ -64,7 +65,7 @@ from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.older import why_apart
 from flocsim.io.results.row_file import new_row_file
-from flocsim.io.results.schema import Results, as_words
+from flocsim.io.results.schema import OUTLINES, Results, as_words, blank
 
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
@@ -120,6 +121,8 @@ def results_of(
         pooled=tables.pooled,
         differences=tables.differences,
         numerics=tables.numerics,
+        # A draft without any replicate has its place.
+        outlines=tables.outlines or (blank(OUTLINES, study.shape[:3]) if study.is_banded else {}),
         count=count,
         radii=study.radii,
         kernel=kernel,
@@ -143,7 +146,8 @@ def table(found: Results) -> str:
     if found.kernel is not None:
         lines = kernel_lines(found.kernel)
     else:
-        lines = [format_table(found.types, found.vertices, found.delta, found.probabilities)]
+        axes = found.types, found.vertices, found.delta
+        lines = [format_table(*axes, found.probabilities, found.outlines)]
     return "\n".join(
         [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
     )
@@ -229,7 +233,10 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
         sums = sums_of(codes, 1, 0, total(runs))
     except UsageError as error:
         raise FileError(f"{store.journal.path} holds no readable rows: {error}") from error
-    return {name: values for name, values in sums.items() if name not in (*POOLED_NAMES, JOINT)}
+    return {
+        name: values for name, values in sums.items()
+        if name not in (*POOLED_NAMES, JOINT) and not name.endswith(OF_OUTLINES)
+    }  # fmt: skip
 
 
 KIND = Kind(

@@ -54,9 +54,9 @@ class StudyResults(Tables):
     """A results file as `flocsim.open` gives it; docs/results.md says what is in it.
 
     ``types``, ``vertices`` and ``delta`` are its conditions, each with ``count`` replicates;
-    ``probabilities``, ``pooled``, ``differences`` and ``numerics`` {name: array} its tables,
-    ``replicates`` the same of every single collision, read when asked for; ``kernel`` the rates of
-    a kernel study, None in others; ``run`` where it came from.
+    ``probabilities``, ``pooled``, ``differences``, ``numerics`` and ``outlines`` {name: array}
+    its tables, ``replicates`` the same of every single collision, read when asked for; ``kernel``
+    the rates of a kernel study, None in others; ``run`` where it came from.
     """
 
     indices = INDICES
@@ -74,7 +74,7 @@ class StudyResults(Tables):
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
         self.differences, self.kernel = results.differences, results.kernel
-        self.numerics = results.numerics
+        self.numerics, self.outlines = results.numerics, results.outlines
         self.studies: dict[int, Study] = {}
 
     @functools.cached_property
@@ -121,7 +121,8 @@ class StudyResults(Tables):
 
     def table(self) -> str:
         """Counts and probabilities of every condition as the command prints them, as text."""
-        lines = [format_table(self.types, self.vertices, self.delta, self.probabilities)]
+        axes = self.types, self.vertices, self.delta
+        lines = [format_table(*axes, self.probabilities, self.outlines)]
         return "\n".join([*lines, *filter(None, [checked_line(self.results)])])
 
     def labelled(self, group: str = "probabilities") -> Labelled:

@@ -18,7 +18,8 @@ ERRORS_TEXT = (
     "Each probability is followed by its 95 % interval, of sampling (Wilson's) and of what "
     "undecided and failed replicates could have come to, and by the least and the most by which it "
     "would change if all replicates were computed exactly (95 %; of those pooled the larger, after "
-    "±). – where there was no event, ± ? where none was run again."
+    "±), and, where outlines were cut closer and wider as well, if all were cut so (shape, 95 %). "
+    "– where there was no event, ± ? where none was run again."
 )
 
 
@@ -56,9 +57,18 @@ def condition_row(results, table, place):
     ends = [int(table[f"n_{name}"][place]) for name in names]
     return [
         results.types[t], int(results.vertices[v]), f"{results.delta[d]:g}", *counts,
-        *(with_errors(table, name, place, results.numerics) for name in SHOWN),
+        *(with_errors(table, name, place, results.numerics)
+          + shape_error(results.outlines, name, place) for name in SHOWN),
         *(int(number) for number in table["n_class"][place]), *ends,
     ]  # fmt: skip
+
+
+def shape_error(outlines, name, place):
+    """ " shape −0.020 +0.050": by how much outlines cut otherwise would change a probability."""
+    if not outlines or math.isnan(outlines[f"{name}_shape_low"][place]):
+        return ""
+    down, up = (float(outlines[f"{name}_shape{end}"][place]) for end in ("_low", "_high"))
+    return f" shape {down:+.3f} {up:+.3f}".replace("-", "−")
 
 
 def with_errors(table, name, place, numerics=None):

@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
 from flocsim.ensembles.pilot.trials import Job, Trial, is_flip, try_out
@@ -25,13 +26,15 @@ from flocsim.io.results.events import flips_easily
 from flocsim.io.results.layout import frame_of
 from flocsim.io.results.row_file import plan_of
 from flocsim.io.results.schema import (
+    BAND_ENDS,
     DIFFERENCES,
     EVENTS,
     NUMERICS,
+    OUTLINES,
     POOLED,
     TABLE,
     Results,
-    tail_of,
+    blank,
 )
 
 SECONDS = 5.0
@@ -113,6 +116,14 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
     name, steps = study.config.scene.names[task.condition], study.config.integrator.max_steps
     first, _ = try_out(study, Job(task, study.methods[name], steps))
+    for end in BAND_ENDS if study.is_banded else ():
+        job = Job(task, study.methods[name], MORE_STEPS * steps)
+
+        def otherwise(_: Draw, end: str = end) -> Draw:
+            return study.draw(*task, end)
+
+        more, _ = try_out(study, job, changed=otherwise)
+        first = first._replace(cpu=first.cpu + more.cpu, setup=first.setup + more.setup)
     exact = study.exact[name] if again else None
     if exact is None:
         return Timed(task, first)
@@ -256,13 +267,9 @@ def file_size(study: Study, count: int) -> float:
         pooled=blank(POOLED, shape[:2]),
         differences=blank(DIFFERENCES, (3, len(EVENTS), *shape)),
         numerics=blank(NUMERICS, shape),
+        outlines=blank(OUTLINES, shape) if study.is_banded else {},
         count=count,
     )
     plan = plan_of(frame_of(draft), math.prod(shape) * count)
     run = RUN_BYTES + len(config.text) + FLOC_BYTES * len(study.flocs)
     return float(plan.size + run + seal_size(len(plan.cuts())))
-
-
-def blank(schema, shape):
-    """Tables of a results file without any number in them."""
-    return {name: np.zeros((*shape, *tail_of(name)), about[0]) for name, about in schema.items()}

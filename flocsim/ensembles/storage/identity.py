@@ -154,16 +154,17 @@ def floc_facts(study):
     """A digest of all flocs at each number of vertices, and of what else chooses among them."""
     facts = {}
     counts = {n for floc in study.flocs for n in floc.shapes}
+    every = [each for floc in study.flocs for each in (floc, *floc.band.values())]
     for n in sorted(counts):
-        parts = [np.array([floc.ratio]) for floc in study.flocs]
-        shapes = [floc.shapes[n] for floc in study.flocs]
+        parts = [np.array([floc.ratio]) for floc in every]
+        shapes = [floc.shapes[n] for floc in every]
         parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
         parts += [ring_numbers(each) for each in shapes]
         if study.floc_pool.by_error:
             parts.append(np.array([floc.errors[n] for floc in study.flocs]))
         facts[f"flocs.{n}"] = digest(np.concatenate(parts))
     if study.floc_pool.own_size:
-        facts["flocs.size"] = digest(np.array([floc.size for floc in study.flocs]))
+        facts["flocs.size"] = digest(np.array([floc.size for floc in every]))
         weights = np.array([floc.weight for floc in study.flocs])
         if np.any(weights != 1.0):
             facts["flocs.weight"] = digest(weights)

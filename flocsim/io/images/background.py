@@ -10,6 +10,18 @@ SURFACE_ROUNDS = 15
 SURFACE_SAMPLES = 120
 """Points along the longer side that the surface is fitted to: plenty for a degree of 6."""
 
+RIM = 0.08
+"""Share of a picture's sides within which the light is told, where a floc covers much of it."""
+
+RIM_DEGREE = 2
+"""Degree of the surface that is begun there: light falls off to the sides like this, mostly."""
+
+CLEARLY = 1.5
+"""Ratio of what two surfaces leave at the rim, above which they differ by more than chance."""
+
+MORE = 0.02
+"""The same of the shares of a picture that lie on them."""
+
 FEWEST_FRAMES = 3
 """The median of fewer frames still shows their flocs."""
 
@@ -61,13 +73,14 @@ def smooth_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     places = (np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in grey.shape)
     rows, columns = (np.polynomial.legendre.legvander(along, degree) for along in places)
     step = max(1, -(-max(grey.shape) // SURFACE_SAMPLES))
-    sample = grey[::step, ::step]
+    values = grey[::step, ::step]
     basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
-    terms = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree
-    coefficients = np.zeros(terms.shape)
-    coefficients[terms] = _reweighted_fit(
-        basis[..., terms].reshape(sample.size, -1), sample.ravel()
-    )
+    orders = np.add.outer(np.arange(degree + 1), np.arange(degree + 1))
+    coefficients = np.zeros(orders.shape)
+    coefficients[orders <= degree] = _surface_fit(
+        basis[..., orders <= degree].reshape(values.size, -1), values.ravel(),
+        orders[orders <= degree], _rim_of(values.shape).ravel(),
+    )  # fmt: skip
     return rows @ coefficients @ columns.T
 
 
@@ -76,13 +89,49 @@ def light_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     return np.exp(smooth_surface(np.log(np.maximum(grey, 0.0) + DARKEST), degree)) - DARKEST
 
 
-def _reweighted_fit(basis, values):
-    weights = np.ones_like(values)
+def _rim_of(shape):
+    """The samples near a side of the picture."""
+    inner = np.zeros(shape, bool)
+    down, across = (max(1, round(RIM * n)) for n in shape)
+    inner[down : shape[0] - down, across : shape[1] - across] = True
+    return ~inner
+
+
+def _surface_fit(basis, values, orders, rim):
+    """The coefficients of the light.
+
+    A floc that covers much of the picture draws the surface into itself, and is then hollow or in
+    pieces. So a second fit begins at the rim of the picture, which few flocs reach, at a low order,
+    and spreads inwards from there over what is as the rim is. It is taken where the first one
+    leaves clearly more at the rim, or less of the picture lies on it.
+    """
+    every = np.ones(len(values), bool)
+    first = _reweighted_fit(basis, values, every, np.ones(len(values)))
+    if rim.all():
+        return first
+    low = orders <= RIM_DEGREE
+    begun = _reweighted_fit(basis[:, low], values, rim, rim.astype(float))
+    weights = _weights(values - basis[:, low] @ begun, rim)
+    second = _reweighted_fit(basis, values, rim, weights)
+    residuals = [values - basis @ each for each in (first, second)]
+    left = [robust_deviation(each[rim]) + 1e-3 for each in residuals]
+    near = [float(np.mean(np.abs(each) < min(left))) for each in residuals]
+    if left[0] > CLEARLY * left[1]:
+        return second
+    return second if left[1] < CLEARLY * left[0] and near[1] > near[0] + MORE else first
+
+
+def _weights(residual, told):
+    """Weights of samples; ``told``: those that tell where the light lies, and how it scatters."""
+    centre = np.median(residual[told])
+    deviation = robust_deviation(residual[told]) + 1e-3
+    return 1.0 / (1.0 + ((residual - centre) / (1.5 * deviation)) ** 2) ** 2
+
+
+def _reweighted_fit(basis, values, told, weights):
     for _ in range(SURFACE_ROUNDS):
         weighted = basis * (weights * weights)[:, None]
         # Legendre products are near orthogonal: the normal equations are safe, and fast.
         solution = np.linalg.lstsq(weighted.T @ basis, weighted.T @ values, rcond=None)[0]
-        residual = values - basis @ solution
-        deviation = robust_deviation(residual) + 1e-3
-        weights = 1.0 / (1.0 + ((residual - np.median(residual)) / (1.5 * deviation)) ** 2) ** 2
+        weights = _weights(values - basis @ solution, told)
     return solution

@@ -200,9 +200,8 @@ def _guess_polarity(smooth, light):
     coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
     step = COARSE if coarse is not smooth else 1
     surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
-    residual = coarse - surface
-    skewness = np.mean((residual - np.median(residual)) ** 3)
-    return "dark" if skewness < 0 else "bright"
+    # From the light, not from their median: flocs may cover most of the picture.
+    return "dark" if np.mean((coarse - surface) ** 3) < 0 else "bright"
 
 
 def _contrast(grey, smooth, light, flocs, noise_scale, degree):

@@ -97,7 +97,7 @@ def find_regions(outlines, contrast, filters):
         closed, whole = split_touching(closed, filters.neck, filters.min_radius)
     closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
     regions, rejected = sorted_out(closed, contrast.shape, filters)
-    return with_bands(regions, rejected, contrast), rejected, whole
+    return *with_bands(regions, rejected, contrast), whole
 
 
 def sorted_out(outlines, shape, filters, numbers=None):
@@ -139,7 +139,7 @@ def reason_to_reject(box, shape, radius, blur, filters):
 
 
 def with_bands(regions, rejected, contrast):
-    """The Regions with their bands, which do not reach into other regions.
+    """Regions and Rejections, which may yet be added, with bands that reach into no other.
 
     A level is uncertain by BAND of the step at the edge, and by what it changes over PIXEL.
     """
@@ -147,7 +147,9 @@ def with_bands(regions, rejected, contrast):
     for each in (*regions, *rejected):
         top, left, bottom, right = each.bbox
         taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
-    return tuple(with_band(each, taken, contrast) for each in regions)
+    return tuple(
+        tuple(with_band(each, taken, contrast) for each in some) for some in (regions, rejected)
+    )
 
 
 def with_band(region, taken, contrast):

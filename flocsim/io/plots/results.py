@@ -47,6 +47,8 @@ PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
 LEGEND_ROWS = 9
 BARS = "\n(bars: 95 %;\nthin: plus numerical error)"
+BARS_OF_BANDS = BARS.replace(" error)", "\nand shape error)")
+"""What bars mean, where outlines were cut closer and wider as well."""
 HOLLOW = "\nhollow: n < 10"
 ENDS = ("", "_low", "_high", "_numerical")
 BOND_WORDS = {
@@ -113,7 +115,7 @@ def probability_figure(results, name):
         marked = set()
         for number, axes in enumerate(panels):
             marked |= draw_probability(axes, results, number, name)
-        add_delta_legend(last, results.delta, marked)
+        add_delta_legend(last, results, marked)
         return figure
 
 
@@ -136,7 +138,7 @@ def shares_figure(results, name, legend_width):
         figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], legend_width)
         for number, axes in enumerate(panels):
             draw_shares(axes, results, number, name)
-        add_shares_legend(last, name)
+        add_shares_legend(last, name, results)
         return figure
 
 
@@ -156,9 +158,9 @@ def overview(results: Results) -> Figure:
             grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
             axes.set_ylabel(LABELS[name])
-        add_delta_legend(grid[0, -1], results.delta, marked)
+        add_delta_legend(grid[0, -1], results, marked)
         for axes, name in zip(grid[2:, -1], SHARES, strict=True):
-            add_shares_legend(axes, name)
+            add_shares_legend(axes, name, results)
         return figure
 
 
@@ -185,7 +187,7 @@ def against_delta(results: Results) -> Figure:
                 marked |= mark_causes(axes, places, causes[number, index][order], colour, shift)
             note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
-        title = "vertices $N$" + BARS + HOLLOW + words_of(marked)
+        title = "vertices $N$" + bars_of(results) + HOLLOW + words_of(marked)
         add_line_legend(last, words, colours, title)
         return figure
 
@@ -349,8 +351,13 @@ def draw_shares(axes, results, number, name):
 def share_bands(results, number, name):
     """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
     type."""
-    errors = share_errors(results.probabilities, name)[number]
-    return (*shares_of(results, number, name), -errors, errors)
+    table, share = results.probabilities, f"pr_{SHARES[name][0].removeprefix('n_')}"
+    errors = over_delta(table, share, table[f"{share}_numerical"])[number]
+    changes = [-errors, errors]
+    for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
+        shape = over_delta(table, share, results.outlines[f"{share}_shape{end}"])
+        changes[side] = changes[side] + shape[number]
+    return (*shares_of(results, number, name), *changes)
 
 
 def bands_in(table, name):
@@ -360,18 +367,22 @@ def bands_in(table, name):
 
 
 def bands_of(results, name):
-    """The same of the conditions of results, which may know the sign of what numerics change."""
+    """The same of the conditions of results, which may know the sign of what numerics change; with
+    what outlines cut otherwise change."""
     bands = bands_in(results.probabilities, name)
-    signed = [results.numerics[f"{name}_change{end}"] for end in ENDS[1:3] if results.numerics]
-    return [*bands[:3], *signed] if signed else bands
+    for side, end in enumerate(ENDS[1:3], start=3):
+        if results.numerics:
+            bands[side] = results.numerics[f"{name}_change{end}"]
+        if results.outlines:
+            bands[side] = bands[side] + np.nan_to_num(results.outlines[f"{name}_shape{end}"])
+    return bands
 
 
-def share_errors(table, name):
-    """Numerical errors (type, vertices, class or bond) of shares, pooled over delta: the mean of
-    those at each, by their trials."""
-    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+def over_delta(table, share, errors):
+    """Errors (type, vertices, class or bond) of shares, pooled over delta: the mean of those at
+    each, by their trials."""
     trials = events_of(table)[share].trials
-    errors = np.where(trials > 0, table[f"{share}_numerical"], 0.0)
+    errors = np.where(trials > 0, errors, 0.0)
     with np.errstate(invalid="ignore"):
         return (trials * errors).sum(axis=2) / trials.sum(axis=2)
 
@@ -446,9 +457,10 @@ def note_if_empty(axes, values, text):
         axes.text(0.5, 0.5, text, color="0.4", **place)
 
 
-def add_delta_legend(axes, delta, marked=frozenset()):
+def add_delta_legend(axes, results, marked=frozenset()):
     from matplotlib.lines import Line2D
 
+    delta = results.delta
     handles = [
         Line2D(
             [],
@@ -461,11 +473,16 @@ def add_delta_legend(axes, delta, marked=frozenset()):
             zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
         )
     ]
-    title = r"$\delta\,/\,\delta_{\max}$" + BARS + HOLLOW + words_of(marked)
+    title = r"$\delta\,/\,\delta_{\max}$" + bars_of(results) + HOLLOW + words_of(marked)
     place_legend(axes, handles, title)
 
 
-def add_shares_legend(axes, name):
+def bars_of(results):
+    """What the bars of a figure mean."""
+    return BARS_OF_BANDS if results.outlines else BARS
+
+
+def add_shares_legend(axes, name, results):
     from matplotlib.lines import Line2D
 
     words, title = (CLASS_WORDS, "class") if name == "classes" else (BOND_WORDS, "bond")
@@ -473,7 +490,7 @@ def add_shares_legend(axes, name):
         Line2D([], [], color=colour, marker=MARKERS[index], label=plain(words[each]))
         for index, (each, colour) in enumerate(SHARES[name][-1].items())
     ]
-    place_legend(axes, handles, title + BARS)
+    place_legend(axes, handles, title + bars_of(results))
 
 
 def place_legend(axes, handles, title):

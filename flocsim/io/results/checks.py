@@ -12,6 +12,7 @@ from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.schema import (
     AGGREGATED,
     AXES,
+    BAND_ENDS,
     BONDS,
     CLASSES,
     EVENTS,
@@ -28,8 +29,10 @@ from flocsim.io.results.schema import (
     Results,
 )
 
-OPTIONAL = ("pooled", "differences", "numerics", "flocs", "kernel")
+OPTIONAL = ("pooled", "differences", "numerics", "outlines", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
+FURTHER_RUNS = ("checked", "third", *BAND_ENDS)
+"""What stands before the names of columns of a replicate's further runs."""
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
@@ -66,7 +69,7 @@ def check_coordinates(file: Any) -> None:
     for name in {*RADII} & first.keys() if "pooled" in file else ():
         if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
             raise ValueError(f"pooled/{name} is not probabilities/{name}")
-    lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics")
+    lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics", "outlines")
              for axis, words in LAST_AXES.items()}  # fmt: skip
     for path, words in (lists | {"differences/event": EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
@@ -108,8 +111,9 @@ def check_tables(results: Results) -> None:
     for name, values in results.differences.items():
         least, most = (0, np.inf) if name.startswith("n_") else (-1.0, 1.0)
         refuse(beyond(values, least, most), f"values outside [-1, 1] in differences/{name}")
-    for name, values in results.numerics.items():
-        refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in numerics/{name}")
+    for group in ("numerics", "outlines"):
+        for name, values in getattr(results, group).items():
+            refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in {group}/{name}")
     refuse(len(results.failures) > 256, "too many reasons")
 
 
@@ -135,18 +139,18 @@ def check_rows(
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
+    runs = [run for run in FURTHER_RUNS if f"{run}_outcome" not in lacking]
     for names, least, most in (
-        (("inside", "crossed_zone", "checked_inside", "third_inside"), 0, 1),
-        (("checked_outcome", "third_outcome"), 0, len(OUTCOMES) - 1),
-        (("checked_bond", "third_bond"), 1, len(BONDS)),
+        (("inside", "crossed_zone", *(f"{run}_inside" for run in runs)), 0, 1),
+        ([f"{run}_outcome" for run in runs], 0, len(OUTCOMES) - 1),
+        ([f"{run}_bond" for run in runs], 1, len(BONDS)),
     ):
         for name in names:
             codes = column(name)
             refuse_row(((codes < least) | (codes > most)) & (codes != NOT_APPLICABLE), name)
-    refuse_row(
-        (column("third_outcome") != NOT_APPLICABLE) & (column("checked_outcome") == NOT_APPLICABLE),
-        "third_outcome",
-    )
+    if "third" in runs:
+        never = column("checked_outcome") == NOT_APPLICABLE
+        refuse_row(never & (column("third_outcome") != NOT_APPLICABLE), "third_outcome")
     decided = outcome < len(CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")

@@ -10,6 +10,7 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``replicates``     (type, vertices, delta, replicate): what became of every single collision
 - ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
 - ``numerics``       (type, vertices, delta): by how much numerics change each probability
+- ``outlines``       (type, vertices, delta): by how much outlines cut otherwise change it
 - ``run``            scalars: config text, versions, machine, wall times
 
 All that may differ between two runs of one config is in ``run``, so `same_data` can compare the
@@ -49,6 +50,7 @@ from flocsim.io.results.schema import (
     NOT_APPLICABLE,
     NUMERICS,
     OUTCOMES,
+    OUTLINES,
     POOLED,
     RADII,
     REPLICATES,
@@ -141,6 +143,7 @@ def results_in(file, replicates):
         pooled=read_group(file, "pooled", POOLED),
         differences=read_group(file, "differences", DIFFERENCES),
         numerics=read_group(file, "numerics", NUMERICS),
+        outlines=read_group(file, "outlines", OUTLINES),
         count=len(rows["replicate"]),
         radii={name: table[name] for name in RADII},
         kernel=read_kernel(file),

@@ -109,7 +109,7 @@ def image_of(results: Results, attributes: Mapping[str, Any]) -> io.BytesIO:
 def write_tables(file, results):
     """All groups but the replicates and where they came from."""
     file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-    for name in ("probabilities", "pooled", "differences", "numerics"):
+    for name in ("probabilities", "pooled", "differences", "numerics", "outlines"):
         if getattr(results, name):
             write_labelled(file.create_group(name), results.labelled(name))
     if results.kernel is not None:

@@ -23,6 +23,7 @@ from flocsim.io.results.checks import check_coordinates, check_structure
 from flocsim.io.results.kernel_group import CHANGE, ESTIMATES, KERNEL_GROUP, read_kernel
 from flocsim.io.results.layout import SCHEMA_VERSION, image_of
 from flocsim.io.results.schema import (
+    BAND_ENDS,
     BLANKS,
     BONDS,
     BOUNDS,
@@ -93,10 +94,14 @@ ADDED = {
     7: Addition(
         {
             "probabilities": frozenset({"n_third", "n_third_flipped"}),
-            "replicates": frozenset({"third_outcome", "third_inside", "third_bond"}),
+            "replicates": frozenset(
+                f"{run}_{name}"
+                for run in ("third", *BAND_ENDS)
+                for name in ("outcome", "inside", "bond")
+            ),
             "kernel": frozenset(f"{name}{end}" for name in ESTIMATES for end in CHANGE),
         },
-        "none was run a third time",
+        "none was run a third time, or with outlines cut closer and wider",
     ),
 }  # fmt: skip
 """Version → what it added to that before it."""

@@ -36,6 +36,9 @@ SHAPE_MEASURES = {
 """Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.measures`)."""
 SHAPE_COLUMNS = tuple(f"{name}_{body}" for name in SHAPE_MEASURES for body in "ij")
 
+BAND_ENDS = ("closer", "wider")
+"""How another eye might have cut the outlines of flocs: the two ends of their bands."""
+
 REPLICATES = {  # name: (dtype, units, long name)
     "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
     "angle_j": ("f8", "rad", "orientation drawn for the approaching body j"),
@@ -68,6 +71,13 @@ REPLICATES = {  # name: (dtype, units, long name)
     f"{name}_{body}": ("f8", "1", f"{text} of body {body}, as run")
     for name, text in SHAPE_MEASURES.items()
     for body in "ij"
+} | {
+    f"{end}_{name}": ("u1", "1", f"{text}, both outlines cut {end}")
+    for end in BAND_ENDS
+    for name, text in {
+        "outcome": "outcome", "inside": "centre distance below D_0 at the collision",
+        "bond": "what holds an aggregated pair",
+    }.items()
 }  # fmt: skip
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
@@ -139,6 +149,16 @@ NUMERICS = {
     for end, word in (("_low", "lower"), ("_high", "upper"))
 }  # fmt: skip
 """The numerical error as a signed change of every probability of `PROBABILITIES`."""
+OUTLINES = {
+    f"{name}_{end}": ("f8", "1", f"by how much {text} would change, {words}")
+    for name, text in PROBABILITIES.items()
+    for end, words in {
+        **{end: f"all outlines cut {end}" for end in BAND_ENDS},
+        "shape_low": "outlines cut within their bands: lower 95 % bound",
+        "shape_high": "outlines cut within their bands: upper 95 % bound",
+    }.items()
+}  # fmt: skip
+"""The error by the shape: what the ends of the outlines' bands make of every probability."""
 PER_APPROACH = "pr_a_per_approach"
 """Of all approaches that were decided, misses among them: what efficiencies are sums of."""
 
@@ -168,7 +188,11 @@ FLAGS = {
     "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
     "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
 }
-FLAGS |= {f"third_{name}": FLAGS[f"checked_{name}"] for name in ("outcome", "inside", "bond")}
+FLAGS |= {
+    f"{run}_{name}": FLAGS[f"checked_{name}"]
+    for run in ("third", *BAND_ENDS)
+    for name in ("outcome", "inside", "bond")
+}
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
@@ -218,6 +242,10 @@ GROUPS = {
         {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
          for name, (kind, unit, text) in NUMERICS.items()}, COORDINATES,
     ),
+    "outlines": Group.of(
+        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
+         for name, (kind, unit, text) in OUTLINES.items()}, COORDINATES,
+    ),
     "pooled": Group.of(declared(POOLED, AXES[:2]), COORDINATES, SIZES),
     "differences": Group.of(declared(DIFFERENCES, ("against", "event", *AXES)), COORDINATES),
     "replicates": Group.of(declared(REPLICATES, (*AXES, "replicate"), FLAGS), COORDINATES),
@@ -227,6 +255,13 @@ FLOCS = Group({}, declared({"floc": COORDINATES["floc"]}, ("floc",)))
 """The group of the flocs' names."""
 WORDS = LAST_AXES | {"against": AXES, "event": EVENTS}
 """Axes whose words are the same in every file."""
+
+
+def blank(
+    schema: Mapping[str, tuple[str, str, str]], shape: tuple[int, ...]
+) -> dict[str, np.ndarray]:
+    """Tables of a results file without any number in them."""
+    return {name: np.zeros((*shape, *tail_of(name)), about[0]) for name, about in schema.items()}
 
 
 def as_names(names: Iterable) -> tuple[str, ...]:
@@ -256,7 +291,8 @@ class Results:
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
-    event, type, vertices, delta), ``numerics`` those of `NUMERICS`, or nothing; ``radii``
+    event, type, vertices, delta), ``numerics`` and ``outlines``
+    those of `NUMERICS` and `OUTLINES`, or nothing; ``radii``
     {r_i, r_j: (type,)} [m] those of `RADII`,
     NaN where they are not known; ``kernel`` the rates of a kernel study, None in others.
     Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
@@ -273,6 +309,7 @@ class Results:
     pooled: dict[str, np.ndarray] = attrs.field(factory=dict)
     differences: dict[str, np.ndarray] = attrs.field(factory=dict)
     numerics: dict[str, np.ndarray] = attrs.field(factory=dict)
+    outlines: dict[str, np.ndarray] = attrs.field(factory=dict)
     count: int = 0
     radii: dict[str, np.ndarray] = attrs.field(
         default=attrs.Factory(
@@ -292,9 +329,9 @@ class Results:
         if self.differences:
             wanted = (len(AXES), len(EVENTS), *shape)
             self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
-        if self.numerics:
-            shapes = {name: (*shape, *tail_of(name)) for name in NUMERICS}
-            self.check("numerics", NUMERICS, shapes)
+        for group, schema in (("numerics", NUMERICS), ("outlines", OUTLINES)):
+            if getattr(self, group):
+                self.check(group, schema, {name: (*shape, *tail_of(name)) for name in schema})
         if self.replicates is not None:
             count = np.shape(self.replicates.get("outcome", ()))[3:4]
             self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, shape + count))

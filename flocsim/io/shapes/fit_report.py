@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -54,6 +55,42 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
                 "--radius",
                 file=sys.stderr,
             )
+
+
+MOST_ERROR = 5.0
+"""RE [%] above which the form of a floc is lost on its outline of so few vertices."""
+
+LEAST_FALL, MOST_FALL = 1.0, 2.0
+"""Powers of N by which RE falls at least and at most: of ragged and of smooth outlines."""
+
+
+def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
+    """What to say where the largest N is too small for flocs; "" where it is not.
+
+    errors: {floc: {N: RE [%]}}. The N that would do follows from how RE fell from the N before.
+    """
+    worst, needed, over = "", 0.0, 0
+    most = max((n for found in errors.values() for n in found), default=1)
+    for name, found in errors.items():
+        if most == 1 or found[most] <= MOST_ERROR:
+            continue
+        over += 1
+        before = max((n for n in found if 1 < n < most), default=0)
+        fall = LEAST_FALL
+        if before:
+            fall = math.log(max(found[before] / found[most], 1.0)) / math.log(most / before)
+        fall = min(max(fall, LEAST_FALL), MOST_FALL)
+        wanted = most * (found[most] / MOST_ERROR) ** (1.0 / fall)
+        if wanted > needed:
+            worst, needed = name, wanted
+    if not over:
+        return ""
+    of = "the floc" if len(errors) == 1 else f"{over} of {len(errors)} flocs"
+    return (
+        f"N = {most} is too small for {of}: RE is above {MOST_ERROR:g} %, and "
+        f"{errors[worst][most]:.3g} % for {visible(worst, keep='')}, which needs about "
+        f"{math.ceil(needed)} vertices"
+    )
 
 
 def format_errors(entries: Sequence[ShapeEntry]) -> str:

@@ -33,6 +33,11 @@ and of flocs from pictures
     /population/radius_low  (n) [px], r_eq as it would have been cut closer
     /population/radius_high (n) [px], and wider
 
+and where the ends of the bands were fitted as well
+
+    /closer/N, /wider/N     as /fits/N, of the outlines cut closer and wider; the origin is the
+                            centroid of the floc as it was cut
+
 Every dataset has the attributes
 `units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
 """
@@ -40,6 +45,7 @@ Every dataset has the attributes
 import os
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
+from itertools import product
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -59,6 +65,7 @@ from flocsim.io.hdf5.expected import Declared, hold_against
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.labelled import Labelled
 from flocsim.io.opening import opened_file, text_of
+from flocsim.io.results.schema import BAND_ENDS
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
@@ -180,7 +187,7 @@ class ShapeEntry:
     floc_id: text such as "023.png#7"; pixel_size [m]; centroid (x, y) [px, y down]; area [px];
     equivalent_radius and spheroradius [px]; measures [px] of its mask, None where nobody took them;
     weight: that of Region; radius_low, radius_high: r_eq [px] at the ends of its band, its own
-    where nothing is known.
+    where nothing is known; closer, wider: the fits there, none where nobody made them.
     """
 
     floc_id: str
@@ -199,11 +206,23 @@ class ShapeEntry:
     radius_high: float = attrs.field(
         kw_only=True, default=attrs.Factory(own_radius, takes_self=True)
     )
+    closer: dict[int, StoredFit] = attrs.field(kw_only=True, factory=dict)
+    wider: dict[int, StoredFit] = attrs.field(kw_only=True, factory=dict)
 
     @property
     def measured_radius(self) -> float:
         """r_eq [m] of the floc in its picture."""
         return self.equivalent_radius * self.pixel_size
+
+    @property
+    def errors(self) -> dict[int, float]:
+        """{N: RE [%]} of its fits."""
+        return {count: fit.relative_error for count, fit in self.fits.items()}
+
+    @property
+    def is_banded(self) -> bool:
+        """Whether the ends of its band were fitted."""
+        return bool(self.closer and self.wider)
 
 
 def measures_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
@@ -255,21 +274,31 @@ def make_entry(
     spheroradius: float,
     name_radius: bool = False,
     measures: ShapeMeasures | None = None,
+    band: "tuple[Mapping[int, Fit], ...]" = (),
 ) -> ShapeEntry:
     """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
 
-    name_radius: its id names the spheroradius, for libraries with several of one floc.
+    name_radius: its id names the spheroradius, for libraries with several of one floc; band: the
+    fits of the two masks of the region's band, where they were made.
     """
     top, left = region.bbox[:2]
     # The mask has a margin of one pixel, and y counts downwards there.
     centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
-    stored = {int(count): stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
+
+    def stored(fits, centroid):
+        return {count: stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
+
+    ends = {
+        # The masks of a band have a wider margin, the same on every side.
+        name: stored(each, centroid + np.array([1, -1]) * (len(mask) - len(region.mask)) // 2)
+        for name, each, mask in zip(BAND_ENDS, band, region.band or (), strict=bool(band))
+    }
     floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     low, high = region.radius_band
     return ShapeEntry(
         floc_id, image, float(pixel_size), region.centroid, region.area,
-        region.equivalent_radius, float(spheroradius), stored, measures, weight=region.weight,
-        radius_low=low, radius_high=high,
+        region.equivalent_radius, float(spheroradius), stored(fits, centroid), measures,
+        weight=region.weight, radius_low=low, radius_high=high, **ends,
     )  # fmt: skip
 
 
@@ -291,7 +320,7 @@ def write_library(
     """Write entries, all with fits at the same N, to `path`, whole or not at all.
 
     settings: {name: text or number}, what the fits were made with; rule: what becomes of a file
-    that is there.
+    that is there. The ends of bands are written where all entries have them.
 
     Raises UsageError if there are none, ids repeat or the N differ; FileError if it cannot be
     written.
@@ -315,9 +344,10 @@ def write_library(
 
     compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
     groups = {"flocs": labelled(FLOC_COLUMNS, entries)}
-    for count in sorted(entries[0].fits):
-        fits = [entry.fits[count] for entry in entries]
-        groups[f"fits/{count}"] = labelled(fits_at(count, compound), fits)
+    kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
+    for kind, count in product(kinds, sorted(entries[0].fits)):
+        fits = [getattr(entry, kind)[count] for entry in entries]
+        groups[f"{kind}/{count}"] = labelled(fits_at(count, compound), fits)
     for name, group in OPTIONAL.items():
         if any(map(group.is_known, entries)):
             groups[name] = labelled(group.columns, [group.owner(entry) for entry in entries])
@@ -386,17 +416,23 @@ def opened(path: str | os.PathLike) -> AbstractContextManager[tuple[Any, dict[st
 
 def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
     """ValueError unless the groups and datasets of a file are those of a shape library."""
-    groups: dict[str, Mapping[str, Declared]] = {"flocs": FLOC_COLUMNS, "fits": {}}
+    banded = "closer" in nodes or "wider" in nodes
+    kinds = ("fits", *(BAND_ENDS if banded else ()))
+    groups: dict[str, Mapping[str, Declared]] = {"flocs": FLOC_COLUMNS} | {k: {} for k in kinds}
+    counts: dict[str, set[str]] = {kind: set() for kind in kinds}
     for path in nodes:
         group, _, count = path.rpartition("/")
-        if group == "fits":
+        if group in kinds:
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
-                raise ValueError(f"fits/{count} is no number of vertices to {MOST_VERTICES}")
+                raise ValueError(f"{path} is no number of vertices to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
+            counts[group].add(count)
     optional = {name: group.columns for name, group in OPTIONAL.items()}
     lengths = hold_against(nodes, groups | optional, groups)
-    if lengths["floc"] < 1 or len(groups) < 3:
+    if lengths["floc"] < 1 or not counts["fits"]:
         raise ValueError("there are no flocs")
+    if any(each != counts["fits"] for each in counts.values()):
+        raise ValueError("the ends of its bands have other numbers of vertices than its fits")
     for name, (kind, shape) in nodes[""].attributes.items():
         if shape != () or kind not in ("text", "flag", "i8", "f8"):
             raise ValueError(f"its attribute {name} is no text or number")
@@ -420,16 +456,26 @@ def _entries(file):
     for name, group in OPTIONAL.items():
         if name in file:
             flocs |= group.read({each: file[name][each][()] for each in group.columns})
-    fits = {int(count): _fits(int(count), group) for count, group in file["fits"].items()}
-    entries = []
-    for row in range(len(flocs["floc_id"])):
-        stored = {
+    rows = range(len(flocs["floc_id"]))
+    for kind in ("fits", *BAND_ENDS):
+        if kind in file:
+            flocs[kind] = _stored_fits(file[kind], rows)
+    return [
+        ShapeEntry(**{attribute: column[row] for attribute, column in flocs.items()})
+        for row in rows
+    ]
+
+
+def _stored_fits(group, rows):
+    """[{N: StoredFit}] of all flocs in an open group of fits."""
+    fits = {int(count): _fits(int(count), each) for count, each in group.items()}
+    return [
+        {
             count: StoredFit(vertices[row], float(radius[row]), float(error[row]), tables[row])
             for count, (vertices, radius, error, tables) in sorted(fits.items())
         }
-        values = {attribute: column[row] for attribute, column in flocs.items()}
-        entries.append(ShapeEntry(**values, fits=stored))
-    return entries
+        for row in rows
+    ]
 
 
 def _fits(count, group):
@@ -441,7 +487,9 @@ def _fits(count, group):
         ("relative_error", error, np.inf),
     ):
         if not (np.isfinite(values).all() and np.all(values >= 0.0) and np.all(values <= most)):
-            raise ValueError(f"fits/{count}/{name} holds values that are no numbers of a floc's")
+            raise ValueError(
+                f"{group.name[1:]}/{name} holds values that are no numbers of a floc's"
+            )
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
     return vertices, radius, error, _tables(count, group, vertices, radius)

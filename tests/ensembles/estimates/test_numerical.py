@@ -273,14 +273,14 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
     for first, stop in ((0, 7), (7, 31), (31, 40)):
         sums = added(sums, sums_of(codes, 60, first, stop))
     tables = tables_of(sums)
-    whole = tabulate(*columns)
+    whole = tabulate(*columns[: 2 * len(CODES)])
     assert set(tables.probabilities) == set(whole)
     for name in whole:
         np.testing.assert_array_equal(tables.probabilities[name], whole[name])
     for name in PROBABILITIES:
         ends = (tables.numerics[f"{name}_change{end}"] for end in ("_low", "_high"))
         np.testing.assert_array_equal(np.maximum(*map(np.abs, ends)), whole[f"{name}_numerical"])
-    counted = count(*columns[:3]) | count_changes(*by_runs(columns))
+    counted = count(*columns[:3]) | count_changes(*by_runs(columns)[:3])
     for name, values in numerical_errors(over_displacements(counted)).items():
         if name not in ("pr_class_numerical", "pr_bond_numerical"):
             np.testing.assert_array_equal(tables.pooled[name], values)

@@ -269,3 +269,32 @@ def test_weights_and_bands_are_kept_and_bad_ones_refused(tmp_path, entries):
     write_library(tmp_path / "b.h5", [attrs.evolve(each, weight=-1.0) for each in entries])
     with pytest.raises(FileError, match="population/weight"):
         read_library(tmp_path / "b.h5")
+
+
+def test_ends_of_bands_survive_the_file_and_have_the_vertices_of_the_fits(tmp_path):
+    """Their origin is the centroid of the floc as it was cut: a band that is the floc itself, with
+    a wider margin, has its very vertices."""
+    region = segment(picture(), noise_scale=0).regions[0]
+    region = attrs.evolve(region, band=tuple(np.pad(region.mask, by) for by in (1, 3)))
+    fits, *band = (
+        {n: fit_mask(mask, vertices=n) for n in (1, 6)} for mask in (region.mask, *region.band)
+    )
+    entry = make_entry("a.png", region, fits, PIXEL, 1.0, band=tuple(band))
+    for end in (entry.closer, entry.wider):
+        np.testing.assert_allclose(end[6].vertices, entry.fits[6].vertices, atol=1e-12)
+    write_library(tmp_path / "s.h5", [entry])
+    [found] = read_library(tmp_path / "s.h5")
+    assert found.is_banded
+    np.testing.assert_array_equal(found.wider[6].vertices, entry.wider[6].vertices)
+    (tmp_path / "t.h5").write_bytes(read_sealed(tmp_path / "s.h5"))
+    with h5py.File(tmp_path / "t.h5", "r+") as file:
+        del file["wider/6"]
+    (tmp_path / "t.h5").write_bytes(seal((tmp_path / "t.h5").read_bytes()))
+    with pytest.raises(FileError, match="other numbers of vertices than its fits"):
+        read_library(tmp_path / "t.h5")
+
+
+def test_ends_of_bands_are_written_where_all_flocs_have_them(tmp_path, entries):
+    one = attrs.evolve(entries[0], closer=entries[0].fits, wider=entries[0].fits)
+    write_library(tmp_path / "s.h5", [one, entries[1]])
+    assert not any(each.is_banded for each in read_library(tmp_path / "s.h5"))
