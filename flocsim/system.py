@@ -19,6 +19,7 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.double_layer import refuse_unlike
+from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
 from flocsim.forces.shape_drag import resistance_numbers
 from flocsim.forces.smoothing import smoothing_of
 from flocsim.forces.thermal import key_of, kicks_of
@@ -30,6 +31,7 @@ from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.rhs import pair_resistance
 from flocsim.laws import compiled_calls, law_table
 from flocsim.plausibility.doubts import warn_of
 from flocsim.run import Run
@@ -128,6 +130,7 @@ class System:
     def __attrs_post_init__(self) -> None:
         refuse_unlike(self.forces, len(self.bodies))
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
+        water_between(self.forces, self.bodies, self.fluid)
 
     def __repr__(self) -> str:
         n = len(self.bodies)
@@ -163,6 +166,7 @@ class System:
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
+            water_between=water_between(self.forces, self.bodies, self.fluid),
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:
@@ -191,7 +195,8 @@ class System:
         to serve any number of bodies, not these alone."""
         shapes = FAMILIES[self.family]
         few = {} if grows else few_bodies.left_out(len(self.bodies))
-        filled = {**self.integrator.fillings, **few, **shapes, **(observer or {})}
+        water: Fillings = {} if resistance_of_pairs(self.forces) else pair_resistance.LEFT_OUT
+        filled = {**self.integrator.fillings, **few, **water, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "

@@ -80,7 +80,8 @@ class Kernel:
     [m]; ``arrays`` {name: (mechanism, vertices, i, j)} as in KERNEL, symmetric in i and j.
 
     NaN where a pair was not run: bodies of one size do not meet by settling, and all of theirs is
-    0 but efficiencies, which are not known.
+    0 but efficiencies, which are not known. ``water``: whether the bodies moved the water around
+    each other.
     """
 
     mechanisms: tuple[str, ...]
@@ -88,6 +89,7 @@ class Kernel:
     labels: tuple[str, ...]
     radii: np.ndarray
     arrays: dict[str, np.ndarray]
+    water: bool = False
 
     def __attrs_post_init__(self):
         shape = (len(self.mechanisms), len(self.vertices), len(self.labels), len(self.labels))
@@ -122,8 +124,9 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def read_kernel(file: Any) -> Kernel | None:
-    """The group of an open file, None where it has none; ValueError for values that cannot be."""
+def read_kernel(file: Any, identity: str) -> Kernel | None:
+    """The group of an open file, None where it has none; ``identity``: the text of what its rows
+    follow from. ValueError for values that cannot be."""
     if "kernel" not in file:
         return None
     found = KERNEL_GROUP.read(file["kernel"])
@@ -132,7 +135,12 @@ def read_kernel(file: Any) -> Kernel | None:
     arrays = {name: found[name] for name in KERNEL}
     check_kernel(arrays)
     return Kernel(
-        tuple(found["mechanism"]), found["vertices"], tuple(found["i"]), found["r_eq"], arrays
+        tuple(found["mechanism"]),
+        found["vertices"],
+        tuple(found["i"]),
+        found["r_eq"],
+        arrays,
+        '"PairResistance"' in identity,
     )
 
 
