@@ -86,9 +86,9 @@ class PairResistance(Force):
     The resistance of two spheres of their equivalent radii to slow flow, exactly, less the Stokes
     drag that each has alone, which StokesDrag gives. It is symmetric and, with that, positive: no
     work is got back. The motion that the two have in common counts at the distance of their
-    centres; that against each other at the gap of their outlines, where that is below half the mean
-    radius, and along and across its direction. Below the gap ``h_min`` [m], where surfaces are
-    rough, the resistance stays what it is there, so that bodies touch. ``cut``: gap over r_i + r_j
+    centres; that against each other, along and across their line, at the gap of their outlines
+    where that is below half the mean radius. Below the gap ``h_min`` [m], where surfaces are rough,
+    the resistance stays what it is there, so that bodies touch. ``cut``: gap over r_i + r_j
     at which all of it ends; it fades from half of that on, where it moves two settling bodies by
     less than a tenth of their speed, in proportion to 1/gap.
 

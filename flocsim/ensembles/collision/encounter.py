@@ -28,6 +28,7 @@ from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
 from flocsim.hydrodynamics.fading import FADES_FROM
+from flocsim.hydrodynamics.pair_table import nearest_radii
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
@@ -211,9 +212,11 @@ class Encounter:
         if self.water is None:
             return 1.0
         first, second = (shape.equivalent_radius for shape in self.shapes)
+        # At the nearest ratio of the tables: what is far away hangs on their sum and speeds.
         speeds = [-float(velocity[1]) for velocity, _ in self.settling]
-        distance = self.size + min(self.start_gap, FADES_FROM * self.water.cut * self.size)
-        return math.exp(-bend(SpherePair((first, second)), speeds, distance))
+        gap = min(self.start_gap / self.size, FADES_FROM * self.water.cut)
+        spheres = SpherePair(nearest_radii(first, second))
+        return math.exp(-bend(spheres, speeds, 2.0 * (1.0 + gap)))
 
     @functools.cached_property
     def reach(self) -> float:
