@@ -113,13 +113,13 @@ def split(
 def node(place: int) -> np.ndarray:
     """(NODES, columns) at a node of the ratio, r₂/r₁ = 50^(place/HALF_NODES), of a mean radius and
     a viscosity of 1."""
-    radii = nearest_radii(1.0, LARGEST_RATIO ** (place / HALF_NODES))
-    return columns_at(SpherePair(radii), NEAREST * np.exp(np.arange(NODES) / NODES_A_UNIT))
+    return columns_at(
+        SpherePair(node_radii(place)), NEAREST * np.exp(np.arange(NODES) / NODES_A_UNIT)
+    )
 
 
-def nearest_radii(first: float, second: float) -> tuple[float, float]:
-    """Two radii of a mean of 1 at the nearest node of the ratio of these."""
-    place = round(HALF_NODES * math.log(second / first) / math.log(LARGEST_RATIO))
+def node_radii(place: int) -> tuple[float, float]:
+    """The radii, of a mean of 1, at a node of the ratio."""
     ratio = LARGEST_RATIO ** (place / HALF_NODES)
     return 2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio)
 

@@ -28,7 +28,7 @@ from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
 from flocsim.hydrodynamics.fading import FADES_FROM
-from flocsim.hydrodynamics.pair_table import nearest_radii
+from flocsim.hydrodynamics.pair_table import node_radii, slots
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
@@ -208,15 +208,18 @@ class Encounter:
     @functools.cached_property
     def bent(self) -> float:
         """Offset of settling bodies where they start over that far away, whence the water between
-        them, taken for that of spheres, brings them nearer."""
+        them, taken for that of spheres, has pushed them aside."""
         if self.water is None:
             return 1.0
         first, second = (shape.equivalent_radius for shape in self.shapes)
-        # At the nearest ratio of the tables: what is far away hangs on their sum and speeds.
+        # By nodes of the ratio, as the tables: functions of any other take half a second.
         speeds = [-float(velocity[1]) for velocity, _ in self.settling]
         gap = min(self.start_gap / self.size, FADES_FROM * self.water.cut)
-        spheres = SpherePair(nearest_radii(first, second))
-        return math.exp(-bend(spheres, speeds, 2.0 * (1.0 + gap)))
+        found = sum(
+            weight * bend(SpherePair(node_radii(place)), speeds, 2.0 * (1.0 + gap))
+            for place, weight in slots(second / first)
+        )
+        return math.exp(-found)
 
     @functools.cached_property
     def reach(self) -> float:
