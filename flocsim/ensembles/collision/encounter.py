@@ -212,14 +212,10 @@ class Encounter:
         if self.water is None:
             return 1.0
         first, second = (shape.equivalent_radius for shape in self.shapes)
-        # By nodes of the ratio, as the tables: functions of any other take half a second.
-        speeds = [-float(velocity[1]) for velocity, _ in self.settling]
+        slower, faster = (float(velocity[1]) for velocity, _ in self.settling)
         gap = min(self.start_gap / self.size, FADES_FROM * self.water.cut)
-        found = sum(
-            weight * bend(SpherePair(node_radii(place)), speeds, 2.0 * (1.0 + gap))
-            for place, weight in slots(second / first)
-        )
-        return math.exp(-found)
+        # Flocs of one size differ in it by rounding.
+        return offset_near(*(round(each, 9) for each in (second / first, slower / faster, gap)))
 
     @functools.cached_property
     def reach(self) -> float:
@@ -380,6 +376,18 @@ class Encounter:
         place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
         velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
         return work_of(self.scene, place, velocity)
+
+
+@functools.lru_cache(maxsize=1024)
+def offset_near(ratio: float, speeds: float, gap: float) -> float:
+    """Offset of two settling spheres at a gap over r_i + r_j over that far away, of r_j/r_i and
+    w_i/w_j."""
+    # By nodes of the ratio, as the tables: functions of any other take half a second.
+    found = sum(
+        weight * bend(SpherePair(node_radii(place)), (speeds, 1.0), 2.0 * (1.0 + gap))
+        for place, weight in slots(ratio)
+    )
+    return math.exp(-found)
 
 
 def resisting(system: System, body: Body) -> tuple[float, float, float]:
