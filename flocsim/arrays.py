@@ -212,6 +212,25 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     PIECE_COLUMNS,
 ) = range(11)
 
+# Places in ``Scene.water``: what two bodies' resistance follows from beside ``Scene.pair_table``.
+(
+    VISCOSITY,  # [Pa s]
+    MEAN_RADIUS,  # of the two [m]
+    FLOOR,  # the gap below which it stays what it is [m]
+    CUT,  # the gap at which it ends [m]; 0: there is none
+    NEAR_CUT,  # the gap of outlines up to which they count [m]
+    FLOW,  # from here on: Fluid.flow
+) = range(6)
+
+WATER_SIZE = FLOW + 6
+
+TABLE_COLUMNS = 20
+"""Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair_table.COLUMNS."""
+
+SQUARES = 9
+"""Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a
+strain pulls at them with."""
+
 # Columns of ``Work.pairs``: two bodies that may come near each other.
 (
     LATER,  # the body of the larger number
@@ -467,6 +486,9 @@ class Scene(NamedTuple):
     box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
     kicks: tuple[float, float, float, float]  # how long random forces stay: integrators.loop.kicks
     key: tuple[int, int]  # what they are drawn by
+    pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)]  # forces.pair_resistance
+    water: Annotated[np.ndarray, (WATER_SIZE,)]  # see VISCOSITY
+    listed_reach: float  # the gap up to which outlines are listed for what acts between them [m]
 
 
 class Elimination(NamedTuple):
@@ -504,6 +526,7 @@ class Work(NamedTuple):
     kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
     near: np.ndarray  # rows of pieces of two bodies: rhs.outline_sum
     feet: np.ndarray  # scratch of the same
+    squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
     pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
     discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
@@ -598,6 +621,7 @@ def work_of(
         kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
         near=np.zeros(2 * len(scene.pieces) + 2, dtype=np.int64),
         feet=np.zeros(MOST_FEET),
+        squares=np.zeros((SQUARES + 1, 7)),
         pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
         budget=np.full(pairs, -1.0),
         discs=np.zeros((n, 8)),

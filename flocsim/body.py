@@ -7,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim import water
 from flocsim.arrays import RESISTANCE_COLUMNS, Scene
 from flocsim.constants import (
@@ -30,6 +31,9 @@ NO_SMOOTHING = (1.0, 0.0, 0.0)
 
 NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
 """``Scene.outlines`` of a scene without forces between outlines."""
+
+NO_WATER = (np.zeros((0, at.TABLE_COLUMNS, 4)), np.zeros(at.WATER_SIZE))
+"""``Scene.pair_table`` and ``Scene.water`` where nothing acts between bodies through the water."""
 
 NO_BOX = (math.inf, math.inf)
 """``Scene.box`` where nothing repeats."""
@@ -281,10 +285,12 @@ def scene_of(
     kicks: tuple[float, float, float, float] = NO_KICKS,
     key: tuple[int, int] = (0, 0),
     resistances: Sequence[Sequence[float]] | None = None,
+    water_between: tuple[np.ndarray, np.ndarray] = NO_WATER,
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
     (flocsim.forces.codegen.Pieces); without, a scene that has no laws. ``resistances``: of every
-    body, where a drag follows their shapes (flocsim.forces.shape_drag)."""
+    body, where a drag follows their shapes (flocsim.forces.shape_drag);
+    ``water_between``: Scene.pair_table and Scene.water (flocsim.forces.pair_resistance)."""
     shapes = [body.shape for body in bodies]
     columns: tuple[list[float], ...] = (
         [body.mass for body in bodies],
@@ -313,4 +319,7 @@ def scene_of(
         box=box,
         kicks=kicks,
         key=key,
+        pair_table=water_between[0],
+        water=water_between[1],
+        listed_reach=max(float(surface_reach), water_between[1][at.NEAR_CUT] or -1.0),
     )

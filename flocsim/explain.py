@@ -24,6 +24,7 @@ from flocsim.forces.check import (
     sample_pairs,
 )
 from flocsim.forces.codegen import PLACES, VELOCITIES
+from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
@@ -106,6 +107,9 @@ def about(system, force, implicit):
         parts, derivative = ["on every body"], body_derivative(system, force)
     elif not counting(system.bodies):
         return [f"never called, {no_partner(system)}"]
+    elif isinstance(force, PairResistance):
+        parts = [f"between the two, up to {force.cut:g} (r_i + r_j) apart"]
+        derivative = "derivatives analytic, of its growth in the gap alone by place"
     elif isinstance(force, ContactForce):
         parts = ["at every overlapping pair", sliding(system, force)]
         derivative = "derivatives from differences of its kernel"
@@ -183,6 +187,7 @@ def sliding(system, force):
 def machinery_lines(system):
     laws = system.pieces.laws
     touching = "contact_force" in laws or "surface_force" in laws
+    touching = touching or resistance_of_pairs(system.forces) is not None
     lines = [search_line(system, touching)]
     if system.spheres_only:
         lines.append("out: vertex-edge pairs, rotation of vertices: no body has an edge")
@@ -240,6 +245,8 @@ def exerts_torque(system, force):
         return any(result[2] != 0.0 for result in tried(system, force, kernel, SAMPLE_BODIES))
     if not counting(system.bodies):
         return False
+    if isinstance(force, PairResistance):
+        return True
     if isinstance(force, PairForce):
         return force.acts_on != "centres" and not system.spheres_only
     sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)

@@ -20,6 +20,7 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.double_layer import refuse_unlike
+from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
 from flocsim.forces.shape_drag import resistance_numbers
 from flocsim.forces.smoothing import smoothing_of
 from flocsim.forces.thermal import key_of, kicks_of
@@ -129,6 +130,7 @@ class System:
     def __attrs_post_init__(self) -> None:
         refuse_unlike(self.forces, len(self.bodies))
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
+        water_between(self.forces, self.bodies, self.fluid)
 
     def __repr__(self) -> str:
         n = len(self.bodies)
@@ -150,9 +152,14 @@ class System:
         return "spheres" if self.spheres_only else "polygons"
 
     @property
-    def has_outlines(self) -> bool:
-        """Whether a force acts all along outlines."""
-        return "outline_pressure" in self.pieces.laws
+    def reached(self) -> dict[str, bool]:
+        """What its forces reach of an engine (flocsim.integrators.left_out): two systems of one
+        family that reach the same share their compiled code."""
+        return {
+            "outlines": "outline_pressure" in self.pieces.laws,
+            "plain": self.pieces.plain_bodies,
+            "water": resistance_of_pairs(self.forces) is not None,
+        }
 
     def scene(self, *, jit: bool = True) -> Scene:
         """The bodies as arrays for the drivers, with the laws that their forces add up to.
@@ -169,6 +176,7 @@ class System:
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
+            water_between=water_between(self.forces, self.bodies, self.fluid),
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:
@@ -197,10 +205,7 @@ class System:
         """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
         to serve any number of bodies, not these alone."""
         shapes = FAMILIES[self.family]
-        needless = left_out(
-            math.inf if grows else len(self.bodies),
-            outlines=self.has_outlines, plain=self.pieces.plain_bodies,
-        )  # fmt: skip
+        needless = left_out(math.inf if grows else len(self.bodies), **self.reached)
         filled = {**self.integrator.fillings, **needless, **shapes, **(observer or {})}
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(

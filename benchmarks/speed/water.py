@@ -1,14 +1,19 @@
-"""What it takes to know what slow flow makes of two spheres, and of an outline: CPU seconds.
+"""What it takes to know what slow flow makes of two spheres, and of an outline: CPU seconds; and
+how much longer a study of rates takes with the water between two bodies.
 
 python -m benchmarks.speed.water
 """
 
 import time
+from pathlib import Path
 from statistics import mean
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
+from flocsim.ensembles.config.loader import load_any_config
+from flocsim.ensembles.kernels.study import study_of
 from flocsim.hydrodynamics import Meeting, SpherePair, prism_drag
 from flocsim.hydrodynamics.two_spheres import functions_of
 from flocsim.io.shapes.library import SHIPPED, read_library
@@ -63,12 +68,65 @@ def outline_table(count):
     return table
 
 
+STUDY = """
+preset = "si"
+replicates = 4096
+[scene]
+kind = "kernel"
+meeting = "{}"
+{}
+sizes = ["5 um", "10 um"]
+[shapes]
+source = "library"
+file = "synthetic"
+vertices = [{}]
+[forces.double_layer]
+potential = 0
+"""
+
+
+def study_of_pairs(folder, meeting, vertices, more=""):
+    """A study of quartz."""
+    path = Path(folder) / "kernel.toml"
+    rate = "" if meeting == "settling" else 'rate = "10 1/s"'
+    path.write_text(STUDY.format(meeting, rate, vertices) + more, "utf-8")
+    return study_of(load_any_config(path))
+
+
+def study_table(count):
+    """CPU seconds of the same points with the water over those without, and steps; 5 with 10 µm."""
+    table = Table("Studies with the water", ("meeting", "N", "ms a pair", "ratio", "of steps"))
+    for meeting in ("settling", "shear"):
+        for vertices in (1, 16):
+            with TemporaryDirectory() as folder:
+                plain, wet = (
+                    study_of_pairs(folder, meeting, vertices, more)
+                    for more in ("", "[forces.hydrodynamics]\n")
+                )
+            spent, steps = {plain: 0.0, wet: 0.0}, {plain: 0, wet: 0}
+            place = [each.endswith("5um-10um") for each in plain.config.scene.names].index(True)
+            for study in (plain, wet):  # what it takes to compile, and tables
+                study.run(place, vertices, 1.0, 0)
+            for replicate in range(count):
+                for study in (plain, wet):
+                    began = time.process_time()
+                    row = study.run(place, vertices, 1.0, replicate)
+                    spent[study] += time.process_time() - began
+                    steps[study] += row["steps"]
+            table.add(
+                meeting, vertices, 1e3 * spent[wet] / count, spent[wet] / spent[plain],
+                steps[wet] / steps[plain],
+            )  # fmt: skip
+    return table
+
+
 def main():
     """Print the tables."""
     arguments = parse_arguments(__doc__)
     print_heading()
     pair_table().print(arguments.markdown)
     outline_table(6 if arguments.quick else 24).print(arguments.markdown)
+    study_table(40 if arguments.quick else 400).print(arguments.markdown)
 
 
 if __name__ == "__main__":

@@ -135,6 +135,8 @@ KERNEL_HEADER = (
 def kernel_lines(kernel: Kernel) -> list[str]:
     """The rates of a kernel study as tables of text: one for each mechanism and N."""
     lines = [f"capture widths and kernels, {RECTILINEAR}", IN_WATER]
+    if kernel.water:
+        lines = ["capture widths and kernels, with the water that bodies push at each other"]
     for m, mechanism in enumerate(kernel.mechanisms):
         for v, count in enumerate(kernel.vertices):
             rows = [

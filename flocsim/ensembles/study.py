@@ -199,8 +199,8 @@ class Study(StudyKind):
         """
         system = encounter.system
         method = method or system.integrator
-        forces = system.has_outlines, system.pieces.plain_bodies
-        kind = system.family, forces, type(method), bool(encounter.kick_energy)
+        reached = tuple(system.reached.items())
+        kind = system.family, reached, type(method), bool(encounter.kick_energy)
         if kind not in self.drivers:
             made = attrs.evolve(system, integrator=method)
             self.drivers[kind] = made.compose(observer=encounter.observer)

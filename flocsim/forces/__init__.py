@@ -13,7 +13,7 @@ from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
-from flocsim.forces.lubrication import Lubrication
+from flocsim.forces.pair_resistance import Lubrication, PairResistance
 from flocsim.forces.thermal import Thermal
 from flocsim.forces.van_der_waals import VanDerWaals
 
@@ -28,6 +28,7 @@ __all__ = [
     "Lubrication",
     "OutlineForce",
     "PairForce",
+    "PairResistance",
     "StokesDrag",
     "SurfaceForce",
     "Thermal",

@@ -32,6 +32,7 @@ from flocsim.forces.differences import (
     pressed_contact,
 )
 from flocsim.forces.outline import outlines_of_forces
+from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.forces.smoothing import smoothness
 from flocsim.laws import LAWS
 
@@ -264,6 +265,9 @@ def sort_forces(pieces, forces, fluid):
         if force.absent:
             pieces.left_out[name] = force.absent
             continue
+        if isinstance(force, PairResistance):
+            pieces.used[name] = force
+            continue
         check_named(force, fluid, name)
         pieces.used[name] = force
         if isinstance(force, BodyForce):
@@ -301,7 +305,9 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
         pieces.centre_reach = max(map(reach_of, kinds["centre"]))
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
-        pieces.smoothness = smoothness(kinds["surface"], fluid)
+    water = [stand_in(each) for each in pieces.used.values() if isinstance(each, PairResistance)]
+    if kinds["surface"] or water:
+        pieces.smoothness = smoothness([*kinds["surface"], *water], fluid)
     write_outline_law(sources["outline"], kinds["outline"])
     pieces.outlines = outlines_of_forces(kinds["outline"], fluid)
     for source in sources.values():

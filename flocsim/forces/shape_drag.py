@@ -87,12 +87,14 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         return np.array(numbers, dtype=float).tobytes()
 
     told = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
-    data = kept("flocsim_drag", f"{told} {height} {drag_facts()}", made)
+    data = kept("flocsim_drag", f"{told} {height} {facts_of(prism)}", made)
     return tuple(np.frombuffer(data).tolist())
 
 
 @functools.cache
-def drag_facts() -> str:
-    """What a resistance follows from beside the outline: code, versions, processor."""
-    code = hashlib.blake2b(inspect.getsource(prism).encode(), digest_size=16).hexdigest()
-    return f"{code} {versions()} {cpu_kind()}"
+def facts_of(*modules: Any) -> str:
+    """What is computed once follows from beside its input: code of modules, versions, processor."""
+    code = hashlib.blake2b(digest_size=16)
+    for module in modules:
+        code.update(inspect.getsource(module).encode())
+    return f"{code.hexdigest()} {versions()} {cpu_kind()}"

@@ -5,9 +5,9 @@ for motion in a plane; encounters: which of two spheres that meet touch; prism: 
 floc's outline. May import errors.
 """
 
-from flocsim.hydrodynamics.encounters import Meeting
+from flocsim.hydrodynamics.encounters import Meeting, bend
 from flocsim.hydrodynamics.pair import Relative, SpherePair
 from flocsim.hydrodynamics.prism import PrismDrag, prism_drag
 from flocsim.hydrodynamics.two_spheres import TwoSpheres
 
-__all__ = ["Meeting", "PrismDrag", "Relative", "SpherePair", "TwoSpheres", "prism_drag"]
+__all__ = ["Meeting", "PrismDrag", "Relative", "SpherePair", "TwoSpheres", "bend", "prism_drag"]

@@ -7,7 +7,7 @@ to touching is narrowed down from outside in.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import attrs
@@ -198,12 +198,7 @@ class Meeting:
             directions = np.column_stack([-np.sqrt(1.0 - sine**2), sine, 0.0 * sine])
             return self.touches(table, rates, start, directions)[None]
 
-        # ln(r sin φ) changes by (1 − sideways/radial)/r dr, from far away to the start.
-        log = np.linspace(math.log(start - self.reach), math.log(LAST * self.reach), 400)
-        radial, sideways, _ = table(log)
-        gap = np.exp(log)
-        change = gap / (gap + self.reach) - sideways / radial
-        before = np.trapezoid(change, log) + change[-1]
+        before = bend(self.pair, alone, start) if self.water else 0.0
         low, high = self.between(hits, 1)
         return float((high[0] ** 2 - low[0] ** 2) * math.exp(2.0 * before))
 
@@ -214,6 +209,18 @@ class Meeting:
         ``flow``: "shear", u = (G y, 0, 0), or "extension", u = (s x, −s y, 0); ``rate``: G or s
         [1/s]. UsageError for others.
         """
+        nodes, weights = np.polynomial.legendre.leggauss(AZIMUTHS)
+        angle, weight = 0.25 * math.pi * (nodes + 1.0), 0.25 * math.pi * weights
+        low, high = self.widths(flow, rate, angle)
+        if flow == "shear":
+            # 4 ∫∫ G |y| dy dz over 4/3 G.
+            return float(np.sum(weight * np.cos(angle) * (high**3 - low**3)))
+        # Of x y and z 2 · 4 ∫∫ s d(x y) dz over 8/3 s; d(x y) = ½ (r₁ + r₂) d(first).
+        return float(np.sum(weight * 0.75 * (high**2 - low**2)))
+
+    def widths(self, flow: str, rate: float, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest offset over r₁ + r₂ (k,) of those that come to touch in a flow,
+        of offsets that lie at an ``angle`` (k,) from the plane of shear, or of extension."""
         if flow not in FLOWS or not rate > 0.0:
             raise UsageError(
                 f"flow must be one of {', '.join(FLOWS)}, at a rate above 0, found {flow!r} at "
@@ -236,8 +243,6 @@ class Meeting:
             return radial * along + driven, turned + across
 
         start = FLOW_FAR * self.reach
-        nodes, weights = np.polynomial.legendre.leggauss(AZIMUTHS)
-        angle, weight = 0.25 * math.pi * (nodes + 1.0), 0.25 * math.pi * weights
 
         def hits(offsets):
             first, second = offsets * np.cos(angle)[:, None], offsets * np.sin(angle)[:, None]
@@ -253,9 +258,17 @@ class Meeting:
             directions = directions / np.linalg.norm(directions, axis=1)[:, None]
             return self.touches(table, rates, start, directions).reshape(offsets.shape)
 
-        low, high = self.between(hits, AZIMUTHS)
-        if is_shear:
-            # 4 ∫∫ G |y| dy dz over 4/3 G.
-            return float(np.sum(weight * np.cos(angle) * (high**3 - low**3)))
-        # Of x y and z 2 · 4 ∫∫ s d(x y) dz over 8/3 s; d(x y) = ½ (r₁ + r₂) d(first).
-        return float(np.sum(weight * 0.75 * (high**2 - low**2)))
+        return self.between(hits, len(angle))
+
+
+def bend(pair: SpherePair, speeds: Sequence[float] | np.ndarray, distance: float) -> float:
+    """By how much the logarithm of the offset of two settling spheres falls from far away until
+    they are a ``distance`` [m] apart, where that is small; ``speeds``: of both alone."""
+    reach = sum(pair.radii)
+    log = np.linspace(math.log(distance - reach), math.log(max(LAST * reach, 4.0 * distance)), 400)
+    gap = np.exp(log)
+    motion = pair.relative(gap)
+    loads = np.array(speeds) * pair.radii
+    # ln(r sin φ) changes by (1 − sideways/radial)/r dr; from the last on it falls with 1/r.
+    change = gap / (gap + reach) * (1.0 - (motion.across @ loads) / (motion.along @ loads))
+    return float(np.trapezoid(change, log) + change[-1])

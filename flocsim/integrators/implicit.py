@@ -85,7 +85,7 @@ def is_tried_again(scene, clock):
     what was found out about its start is known still. Not so with surface forces, as which pairs
     have a share in them hangs on the size of the step."""
     staged = clock[at.STAGED_STEP] > 0.0 and clock[at.STAGED_AT] == clock[at.TIME]
-    return staged and scene.surface_reach <= 0.0
+    return staged and scene.listed_reach <= 0.0
 
 
 @attrs.frozen

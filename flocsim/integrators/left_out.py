@@ -15,7 +15,7 @@ from flocsim.geometry.contact import body_pairs
 from flocsim.hooks import choose_method, step_across
 from flocsim.integrators.backward_euler.choice import FEWEST
 from flocsim.integrators.radau import elimination
-from flocsim.integrators.rhs import forces, jacobian, outline_sum, views
+from flocsim.integrators.rhs import forces, jacobian, outline_sum, pair_resistance, views
 
 
 def list_none(scene, work, cut):
@@ -55,10 +55,13 @@ def none_apart(scene, work, time, a, b, way):
     return 0.0
 
 
-def left_out(bodies: float, *, outlines: bool, plain: bool) -> dict[Callable, Callable]:
+def left_out(
+    bodies: float, *, outlines: bool, plain: bool, water: bool
+) -> dict[Callable, Callable]:
     """{hook: function} that leaves out what a scene does not need, for
     flocsim.compiler.composer.compose: of so many bodies (inf: of any number), with forces along
-    ``outlines`` or without, ``plain``: whether no kernel reads the numbers of shapes."""
+    ``outlines`` or without, ``plain``: whether no kernel reads the numbers of shapes; with the
+    resistance of ``water`` between two bodies, or without."""
     found: dict[Callable, Callable] = {}
     if plain:
         found |= {views.body_view: views.plain_body_view}
@@ -68,6 +71,8 @@ def left_out(bodies: float, *, outlines: bool, plain: bool) -> dict[Callable, Ca
             jacobian.add_outlines: differentiate_none,
             outline_sum.outlines_apart: none_apart,
         }
+    if not water:
+        found |= pair_resistance.LEFT_OUT
     if bodies < FEWEST:
         found |= {choose_method: choose_method, step_across: step_across}
     if bodies <= at.DENSE:

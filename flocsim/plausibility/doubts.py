@@ -12,7 +12,7 @@ from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
-from flocsim.forces.lubrication import Lubrication
+from flocsim.forces.pair_resistance import Lubrication
 from flocsim.forces.thermal import Thermal, thermal_in
 from flocsim.plausibility.ranges import RADIUS, ROUNDING, unusual
 from flocsim.plausibility.reynolds import all_settled, beyond_the_law

@@ -14,6 +14,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.outline import refuse_outlines
+from flocsim.forces.pair_resistance import refuse_pair_resistance
 from flocsim.forces.thermal import kicks_of
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.geometry.contact.separation import PERIODIC
@@ -86,6 +87,7 @@ class Swarm:
     system: System = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
+        refuse_pair_resistance(self.forces, "a swarm")
         system = System(self.bodies, self.forces, self.integrator, self.fluid, seed=self.seed)
         object.__setattr__(self, "system", system)
         if all(body.fixed for body in self.bodies):

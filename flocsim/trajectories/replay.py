@@ -13,9 +13,10 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.arrays import Scene, Work, copy_of, with_room
-from flocsim.body import Body, Fluid
+from flocsim.body import NO_WATER, Body, Fluid
 from flocsim.forces.base import Force, names_of
 from flocsim.forces.codegen import laws_of
+from flocsim.forces.pair_resistance import PairResistance
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -131,12 +132,15 @@ class Replay:
     def scene_of(self, forces: Sequence[Force]) -> Scene:
         """The run's scene with the laws of these of its forces, uncompiled."""
         pieces = laws_of(forces, self.origin.fluid)
+        water = NO_WATER
+        if any(isinstance(force, PairResistance) for force in forces):
+            water = self.run.scene.pair_table, self.run.scene.water
         return self.run.scene._replace(
             laws=law_table(pieces.laws, jit=False),
             parameters=np.array(pieces.parameters, dtype=float),
             surface_reach=float(pieces.surface_reach),
             centre_reach=float(pieces.centre_reach), events=int(pieces.events),
-            outlines=pieces.outlines,
+            outlines=pieces.outlines, pair_table=water[0], water=water[1],
         )  # fmt: skip
 
     @functools.cached_property
@@ -198,7 +202,7 @@ class Replay:
         """The Instant of a motion (n, 6) near where the run is now."""
         work = copy_of(self.run.work)
         work.motion[at.NOW] = motion
-        touching = has(self.scene, CONTACT_FORCE) or self.scene.surface_reach > 0.0
+        touching = has(self.scene, CONTACT_FORCE) or self.scene.listed_reach > 0.0
         if touching or not watches_all(work):
             while not work.tally[at.CANDIDATES] and not list_candidates(self.scene, work):
                 work = with_room(work)
@@ -207,7 +211,7 @@ class Replay:
             set_closed(work)
             for row in range(work.tally[at.CANDIDATES]):
                 work.slip[at.NOW, row] = slips.get(key_of(work, row), 0.0)
-            if self.scene.surface_reach > 0.0:
+            if self.scene.listed_reach > 0.0:
                 flag_near(self.scene, work, at.NOW, 0.0)
         return Instant(float(time), self.scene, work)
 

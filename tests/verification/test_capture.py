@@ -19,6 +19,7 @@ from flocsim.ensembles.runner import run
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.integrators import Overdamped
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.system import System
@@ -38,7 +39,7 @@ kind = "kernel"
 meeting = "{meeting}"
 {rate}
 sizes = ["10 um", "20 um"]
-start_gap = {gap!r}
+start_gap = {gap}
 [shapes]
 vertices = [1]
 [forces]
@@ -48,7 +49,15 @@ hamaker = {hamaker!r}
 d_min = {d_min!r}
 [integrator]
 name = "overdamped"
-tolerance = 1e-11
+tolerance = {tolerance}
+{more}
+"""
+
+STIFF_IN_WATER = """[forces.contact]
+k_n = 2e4
+k_t = 2e3
+[forces.hydrodynamics]
+h_min = {!r}
 """
 
 
@@ -57,8 +66,9 @@ def settling_speed():
     return 2.0 / 9.0 * (2650.0 - 997.0) * 9.81 * (RADII[1] ** 2 - RADII[0] ** 2) / VISCOSITY
 
 
-def capture_offset(folder, meeting, ratio, d_min):
-    """b_c/R, to some 1e-6, of overdamped spheres that attract each other by van der Waals alone.
+def capture_offset(folder, meeting, ratio, d_min, water=False):
+    """b_c/R, to some 1e-6, of overdamped spheres that attract each other by van der Waals alone; to
+    1e-4 with the ``water`` between them.
 
     ``ratio``: k/(w R²), or k/(G R³); ``d_min`` over R: the force reaches 3e4 times as far.
     """
@@ -67,8 +77,9 @@ def capture_offset(folder, meeting, ratio, d_min):
     path = folder / "capture.toml"
     path.write_text(
         OVERDAMPED.format(
-            meeting=meeting, rate=rate, gap=FAR * SIZE, d_min=d_min * SIZE,
-            hamaker=ratio * unit * 36.0 * math.pi * VISCOSITY,
+            meeting=meeting, rate=rate, gap="'auto'" if water else FAR * SIZE, d_min=d_min * SIZE,
+            hamaker=ratio * unit * 36.0 * math.pi * VISCOSITY, tolerance=1e-10 if water else 1e-11,
+            more=STIFF_IN_WATER.format(d_min * SIZE) if water else "",
         ),
         "utf-8",
     )  # fmt: skip
@@ -82,10 +93,10 @@ def capture_offset(folder, meeting, ratio, d_min):
         assert OUTCOMES[row["outcome"]] in ("A", "C", "missed")
         return OUTCOMES[row["outcome"]] != "missed"
 
-    low, high = 1.0, 1.0 + encounter.reach / SIZE
+    low, high = (0.05, 1.0) if water else (1.0, 1.0 + encounter.reach / SIZE)
     assert is_caught(low), "spheres whose ways touch"
     assert not is_caught(high), "the sampled offsets reach far enough"
-    while high - low > 1e-6:
+    while high - low > (1e-4 if water else 1e-6):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_caught(middle) else (low, middle)
     return low
@@ -119,6 +130,32 @@ def test_weak_attraction_catches_by_the_two_fifths_law(tmp_path):
                                                           (1e-4, 1.04678, 1e-3)])  # fmt: skip
 def test_spheres_in_shear_are_caught_as_far_as_computed(tmp_path, ratio, expected, d_min):
     assert capture_offset(tmp_path, "shear", ratio, d_min) == pytest.approx(expected, abs=2e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ratio", "expected"), [(1e-2, 0.6288), (1e-4, 0.2537), (1e-6, 0.1400)])
+def test_settling_spheres_in_water_are_caught_as_far_as_computed(tmp_path, ratio, expected):
+    found = capture_offset(tmp_path, "settling", ratio, 1e-4, water=True)
+    assert found == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("meeting", ["shear", "extension"])
+@pytest.mark.parametrize("ratio", [1e-3, 1e-5])
+def test_spheres_in_a_flow_of_water_are_caught_as_far_as_by_their_ways(tmp_path, meeting, ratio):
+    hamaker = ratio * RATE * SIZE**3 * 36.0 * math.pi * VISCOSITY
+    reduced, touch = RADII[0] * RADII[1] / SIZE, 1e-4 * SIZE
+
+    def force(gap):
+        return -hamaker * reduced / (6.0 * np.maximum(gap, touch) ** 2)
+
+    spheres = Meeting(SpherePair(RADII, VISCOSITY), force, touch)
+    low, high = spheres.widths(meeting, RATE, np.array([0.0]))
+    assert low[0] == 0.0
+    # There x y = ½ R first, and the offset of an extension is √(2 x y).
+    expected = high[0] if meeting == "shear" else math.sqrt(high[0])
+    found = capture_offset(tmp_path, meeting, ratio, 1e-4, water=True)
+    assert found == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.slow

@@ -22,9 +22,13 @@ from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release,
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
+from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.shape_drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.hydrodynamics import SpherePair, bend
+from flocsim.hydrodynamics.fading import FADES_FROM
+from flocsim.hydrodynamics.pair_table import node_radii, slots
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
@@ -48,6 +52,14 @@ KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: kicked.watch_kicke
 
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
+
+START = 5.0
+"""Gap over r_i + r_j at which two bodies begin that move the water around each other: shapes are to
+each other what spheres are there, and in a flow a strain brings them together by all but .003."""
+
+STRESSLET = 6.116 / 3.0
+"""By how much more a strain pulls at the bond of two equal spheres in the water between them than
+by the drag of each alone; at that of unequal ones by less."""
 
 LIMIT_ESCAPES = 100.0
 """The same of a brownian meeting, in times escape²/D: e^-578 of those that nothing holds are still
@@ -170,14 +182,40 @@ class Encounter:
         system = self.system
         return meetings.speeds_of(system.forces, system.fluid, radii, sum(mobilities))
 
+    @property
+    def size(self) -> float:
+        """r_i + r_j [m]."""
+        return sum(shape.equivalent_radius for shape in self.shapes)
+
+    @functools.cached_property
+    def far_gap(self) -> float:
+        """The gap [m] beyond which what acts between the two at rest hardly moves them."""
+        share = self.options.far
+        return meetings.far_gap(self.pull, math.hypot(*self.drift), share, self.size)
+
     @functools.cached_property
     def start_gap(self) -> float:
         """Distance of the outlines at the start [m]."""
         if not isinstance(self.options.start_gap, str):
             return self.options.start_gap
-        size = sum(shape.equivalent_radius for shape in self.shapes)
-        share = self.options.far
-        return meetings.far_gap(self.pull, math.hypot(*self.drift), share, size)
+        return max(self.far_gap, START * self.size if self.water else 0.0)
+
+    @property
+    def water(self) -> PairResistance | None:
+        """What acts between the two through the water, None where nothing does."""
+        return resistance_of_pairs(self.system.forces)
+
+    @functools.cached_property
+    def bent(self) -> float:
+        """Offset of settling bodies where they start over that far away, whence the water between
+        them, taken for that of spheres, has pushed them aside."""
+        if self.water is None:
+            return 1.0
+        first, second = (shape.equivalent_radius for shape in self.shapes)
+        slower, faster = (float(velocity[1]) for velocity, _ in self.settling)
+        gap = min(self.start_gap / self.size, FADES_FROM * self.water.cut)
+        # Flocs of one size differ in it by rounding.
+        return offset_near(*(round(each, 9) for each in (second / first, slower / faster, gap)))
 
     @functools.cached_property
     def reach(self) -> float:
@@ -233,7 +271,8 @@ class Encounter:
             bodies: Sequence[Sequence[float]] = self.yielding
             if follows_shape(self.system.forces):
                 bodies = [resisting(self.system, body) for body in self.system.bodies]
-            return meetings.flow_load(self.meeting, self.rate, self.outer, bodies)
+            load = meetings.flow_load(self.meeting, self.rate, self.outer, bodies)
+            return load if self.water is None else STRESSLET * load
         fastest = max(math.hypot(*velocity) for velocity, _ in self.settling)
         least = [
             least_mobility(self.system, body, fastest, mobility)
@@ -260,7 +299,9 @@ class Encounter:
         options = self.options
         observed = np.zeros(numbers.OBSERVED_SIZE)
         given = options.escape_gap
-        escape = self.start_gap if isinstance(given, str) else given  # "start_gap"
+        # "start_gap": what the water does from there on ends no way and turns none back.
+        auto = isinstance(given, str) and isinstance(options.start_gap, str)
+        escape = self.far_gap if auto else self.start_gap if isinstance(given, str) else given
         observed[numbers.ZONE] = self.zone_distance
         observed[numbers.ESCAPE] = escape
         observed[numbers.REST_TIME] = self.rest_time()
@@ -315,7 +356,8 @@ class Encounter:
         largest = largest_displacement(
             self.options.delta_max, shapes[0], angles[0], shapes[1], angles[1]
         )
-        place = place_pair(shapes, angles, share * largest, self.start_gap)
+        offset = share * largest * self.bent
+        place = place_pair(shapes, angles, offset, self.start_gap)
         if isinstance(self.options.start_gap, str):
             # Forces between the centres do not know how thin the outlines are.
             clear = sum(shape.equivalent_radius for shape in shapes) + self.start_gap
@@ -334,6 +376,18 @@ class Encounter:
         place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
         velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
         return work_of(self.scene, place, velocity)
+
+
+@functools.lru_cache(maxsize=1024)
+def offset_near(ratio: float, speeds: float, gap: float) -> float:
+    """Offset of two settling spheres at a gap over r_i + r_j over that far away, of r_j/r_i and
+    w_i/w_j."""
+    # By nodes of the ratio, as the tables: functions of any other take half a second.
+    found = sum(
+        weight * bend(SpherePair(node_radii(place)), (speeds, 1.0), 2.0 * (1.0 + gap))
+        for place, weight in slots(ratio)
+    )
+    return math.exp(-found)
 
 
 def resisting(system: System, body: Body) -> tuple[float, float, float]:

@@ -57,6 +57,7 @@ from flocsim.forces import (
     DoubleLayer,
     Gravity,
     Lubrication,
+    PairResistance,
     StokesDrag,
     Thermal,
     VanDerWaals,
@@ -512,6 +513,7 @@ FORCES: dict[str, type] = {
     "double_layer": DoubleLayer,
     "contact": Contact,
     "lubrication": Lubrication,
+    "hydrodynamics": PairResistance,
     "thermal": Thermal,
 }
 """Name of the table [forces.NAME] → class, in the order of Config.forces."""

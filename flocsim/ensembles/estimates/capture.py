@@ -51,6 +51,7 @@ from flocsim.ensembles.estimates.statistics import COUNTED, by_runs
 from flocsim.ensembles.kernels.sampling import as_draws
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import wilson
 from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, Events, kinds_of
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
@@ -437,7 +438,8 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         m, v, i, j = cell
         for name, value in (each.values | numerical[cell]).items():
             arrays[name][m, v, i, j] = arrays[name][m, v, j, i] = value
-    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays)
+    water = resistance_of_pairs(study.config.forces) is not None
+    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water)
 
 
 def fill_alike(arrays: dict[str, np.ndarray], meetings: Sequence[str], given: bool) -> None:

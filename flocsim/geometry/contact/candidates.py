@@ -73,7 +73,7 @@ def widest_cut(scene, work, ahead):
             fastest = max(fastest, outline_speed(scene, work, body))
         contact = max(contact, scene.bodies[body, at.RADIUS])
     skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
-    reach = max(0.0, scene.surface_reach, scene.centre_reach)
+    reach = max(0.0, scene.listed_reach, scene.centre_reach)
     return reach + widened(skin, 2.0 * fastest * ahead)
 
 
@@ -82,7 +82,7 @@ def list_pair(scene, work, pair, ahead):
     must be made again."""
     a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
     ox, oy = separation(scene, work, at.NOW, a, b)
-    reach = scene.surface_reach
+    reach = scene.listed_reach
     skin = skin_of(scene, work, a, b, ahead)
     apart = (
         length_of(ox, oy)

@@ -149,7 +149,7 @@ def went_too_far(scene, work, clock, step):
     if spent(scene, work, at.NEW) > 1.0:
         return True
     locate_contacts(scene, work, at.NEW)
-    if scene.surface_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
+    if scene.listed_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
         return False
     return overlooked(scene, work) or overtakes(scene, work, clock, step)
 
@@ -192,7 +192,7 @@ def advance(scene, work, observed, clock, counts, record):
 
     ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
     """
-    lists = has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0
+    lists = has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0
     lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
     limit, trials = math.inf, 0
     while clock[at.TIME] < clock[at.UNTIL]:
@@ -204,7 +204,7 @@ def advance(scene, work, observed, clock, counts, record):
         choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
         step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
-        if scene.surface_reach > 0.0:
+        if scene.listed_reach > 0.0:
             flag_near(scene, work, at.NOW, step)
         ratio = attempt(scene, work, clock, step)
         if work.tally[at.FULL] != at.NOTHING_FULL:

@@ -9,6 +9,7 @@ from flocsim.geometry.contact.points import locate_acting
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.grazing import grazing_force
 from flocsim.integrators.rhs.outline_sum import outlines_in
+from flocsim.integrators.rhs.pair_resistance import add_pair_resistance
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
 from flocsim.integrators.rhs.views import (
     add_force,
@@ -101,7 +102,7 @@ def rate_slips(work, state):
 
 def locate_touching(scene, work, state):
     """Contact geometry of a state, of the pairs through which forces act."""
-    if has(scene, CONTACT_FORCE) or scene.surface_reach > 0.0:
+    if has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0:
         locate_acting(scene, work, state)
 
 
@@ -127,6 +128,7 @@ def sum_other_forces(scene, work, time, state):
         add_surface_forces(scene, work, time, state)
     if has(scene, OUTLINE_PRESSURE):
         add_outline_forces(scene, work, time, state)
+    add_pair_resistance(scene, work, state)
 
 
 def sum_forces(scene, work, time, state):

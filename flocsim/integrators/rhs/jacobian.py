@@ -20,6 +20,7 @@ from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, 
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.pair_resistance import add_pair_damping
 from flocsim.integrators.rhs.stated_error import doubted
 from flocsim.integrators.rhs.surface_gap import (
     mean_direction,
@@ -346,6 +347,7 @@ def assemble_others(scene, work, time, remaining):
         add_surfaces(scene, work, time)
     if has(scene, OUTLINE_PRESSURE):
         add_outlines(scene, work, time)
+    add_pair_damping(scene, work)
 
 
 def assemble_jacobian(scene, work, time, remaining):

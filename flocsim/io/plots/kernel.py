@@ -15,6 +15,7 @@ from flocsim.io.results.schema import Results
 MICRO = 1e6
 MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
+WATER_WORDS = "with hydrodynamic interaction"
 
 
 def kernel_of(results: Results) -> Kernel:
@@ -53,7 +54,8 @@ def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
             axes.grid(axis="y", color="0.9", linewidth=0.6)
         panels[0].set_ylabel(label)
         legend(figure, panels[-1], kernel, colours)
-        figure.supxlabel(BOUND_WORDS, fontsize=7, color="0.4")
+        words = WATER_WORDS if kernel.water else BOUND_WORDS
+        figure.supxlabel(words, fontsize=7, color="0.4")
         return figure
 
 

@@ -131,13 +131,14 @@ def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -
 def results_in(file, replicates):
     """The Results in an open file."""
     table, rows = GROUPS["probabilities"].read(file["probabilities"]), file["replicates"]
+    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
     results = Results(
         types=table["type"],
         vertices=table["vertices"],
         delta=table["delta"],
         replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
         probabilities={name: table[name] for name in TABLE},
-        run={name: scalar_of(dataset) for name, dataset in file["run"].items()},
+        run=run,
         failures=rows["failure"].attrs["flag_meanings"].split(),
         flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
         pooled=read_group(file, "pooled", POOLED),
@@ -146,7 +147,7 @@ def results_in(file, replicates):
         outlines=read_group(file, "outlines", OUTLINES),
         count=len(rows["replicate"]),
         radii={name: table[name] for name in RADII},
-        kernel=read_kernel(file),
+        kernel=read_kernel(file, str(run.get("identity", ""))),
     )
     check_tables(results)
     if results.replicates is not None:

@@ -84,7 +84,8 @@ class Kernel:
     [m]; ``arrays`` {name: (mechanism, vertices, i, j)} as in KERNEL, symmetric in i and j.
 
     NaN where a pair was not run: bodies of one size do not meet by settling, and all of theirs is
-    0 but efficiencies, which are not known.
+    0 but efficiencies, which are not known. ``water``: whether the bodies moved the water around
+    each other.
     """
 
     mechanisms: tuple[str, ...]
@@ -92,6 +93,7 @@ class Kernel:
     labels: tuple[str, ...]
     radii: np.ndarray
     arrays: dict[str, np.ndarray]
+    water: bool = False
 
     def __attrs_post_init__(self):
         shape = (len(self.mechanisms), len(self.vertices), len(self.labels), len(self.labels))
@@ -126,10 +128,11 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def read_kernel(file: Any, group: Group = KERNEL_GROUP) -> Kernel | None:
+def read_kernel(file: Any, identity: str, group: Group = KERNEL_GROUP) -> Kernel | None:
     """The group of an open file, None where it has none; ValueError for values that cannot be.
 
-    ``group``: as the version of the file has it; what it lacks is NaN.
+    ``identity``: the text of what its rows follow from; ``group``: as the version of the file has
+    it; what it lacks is NaN.
     """
     if "kernel" not in file:
         return None
@@ -140,7 +143,12 @@ def read_kernel(file: Any, group: Group = KERNEL_GROUP) -> Kernel | None:
     arrays = {name: found.get(name, blank) for name in KERNEL}
     check_kernel(arrays)
     return Kernel(
-        tuple(found["mechanism"]), found["vertices"], tuple(found["i"]), found["r_eq"], arrays
+        tuple(found["mechanism"]),
+        found["vertices"],
+        tuple(found["i"]),
+        found["r_eq"],
+        arrays,
+        '"PairResistance"' in identity,
     )
 
 

@@ -99,6 +99,13 @@ def kernel_matrix(
     efficiencies are multiplied by, element by element; ``factors`` (i, j): those of "spheres"."""
     m, v = kernel.place_of(mechanism, vertices)
     bound = ["without hydrodynamic interaction: an upper bound"]
+    if kernel.water:
+        bound = ["with hydrodynamic interaction, of the outlines in the plane"]
+    if kernel.water and (curvilinear is not None or factors is not None):
+        raise UsageError(
+            "the study has the water between the bodies in it ([forces.hydrodynamics]): a "
+            "curvilinear factor would count it twice; leave it out"
+        )
     if (curvilinear is not None or factors is not None) and quantity not in OF_MODELS:
         raise UsageError(
             f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: take "

@@ -159,7 +159,8 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
 
 def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
     """The Results in an open file of an older version."""
-    kernel = read_kernel(file, groups["kernel"])
+    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    kernel = read_kernel(file, str(run.get("identity", "")), groups["kernel"])
     found = {name: group.read(file[name]) for name, group in groups.items()
              if name in file and name != "kernel"}  # fmt: skip
     table, rows = found["probabilities"], found["replicates"]
@@ -177,7 +178,7 @@ def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
     return Results(
         types=table["type"], vertices=table["vertices"], delta=table["delta"],
         replicates=filled(columns, rows), probabilities=filled(blank, table),
-        run={name: scalar_of(dataset) for name, dataset in file["run"].items()},
+        run=run,
         failures=file["replicates/failure"].attrs["flag_meanings"].split(),
         flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
         pooled=filled(pooled, found["pooled"]) if "pooled" in found else {},

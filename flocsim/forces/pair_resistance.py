@@ -1,0 +1,208 @@
+"""The water between two bodies: lubrication alone, or the resistance to all of their motion."""
+
+import functools
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+import flocsim.arrays as at
+from flocsim.body import NO_WATER, Body, Fluid
+from flocsim.compiler.disk_cache import kept
+from flocsim.constants import MINIMUM_GAP
+from flocsim.errors import RangeError, UsageError
+from flocsim.fields import quantity
+from flocsim.forces.base import Force, SurfaceForce
+from flocsim.forces.drag import StokesDrag
+from flocsim.forces.shape_drag import facts_of
+from flocsim.forces.thermal import Thermal
+from flocsim.hydrodynamics import pair, pair_table, two_spheres
+from flocsim.hydrodynamics.fading import FADES_FROM, fading
+
+NEAR = 0.5
+"""Gap of the outlines over the mean radius at which relative motion is that at the distance of the
+centres alone; from FADES_FROM of it on it goes over from that at the outlines."""
+
+
+@attrs.frozen
+class Lubrication(SurfaceForce):
+    """Resistance F = −6πγ r*² ḣ/h against a change of the gap h, r* = r_i r_j/(r_i + r_j).
+
+    Of two spheres that are close, h ≪ r*, and of other outlines at the smooth gap between them.
+    Below ``h_min`` [m], where surfaces are rough and the fluid is none any more, the resistance
+    stays what it is at h_min, so that bodies touch; ``cut`` [m]: the force ends there, and fades
+    from half of it on. Viscosity γ is the fluid's. A constant push F on the pair
+    makes h = h₀ exp(−F t/(6πγ r*²)), and van der Waals attraction at the surface gap
+    h² = h₀² − H_A t/(18πγ r*).
+
+    Source: Kim and Karrila (1991), Microhydrodynamics, ch. 9; the leading term of two spheres.
+    """
+
+    h_min: float = quantity(
+        "m", above=0.0, default=MINIMUM_GAP, help="the resistance grows no further below this gap"
+    )
+    cut: float = quantity(
+        "m",
+        above=0.0,
+        default=1e-5,
+        help="gap at which the force ends; it fades from half of it on",
+    )
+
+    def __attrs_post_init__(self) -> None:
+        if self.h_min > FADES_FROM * self.cut:
+            raise RangeError(
+                f"h_min must be at most half of cut, found {self.h_min:g} m with a cut of "
+                f"{self.cut:g} m"
+            )
+
+    @property
+    def reach(self) -> float:
+        """``cut`` [m]."""
+        return self.cut
+
+    @staticmethod
+    def kernel(pair, viscosity, h_min, cut):
+        """−6πγ r*² ḣ/h [N]."""
+        share, _ = fading(pair.gap, cut)
+        resistance = 6.0 * math.pi * viscosity * pair.reduced_radius**2 / max(pair.gap, h_min)
+        return -share * resistance * pair.gap_rate
+
+    @staticmethod
+    def slope(pair, viscosity, h_min, cut):
+        """Its derivative by the gap [N/m], none below h_min."""
+        if pair.gap <= h_min:
+            return 0.0
+        share, fall = fading(pair.gap, cut)
+        squeezed = 6.0 * math.pi * viscosity * pair.reduced_radius**2 * pair.gap_rate
+        return squeezed / pair.gap * (share / pair.gap - fall)
+
+
+@attrs.frozen
+class PairResistance(Force):
+    """What two bodies' motion, and a flow's strain, put on both through the water between them.
+
+    The resistance of two spheres of their equivalent radii to slow flow, exactly, less the Stokes
+    drag that each has alone, which StokesDrag gives. It is symmetric and, with that, positive: no
+    work is got back. The motion that the two have in common counts at the distance of their
+    centres; that against each other, along and across their line, at the gap of their outlines
+    where that is below half the mean radius. Below the gap ``h_min`` [m], where surfaces are rough,
+    the resistance stays what it is there, so that bodies touch. ``cut``: gap over r_i + r_j
+    at which all of it ends; it fades from half of that on, where it moves two settling bodies by
+    less than a tenth of their speed, in proportion to 1/gap.
+
+    Two free bodies, radii up to 50 times each other, gaps from 1e-7 mean radii on. Sources: Jeffrey
+    and Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
+    """
+
+    h_min: float = quantity(
+        "m", above=0.0, default=MINIMUM_GAP, help="the resistance grows no further below this gap"
+    )
+    cut: float = quantity(
+        "",
+        at_least=5.0,
+        at_most=0.5 * pair_table.FARTHEST,
+        default=20.0,
+        help="gap over r_i + r_j at which it ends; it fades from half of it on",
+    )
+
+    @staticmethod
+    def kernel(view):
+        """Nothing: what is computed follows from tables (integrators/rhs/pair_resistance.py)."""
+        raise NotImplementedError("a pair resistance is no kernel")
+
+
+def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
+    """The pair resistance among some forces; None without. UsageError for several, or beside a
+    force that it does not go with."""
+    forces = list(forces)
+    found = [force for force in forces if isinstance(force, PairResistance)]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise UsageError("there is one PairResistance at most, found more: leave all but one out")
+    for force in forces:
+        if isinstance(force, Lubrication):
+            raise UsageError(
+                "Lubrication is a part of PairResistance and would count twice: leave one of them "
+                "out"
+            )
+        if isinstance(force, Thermal) and not force.absent:
+            raise UsageError(
+                "thermal kicks do not go with PairResistance, for they would have to be correlated "
+                "between bodies as it is: leave Thermal or PairResistance out"
+            )
+    drags = [force for force in forces if isinstance(force, StokesDrag)]
+    if len(drags) != 1 or drags[0].law == "schiller_naumann" or not drags[0].rotational:
+        raise UsageError(
+            "PairResistance is what two bodies add to the drag of each in slow flow: give one "
+            'StokesDrag beside it, of the law "stokes" or "shape" and with rotational = true'
+        )
+    return found[0]
+
+
+def refuse_pair_resistance(forces: Iterable[Force], what: str) -> None:
+    """UsageError where there is a pair resistance, which ``what`` cannot have."""
+    if any(isinstance(force, PairResistance) for force in forces):
+        raise UsageError(
+            f"PairResistance is of two bodies, and {what} cannot have it: of many its sum over "
+            "pairs would not be positive; leave it out"
+        )
+
+
+def water_between(
+    forces: Iterable[Force], bodies: Sequence[Body], fluid: Fluid
+) -> tuple[np.ndarray, np.ndarray]:
+    """(``Scene.pair_table``, ``Scene.water``) of two bodies; those of none without a
+    PairResistance, or for a lone body. UsageError where tables do not reach."""
+    force = resistance_of_pairs(forces)
+    if force is None or len(bodies) < 2:
+        return NO_WATER
+    if len(bodies) > 2:
+        refuse_pair_resistance([force], f"a System of {len(bodies)} bodies")
+    if any(body.fixed for body in bodies):
+        raise UsageError(
+            "PairResistance is of two free bodies, and one is fixed: free it, or leave "
+            "PairResistance out"
+        )
+    first, second = (body.shape.equivalent_radius for body in bodies)
+    mean = 0.5 * (first + second)
+    if not pair_table.NEAREST * mean <= force.h_min <= 0.1 * mean:
+        raise UsageError(
+            f"h_min of PairResistance must be {pair_table.NEAREST:g} to .1 of the mean radius of "
+            f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
+        )
+    water = np.zeros(at.WATER_SIZE)
+    water[[at.VISCOSITY, at.MEAN_RADIUS, at.FLOOR]] = fluid.viscosity, mean, force.h_min
+    water[at.CUT], water[at.NEAR_CUT] = force.cut * 2.0 * mean, NEAR * mean
+    water[at.FLOW : at.FLOW + 6] = fluid.flow
+    table = unit_table(second / first) * pair_table.scales(fluid.viscosity, mean)[:, None]
+    return table, water
+
+
+def stand_in(force: PairResistance) -> Lubrication:
+    """A force between outlines that changes as fast as the resistance does."""
+    return Lubrication(force.h_min, force.h_min / FADES_FROM * 1e3)
+
+
+@functools.lru_cache(maxsize=256)
+def unit_table(ratio: float) -> Any:
+    """``Scene.pair_table`` of a mean radius and a viscosity of 1, r₂/r₁ = ``ratio``."""
+    if not 1.0 / pair_table.LARGEST_RATIO <= ratio * (1.0 + 1e-9) <= 1.0001 * 50.0:
+        raise UsageError(
+            f"the radii of two bodies with PairResistance must be up to "
+            f"{pair_table.LARGEST_RATIO:g} times each other, found {max(ratio, 1.0 / ratio):.4g}"
+        )
+    values = sum(weight * kept_node(place) for place, weight in pair_table.slots(ratio))
+    return pair_table.cubics(np.asarray(values))
+
+
+@functools.cache
+def kept_node(place: int) -> np.ndarray:
+    """The columns of a node of the ratio, kept on the disk: a second to compute."""
+    if place < 0:
+        return pair_table.exchanged(kept_node(-place))
+    facts = facts_of(pair_table, pair, two_spheres)
+    data = kept("flocsim_pair", f"{place} {facts}", lambda: pair_table.node(place).tobytes())
+    return np.frombuffer(data).reshape(pair_table.NODES, -1)
