@@ -89,8 +89,8 @@ def test_another_seed_draws_other_collisions(tmp_path, alone):
 def test_results_hold_what_was_run(study, alone, tmp_path):
     results = results_of(study)
     assert (results.types, list(results.vertices)) == (("I", "III"), [1, 4, 16])
-    first_and_second = COUNTED[: 2 * len(CODES)]
-    table = tabulate(*(alone[name] for name in first_and_second))
+    all_but_outlines = COUNTED[: 3 * len(CODES)]
+    table = tabulate(*(alone[name] for name in all_but_outlines))
     for name in table:
         np.testing.assert_array_equal(results.probabilities[name], table[name])
     assert table["n_total"].sum() == 36

@@ -79,17 +79,17 @@ def test_sums_of_blocks_add_up():
     random = np.random.default_rng(3)
     columns = [
         np.concatenate(each, axis=-1)
-        for each in zip(*(codes(random.choice([A, B, C, D, MISSED], 40)) for _ in range(4)),
+        for each in zip(*(codes(random.choice([A, B, C, D, MISSED], 40)) for _ in range(5)),
                         strict=True)
     ]  # fmt: skip
-    first, checked, closer, wider = (
-        [column[..., 40 * run : 40 * run + 40].copy() for column in columns] for run in range(4)
+    first, checked, third, closer, wider = (
+        [column[..., 40 * run : 40 * run + 40].copy() for column in columns] for run in range(5)
     )
-    for run in (checked, closer, wider):
+    for run in (checked, third, closer, wider):
         for column in run:
             column[..., :10] = NOT_APPLICABLE
-    every = [*first, *checked, *closer, *wider]
-    assert len(every) == len(COUNTED) == 4 * len(CODES)
+    every = [*first, *checked, *third, *closer, *wider]
+    assert len(every) == len(COUNTED) == 5 * len(CODES)
 
     def read(start, stop):
         return tuple(column[..., start:stop] for column in every)
