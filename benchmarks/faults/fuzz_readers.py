@@ -215,6 +215,7 @@ class JournalReader:
     def rows(self):
         """Two good rows."""
         from flocsim.ensembles.chunks import ROW
+        from flocsim.io.results.checks import FURTHER_RUNS
         from flocsim.io.results.schema import SHAPE_COLUMNS
 
         rows = np.zeros(2, ROW)
@@ -222,8 +223,9 @@ class JournalReader:
         rows["r_i"], rows["r_j"], rows["D_0"] = 1e-5, 2e-5, 4e-5
         for name in SHAPE_COLUMNS:
             rows[name] = 1.0
-        for name in ("outcome", "inside", "bond"):
-            rows[f"checked_{name}"], rows[f"third_{name}"] = (rows[name][0], 255), 255
+        for run in FURTHER_RUNS:
+            for name in ("outcome", "inside", "bond"):
+                rows[f"{run}_{name}"] = rows[name][0], 255
         return rows
 
     def make(self, rng, folder):

@@ -23,7 +23,7 @@ from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
-from flocsim.io.shapes.fit_report import coarse_line, format_errors, plural, summary_text
+from flocsim.io.shapes.fit_report import coarse_line, errors_of, format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
 from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.ranges import PIXEL_SIZE
@@ -196,8 +196,8 @@ def run(args: argparse.Namespace) -> int:
     if args.fits is not None:
         draw_fits(args.fits, pictures, fits, options, drawn)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
-    if coarse := coarse_line({each.floc_id: each.errors for each in entries}):
-        report(f"warning: {coarse} (--vertices)")
+    if coarse := coarse_line(errors_of(entries)):
+        print(f"warning: {coarse} (--vertices)")
     counts = ", ".join(map(str, options.vertices))
     print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:

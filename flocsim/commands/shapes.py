@@ -11,7 +11,7 @@ from flocsim.commands import SUMMARIES
 from flocsim.commands.fit import number
 from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.shapes.fit_report import coarse_line, plural
+from flocsim.io.shapes.fit_report import coarse_line, errors_of, plural
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
 from flocsim.io.shapes.population import measures_in, population_lines
 
@@ -77,7 +77,7 @@ def run_list(args: argparse.Namespace) -> int:
             print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
         if entries:
             print("\n".join(population_lines(entries)))
-        if coarse := coarse_line({each.floc_id: each.errors for each in entries}):
+        if coarse := coarse_line(errors_of(entries)):
             print(f"warning: {coarse}: fit again with more --vertices")
         if any(each.measures is None for each in entries):
             print("shape measures of the finest fit where the library has none of the picture")

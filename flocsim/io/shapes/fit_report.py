@@ -93,6 +93,16 @@ def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
     )
 
 
+def errors_of(entries: Sequence[ShapeEntry]) -> dict[str, dict[int, float]]:
+    """{floc: {N: RE [%]}} at the smallest spheroradius, of flocs that are larger than that: what a
+    disk cannot follow, more vertices do not mend."""
+    least = min((each.spheroradius for each in entries), default=0.0)
+    return {
+        each.floc_id: {count: fit.relative_error for count, fit in each.fits.items()}
+        for each in entries if each.spheroradius == least < each.equivalent_radius
+    }  # fmt: skip
+
+
 def format_errors(entries: Sequence[ShapeEntry]) -> str:
     """A table of the mean relative error [%] of ShapeEntries by N and size class, for each r."""
     lines = []

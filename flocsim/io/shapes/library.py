@@ -215,11 +215,6 @@ class ShapeEntry:
         return self.equivalent_radius * self.pixel_size
 
     @property
-    def errors(self) -> dict[int, float]:
-        """{N: RE [%]} of its fits."""
-        return {count: fit.relative_error for count, fit in self.fits.items()}
-
-    @property
     def is_banded(self) -> bool:
         """Whether the ends of its band were fitted."""
         return bool(self.closer and self.wider)

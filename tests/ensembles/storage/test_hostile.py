@@ -103,7 +103,8 @@ def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
      ("angle_i", np.nan), ("t_end", np.inf), ("d_c_last", np.nan),
      ("r_i", 0.0), ("r_j", np.inf), ("D_0", np.nan), ("d_c_over_D_0", 0.5),
      ("checked_outcome", 8), ("checked_inside", 2), ("checked_bond", 0),
-     ("third_outcome", 8), ("third_outcome", 0), ("third_inside", 2), ("third_bond", 0)],
+     ("third_outcome", 8), ("third_outcome", 0), ("third_inside", 2), ("third_bond", 0),
+     ("closer_outcome", 8), ("wider_inside", 2), ("wider_bond", 0)],
 )  # fmt: skip
 def test_rows_that_no_run_has_given_are_computed_again(reader, tmp_path, column, value):
     session, (kind, description, _), second = reader.parts
