@@ -41,6 +41,7 @@ def parse_arguments():
     parser.add_argument("--launch", metavar="COMMAND", help='e.g. "mpirun -n 2" or "srun"')
     parser.add_argument("--readings", action="store_true", help="run the other readings too")
     parser.add_argument("--reading-replicates", type=int, default=100, metavar="N")
+    parser.add_argument("--swarms", type=int, default=12, metavar="N", help="of claim 26")
     parser.add_argument("-o", "--output", type=Path, default=Path("tang2014"), metavar="DIR")
     return parser.parse_args()
 
@@ -172,7 +173,8 @@ def main():
     ensemble(arguments, folder / "study.h5", arguments.replicates, changes)
     readings = run_readings(arguments) if arguments.readings else {}
     if not (folder / "several.csv").exists():
-        steps.call(folder, "several", sys.executable, HERE / "several.py", "-o", folder)
+        swarms = "--swarms", arguments.swarms, "-o", folder
+        steps.call(folder, "several", sys.executable, HERE / "several.py", *swarms)
     write_pages(arguments, changes, readings)
 
 

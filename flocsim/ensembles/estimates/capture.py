@@ -47,7 +47,7 @@ from flocsim.ensembles.estimates.numerical import (
     most_exact,
     run_so,
 )
-from flocsim.ensembles.estimates.statistics import COUNTED, by_runs
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
 from flocsim.ensembles.kernels.sampling import as_draws
 from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
@@ -248,7 +248,7 @@ def estimate(
 ) -> Estimated:  # fmt: skip
     """What the points of a condition come to; ``most_unknown``: share of the flux that may be
     unknown where there is an estimate."""
-    first, *runs = by_runs([rows[name] for name in COUNTED])[:3]
+    first, *runs = by_runs([rows[name] for name in EXACT_RUNS])
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
     known = run_so(exact) & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
     moved = [np.where(known, *pair) for pair in zip(exact, first, strict=True)]

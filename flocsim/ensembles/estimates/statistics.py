@@ -47,9 +47,13 @@ COUNTED = tuple(f"{run}{name}" for run in ("", *(f"{each}_" for each in FURTHER_
 cut otherwise."""
 
 
+EXACT_RUNS = COUNTED[: 3 * len(CODES)]
+"""The columns of the first, second and third runs, with outlines as they were cut."""
+
+
 def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:
-    """CODES of first, second and third runs, from columns in the order of COUNTED."""
-    return [columns[k : k + len(CODES)] for k in range(0, len(COUNTED), len(CODES))]
+    """CODES of each run, from columns in the order of COUNTED, all of them or the first ones."""
+    return [columns[k : k + len(CODES)] for k in range(0, len(columns), len(CODES))]
 
 
 def tabulate(

@@ -15,7 +15,7 @@ from flocsim.ensembles.estimates.paired import (
     joined,
     of_each_scramble,
 )
-from flocsim.ensembles.estimates.statistics import COUNTED, by_runs
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
 from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.report import SCRAMBLES
 from flocsim.io.confidence import proportion, scrambled_proportion
@@ -110,7 +110,7 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
     )
     scrambles = [int(each.run.get(SCRAMBLES, 0)) for each in (first, second)]
     kept = pairs if paired else None
-    codes = [by_runs([each[name][..., :kept] for name in COUNTED]) for each in rows]
+    codes = [by_runs([each[name][..., :kept] for name in EXACT_RUNS]) for each in rows]
     trials = [compared_events(*each[0]) for each in codes]
     changes = (
         change_of_differences(codes[0], codes[1], compared_events)
@@ -142,7 +142,7 @@ def places(results, wanted):
 def picked(results, wanted):
     """The columns that are compared, at the wanted conditions."""
     at = np.ix_(*places(results, wanted))
-    return {name: results.replicates[name][at] for name in ("angle_i", "angle_j", *COUNTED)}
+    return {name: results.replicates[name][at] for name in ("angle_i", "angle_j", *EXACT_RUNS)}
 
 
 def compared_events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, Events]:

@@ -43,7 +43,7 @@ def test_a_reading_is_another_config(name):
     ("vertices", "animations"), [("1,4", 0), pytest.param("1,64", 1, marks=pytest.mark.slow)]
 )
 def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
-    words = ["--replicates", "4", "--vertices", vertices]
+    words = ["--replicates", "4", "--swarms", "1", "--vertices", vertices]
     done = reproduce(tmp_path, *words)
     assert (done.returncode, problems(done.stderr)) == (0, [])
     out = tmp_path / "out"
