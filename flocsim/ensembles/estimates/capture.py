@@ -58,7 +58,7 @@ from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
-COLUMNS = (*COUNTED, "floc_i", "floc_j")
+COLUMNS = (*EXACT_RUNS, "floc_i", "floc_j")
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
 

@@ -46,7 +46,6 @@ COUNTED = tuple(f"{run}{name}" for run in ("", *(f"{each}_" for each in FURTHER_
 """All columns that are counted: of first runs, of those run again, a third time, and with outlines
 cut otherwise."""
 
-
 EXACT_RUNS = COUNTED[: 3 * len(CODES)]
 """The columns of the first, second and third runs, with outlines as they were cut."""
 
