@@ -5,7 +5,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
-from flocsim.ensembles.estimates.statistics import COUNTED, tabulate
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
 from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.unfinished import read_unfinished
 from flocsim.errors import FileError
@@ -45,7 +45,7 @@ def test_the_counts_are_those_of_the_rows_there_are(tmp_path):
     before = (tmp_path / "r.h5.journal").read_bytes()
     found = read_unfinished(tmp_path / "r.h5.journal")
     codes = [RESULTS.replicates[name] for name in ("outcome", "inside", "bond")]
-    again = [RESULTS.replicates[name] for name in COUNTED[3:]]
+    again = [RESULTS.replicates[name] for name in EXACT_RUNS[3:]]
     whole = tabulate(*codes, *again)
     part = tabulate(*(each[1:, 1:, :1, 10:25] for each in [*codes, *again]))
     for name in ("n_class", "pr_a", "pr_a_low", "n_checked"):

@@ -67,7 +67,7 @@ def test_a_scene_has_one_temperature():
     ("key", "value", "words"),
     [
         ("temperature", -1.0, "temperature must be a finite number at least 0"),
-        ("temperature", "25 degC", "does not count from zero: give kelvins"),
+        ("temperature", "77 degF", "does not count from zero: give kelvins, or degC"),
         ("kick", 0.0, "kick must be 'auto' or a finite number above 0"),
         ("finest", "1 s", "finest must be"),
     ],

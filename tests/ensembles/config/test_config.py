@@ -27,7 +27,7 @@ from tests.helpers.small_study import write_star_library
 
 ROOT = Path(__file__).resolve().parents[3]
 
-UNASKED = {"lubrication", "thermal"}
+UNASKED = {"lubrication", "thermal", "hydrodynamics"}
 """Forces that no preset has."""
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from flocsim.ensembles import cli, pairs
+from flocsim.ensembles import cli
+from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME

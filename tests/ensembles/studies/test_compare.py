@@ -10,7 +10,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.estimates.paired import between, newcombe
-from flocsim.ensembles.estimates.statistics import COUNTED, tabulate
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
 from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results, write_results
 from tests.helpers.synthetic_results import make_results
@@ -27,7 +27,7 @@ def changed(path, results, **columns):
     """The results with other columns of replicates, counted anew, in a file."""
     rows = results.replicates | columns
     codes = [rows[name] for name in ("outcome", "inside", "bond")]
-    again = {name: rows[name] for name in COUNTED[3:]}
+    again = {name: rows[name] for name in EXACT_RUNS[3:]}
     table = tabulate(*codes, **again)
     made = attrs.evolve(results, replicates=rows, probabilities=table, pooled={}, differences={})
     write_results(path, made)

@@ -66,4 +66,4 @@ def test_surface_forces_and_rejected_steps_start_afresh(staged, began, reach, kn
     scene = System([Body(Sphere(1e-5), density=2650.0)], [Gravity()], Implicit()).scene(jit=False)
     clock = np.zeros(at.CLOCK_SIZE)
     clock[at.TIME], clock[at.STAGED_STEP], clock[at.STAGED_AT] = 0.5, staged, began
-    assert bool(is_tried_again(scene._replace(surface_reach=reach), clock)) == known
+    assert bool(is_tried_again(scene._replace(listed_reach=reach), clock)) == known
