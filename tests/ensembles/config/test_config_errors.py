@@ -9,7 +9,7 @@ from tests.helpers.small_study import VALID, load_text, problem_lines
 
 # One wrong entry laid into an otherwise valid file → what its line says.
 WRONG = {
-    'preset = "tang"': "preset must be 'tang2014', 'tang2014-literal', 'si' or 'clay', found 'tang' (did",
+    'preset = "tang"': "preset must be 'tang2014', 'tang2014-literal', 'si' or 'clay', found",
     "seed = true": "seed must be an integer from 0 to 9223372036854775807, found true",
     "seed = -1": "found -1",
     "replicates = 2.7": "replicates must be an integer from 1 to 1000000000, found 2.7",
