@@ -137,7 +137,12 @@ class Fluid:
         ]  # fmt: skip
         if not given or not all(map(is_number, given)):
             return otherwise
-        return law(self.temperature or ROOM_TEMPERATURE, self.salinity or 0.0)
+        return law(self.warmth, self.salinity or 0.0)
+
+    @property
+    def warmth(self) -> float:
+        """The temperature [K] that its laws are taken at."""
+        return self.temperature or ROOM_TEMPERATURE
 
     @property
     def ions(self) -> float | None:
@@ -157,14 +162,12 @@ class Fluid:
         """1/κ [m]; None where no salt is given, or none is in it."""
         if not self.ions:
             return None
-        warmth = self.temperature or ROOM_TEMPERATURE
-        return water.debye_length(warmth, self.ions, self.permittivity)
+        return water.debye_length(self.warmth, self.ions, self.permittivity)
 
     @property
     def words(self) -> str:
         """What water it is, and what follows from that; "" where nothing is said of it."""
-        warmth = self.temperature or ROOM_TEMPERATURE
-        said = [f"{warmth - water.ZERO_CELSIUS:.4g} degC"]
+        said = [f"{self.warmth - water.ZERO_CELSIUS:.4g} degC"]
         if self.salinity is not None:
             said.append(f"{self.salinity:g} g/kg of salt")
         if self.ionic_strength is not None:

@@ -28,6 +28,13 @@ def of_each_scramble(first: int, scrambles: int) -> list[slice]:
     return [slice((s - first) % scrambles, None, scrambles) for s in range(scrambles)]
 
 
+def sums_of_scrambles(flags: np.ndarray, first: int, scrambles: int) -> np.ndarray:
+    """Whole numbers (…, scramble): how many flags (…, replicate) are set in each scramble."""
+    parts = [flags[..., part].sum(axis=-1, dtype=np.int64)
+             for part in of_each_scramble(first, scrambles)]  # fmt: skip
+    return np.stack(parts, axis=-1)
+
+
 def joint_counts(
     outcome: np.ndarray, inside: np.ndarray, first: int = 0, scrambles: int = 0
 ) -> np.ndarray:

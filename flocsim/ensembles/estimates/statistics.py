@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
-from flocsim.ensembles.estimates.paired import of_each_scramble
+from flocsim.ensembles.estimates.paired import sums_of_scrambles
 from flocsim.errors import UsageError
 from flocsim.io.confidence import (
     bounded_sums,
@@ -187,10 +187,7 @@ def scrambled_sums(
         return {}
     found = {}
     for name, each in events(*codes).items():
-        flags = np.stack(each)
-        parts = [flags[..., part].sum(axis=-1, dtype=np.int64)
-                 for part in of_each_scramble(first, scrambles)]  # fmt: skip
-        sums = np.stack(parts, axis=-1)
+        sums = sums_of_scrambles(np.stack(each), first, scrambles)
         found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if last_axis(name) else sums
     return found
 

@@ -14,6 +14,7 @@ from flocsim.ensembles.estimates.paired import (
     change_of_differences,
     joined,
     of_each_scramble,
+    sums_of_scrambles,
 )
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
 from flocsim.ensembles.pairs.opened import StudyResults
@@ -199,17 +200,8 @@ def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, n
     found = proportion(successes, trials, unknown=unknown)
     if not scrambles:
         return found
-    sums = [
-        np.stack(
-            [
-                flags[..., part].sum(axis=-1, dtype=np.int64)
-                for part in of_each_scramble(0, scrambles)
-            ],
-            axis=-1,
-        )
-        for flags in each
-    ]
-    return found[0], *scrambled_proportion(sums[1], sums[0], sums[2])[:2]
+    tried, came, left = sums_of_scrambles(np.stack(each), 0, scrambles)
+    return found[0], *scrambled_proportion(came, tried, left)[:2]
 
 
 def told(s, n, t, m, ends):
