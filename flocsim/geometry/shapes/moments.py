@@ -198,12 +198,11 @@ QUADRATURE_NODES, QUADRATURE_WEIGHTS = np.polynomial.legendre.leggauss(16)
 FAINT = 1e-3
 """Bends below this angle are resolved by geometry: distances there differ by less than 1e-7."""
 
-COVERED = 1.0 - 1e-9
-"""A point nearer to the core than this share of the radius is inside the swept shape."""
-
-
 SHARED = 1e-9
 """Outlines of two parts that are nearer than this share of the radius run along each other."""
+
+ROUNDED = 1e-14
+"""By this share of the body's extent rounding may move a place on the offset of a core."""
 
 
 def exposed(points, normals, owners, parts):
@@ -213,22 +212,24 @@ def exposed(points, normals, owners, parts):
     for number, part in enumerate(parts):
         count = sum(len(ring) for ring in part.rings)
         for rows in np.array_split(np.arange(len(points)), 1 + len(points) * count // 200_000):
-            seen[rows] &= ~covered(points[rows], normals[rows], owners[rows] > number, part)
+            seen[rows] &= ~covered(points[rows], normals[rows], owners[rows] - number, part)
     return seen
 
 
-def covered(points, normals, later, part):
+def covered(points, normals, after, part):
     """Which of the points a part covers. Of pieces that two parts share, that of the earlier one
-    counts: ``later`` says which points belong to a later one. Where they share it back to back,
-    both count, in opposite senses."""
+    counts: ``after`` says by how many parts that of each point comes after this one. Where they
+    share it back to back, both count, in opposite senses."""
+    later = after > 0
     away = from_rings(points, part.rings)
     distance = np.hypot(away[..., 0], away[..., 1])
     nearest = distance.argmin(axis=1)
     least = distance[np.arange(len(points)), nearest]
-    found = (least < COVERED * part.radius) | inside_rings(points, part.rings)
+    depth = np.where(after == 0, ROUNDED * np.abs(points).max(initial=0.0), SHARED * part.radius)
+    found = (least < part.radius - depth) | inside_rings(points, part.rings)
     if later.any():
         foot = away[np.arange(len(points)), nearest]
-        shared = (least < (2.0 - COVERED) * part.radius) & later
+        shared = (least < (1.0 + SHARED) * part.radius) & later
         found |= shared & (np.einsum("ij,ij->i", foot, normals) > 0.0)
     return found
 
