@@ -11,8 +11,8 @@ from pathlib import Path
 
 import attrs
 
-from flocsim.io.markdown import markdown_table
 from flocsim.io.provenance import processor
+from flocsim.io.terminal import markdown_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("numba", "llvmlite", "numpy", "scipy")

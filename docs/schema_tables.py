@@ -15,7 +15,6 @@ from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, keys_of
 from flocsim.errors import UsageError
-from flocsim.io.markdown import markdown_table
 from flocsim.io.results.kernel_group import KERNEL
 from flocsim.io.results.schema import (
     COORDINATES,
@@ -26,6 +25,7 @@ from flocsim.io.results.schema import (
     REPLICATES,
     TABLE,
 )
+from flocsim.io.terminal import markdown_table
 
 DOCS = Path(__file__).parent
 

@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from flocsim import hydrodynamics as hydrodynamics
     from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
+    from flocsim.ensembles.comparison import compare
+    from flocsim.ensembles.contents import open_any as open
     from flocsim.ensembles.pairs.comparison import Comparison
     from flocsim.ensembles.pairs.opened import StudyResults
-    from flocsim.ensembles.studies.compare import compare
-    from flocsim.ensembles.studies.opened import open_any as open
     from flocsim.ensembles.studies.study import Study
     from flocsim.ensembles.studies.sweep import sweep
     from flocsim.ensembles.swarms.comparison import SwarmComparison
@@ -56,10 +56,10 @@ HOMES = {
     "SweepResults": "io.results.sweep_file",
     "System": "system",
     "Trajectory": "trajectories.trajectory",
-    "compare": "ensembles.studies.compare",
+    "compare": "ensembles.comparison",
     "curvilinear_factor": "io.results.curvilinear",
     "floor": "swarms.walls",
-    "open": "ensembles.studies.opened:open_any",
+    "open": "ensembles.contents:open_any",
     "sweep": "ensembles.studies.sweep",
     "wall": "swarms.walls",
 }

@@ -69,8 +69,7 @@ INNER_ROWS = {
     ],
     "ensembles": [
         ["cli", "studies"],
-        ["runner", "unfinished"],
-        ["kinds"],
+        ["runner"],
         ["pairs", "strength", "swarms"],
         ["comparison", "dry_run", "report"],
         ["parallel"],
@@ -79,9 +78,8 @@ INNER_ROWS = {
         ["contents"],
         ["storage"],
         ["kernels"],
-        ["study", "doubts", "equivalent_spheres"],
+        ["study", "equivalent_spheres"],
         ["preflight"],
-        ["impact"],
         ["collision"],
         ["kind"],
         ["config", "chunks"],
@@ -93,13 +91,11 @@ INNER_ROWS = {
         ["outputs", "opening", "groups"],
         [
             "files",
-            "own_mark",
             "hdf5",
             "json_text",
             "labelled",
             "provenance",
             "confidence",
-            "markdown",
             "terminal",
         ],
         ["pieces"],
@@ -108,7 +104,7 @@ INNER_ROWS = {
 
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {
-    "mpi4py": ["ensembles/parallel/mpi.py"],
+    "mpi4py": ["ensembles/parallel/communicator.py"],
     "h5py": [
         "io/opening.py",
         "io/groups.py",
@@ -119,7 +115,7 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
-    "gsd": ["io/exchange/gsd_file.py"],
+    "gsd": ["io/exchange.py"],
     "xarray": ["io/labelled.py"],
     "pandas": ["io/labelled.py"],
 }

@@ -29,8 +29,7 @@ from flocsim.ensembles.pilot.choice import (
     sampling_error,
 )
 from flocsim.ensembles.pilot.ladder import DECADES, at_rung, scene_length
-from flocsim.ensembles.pilot.sample import sample_of
-from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
+from flocsim.ensembles.pilot.trials import Job, is_flip, sample_of, try_out
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from flocsim.io.confidence import wilson

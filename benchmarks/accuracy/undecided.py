@@ -24,7 +24,7 @@ from flocsim.ensembles.estimates.statistics import (
     probabilities,
     tabulate,
 )
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.runner import run
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.kernel_group import ESTIMATES

@@ -52,7 +52,7 @@ def group_of(group):
 """,
     "shear": """\
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 
 config = load_any_config(Path(sys.argv[1]))
 study = study_of(config)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from flocsim.ensembles.collision.checking import MORE_STEPS, count_checks
 from flocsim.ensembles.collision.draw import CHECKED
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 
 SIZES = ("4 um", "5 um", "6 um", "8 um", "10 um", "13 um", "16 um", "20 um", "25 um")
 POINTS = 4096

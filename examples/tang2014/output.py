@@ -10,7 +10,7 @@ from pathlib import Path
 
 from flocsim.io.files import write_file
 from flocsim.io.outputs import data_rule, figure_rule
-from flocsim.io.own_mark import marked as with_own_mark
+from flocsim.io.outputs import marked as with_own_mark
 
 FORMATS = ("png", "pdf")
 

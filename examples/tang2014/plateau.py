@@ -23,8 +23,8 @@ from flocsim.ensembles.collision.zone import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
 from flocsim.io.confidence import proportion
-from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
+from flocsim.io.terminal import markdown_table
 from flocsim.io.trajectory import centre_distance
 from flocsim.plausibility.settling import terminal_motion
 

@@ -15,8 +15,8 @@ from output import marked, save_all, write_page, write_table
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
 from flocsim.ensembles.config.overrides import nested
-from flocsim.io.markdown import markdown_table
 from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
+from flocsim.io.terminal import markdown_table
 
 COLOURS, MARKERS = ("#0072B2", "#D55E00", "#009E73"), "osD"
 MOST_OPEN = 0.05

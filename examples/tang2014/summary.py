@@ -11,8 +11,8 @@ from claims.verdicts import interval_of
 from output import marked, write_page
 
 from flocsim.io.confidence import proportion
-from flocsim.io.markdown import markdown_table
 from flocsim.io.results.file import CLASSES
+from flocsim.io.terminal import markdown_table
 
 FLIP_KINDS = ("outcome", "aggregation", "zone")
 MOST_FLIPS, MOST_UNDECIDED = 0.5, 0.1

@@ -33,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: Namespace) -> int:
     """Print the comparison; the exit code."""
-    from flocsim.ensembles.studies.compare import compare
+    from flocsim.ensembles.comparison import compare
 
     both = [file_kind(source := held(path), "compare").opened(source)
             for path in (args.first, args.second)]  # fmt: skip

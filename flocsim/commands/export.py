@@ -10,7 +10,7 @@ import numpy as np
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.exchange.gsd_file import write_gsd
+from flocsim.io.exchange import write_gsd
 from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES

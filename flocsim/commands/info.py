@@ -5,7 +5,7 @@ from argparse import Namespace
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.ensembles.config.consent import read_sources
+from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
 from flocsim.errors import FileError, visible
 from flocsim.io.files import held
@@ -43,7 +43,7 @@ def run(args: Namespace) -> int:
         if args.config or args.modules or args.water:
             raise FileError(f"{journal} holds no config: it is of a run that has not ended")
         # All kinds of studies, and the engine with them, are wanted here alone.
-        from flocsim.ensembles.unfinished import read_unfinished
+        from flocsim.ensembles.storage.unfinished import read_unfinished
 
         print(unfinished_text(read_unfinished(journal)))
         return 0

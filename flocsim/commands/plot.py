@@ -103,7 +103,7 @@ def label(name):
 def read_content(path):
     """(Contents, what a file holds, what each figure of it has to say)."""
     if (journal := journal_of(path)) is not None:
-        from flocsim.ensembles.unfinished import read_unfinished
+        from flocsim.ensembles.storage.unfinished import read_unfinished
 
         begun = read_unfinished(journal)
         return contents_of(begun.kind), begun.results, begun.progress

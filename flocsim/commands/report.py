@@ -9,8 +9,7 @@ from flocsim.commands.reporting.page import report_page
 from flocsim.ensembles.contents import overview_of
 from flocsim.errors import UsageError
 from flocsim.io.files import held, write_file
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
-from flocsim.io.own_mark import marked
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule, marked
 from flocsim.io.plots.results import MOST_ROWS
 
 DESCRIPTION = """\

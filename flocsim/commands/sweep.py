@@ -102,8 +102,8 @@ def run_elasticities(args: Namespace, study: Any) -> int:
     from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.studies.elasticity import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
-    from flocsim.io.plots.elasticity import elasticities as figure_of
     from flocsim.io.plots.style import checked_format, save
+    from flocsim.io.plots.sweep import elasticities as figure_of
 
     if args.dry_run:
         raise UsageError("--dry-run is for --over: leave it out")

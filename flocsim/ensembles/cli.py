@@ -97,7 +97,7 @@ def read_config(arguments, sources, first):
     """The config of a study; on the ``first`` rank found to make one whose results can be written
     where they should go."""
     from flocsim.ensembles.config.loader import load_any_config
-    from flocsim.ensembles.kinds import kind_of
+    from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.preflight import inputs_of
 
     config = load_any_config(arguments.config, overrides(arguments), sources)
@@ -169,7 +169,7 @@ def own_config(comm, arguments):
 
 def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
-    from flocsim.ensembles.kinds import kind_of
+    from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
 
     output = config.output.file
@@ -209,7 +209,7 @@ def run_rank(comm, arguments):
     if config is None:
         return code
     if arguments.dry_run:
-        from flocsim.ensembles.kinds import kind_of
+        from flocsim.ensembles.kind import kind_of
 
         if comm.rank == 0:
             ranks = max(comm.size, arguments.jobs)

@@ -2,7 +2,7 @@
 
 Each kind gives its Contents, by which `open`, `info`, `plot`, `report`, `compare`, `sweep` and
 `export` read it and show it; they know no kind themselves. `flocsim.ensembles.config.kinds` is the
-table of all.
+table of all. `open_any` is `flocsim.open`, what a script has of a file.
 """
 
 import importlib
@@ -231,3 +231,15 @@ def origin(run: Mapping[str, Any]) -> Facts:
 def in_words(value: object) -> str:
     """A coordinate as text."""
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def open_any(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> Any:
+    """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked;
+    the table of replicates of pairs stays on the disk until it is asked for.
+
+    ``folder``: where the config of a study lay, its shape library and its own modules, which are
+    run then whatever they are (default: where the results lie). FileError for a file that is
+    absent, damaged, or of another kind.
+    """
+    source = held(path)
+    return file_kind(source, "opened").opened(source, folder)

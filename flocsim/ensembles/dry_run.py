@@ -11,15 +11,8 @@ from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, Config
-from flocsim.ensembles.doubts import (
-    IMPLIED,
-    paper_weight,
-    said_doubts,
-    settling_facts,
-    study_doubts,
-)
 from flocsim.ensembles.equivalent_spheres import sphere_facts
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
@@ -30,13 +23,18 @@ from flocsim.ensembles.pilot.forecast import (
     timed,
 )
 from flocsim.ensembles.pilot.needless import find, words_of
-from flocsim.ensembles.pilot.sample import LADDER, pilot_size
+from flocsim.ensembles.pilot.trials import LADDER, pilot_size
 from flocsim.ensembles.preflight import (
+    IMPLIED,
     kinds,
     measured_flocs,
     pairings,
+    paper_weight,
     placed_system,
+    said_doubts,
+    settling_facts,
     sphere_pairs,
+    study_doubts,
 )
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError

@@ -3,11 +3,12 @@
 A kind gives a StudyKind, its conditions, draws and runs, which every rank has, and a Kind, the
 functions by which rank 0 checks, describes and writes such studies. The journal, dealing to ranks
 and processes, resuming, identities, signals and progress exist once and ask these two.
-`flocsim.ensembles.kinds` is the table of all kinds.
+`kinds` has all of them, by their scenes.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import cache
 from itertools import product
 from typing import Any, ClassVar
 
@@ -15,6 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ROW, Condition, Interval
+from flocsim.ensembles.config.kinds import STUDIES
 from flocsim.ensembles.config.schema import Config
 from flocsim.io.journal.records import Record
 
@@ -213,3 +215,31 @@ class Kind:
     """What a session of a study of this kind alone says of what was asked, as a pattern."""
     enough: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda count: False
     """(study, store) → whether so many replicates of each condition are enough."""
+
+
+@cache
+def kinds() -> dict[type, Kind]:
+    """Class of [scene] → its Kind; rates are pairs with other draws and conditions."""
+    found = [folder.part("kind").KIND for folder in STUDIES.values()]
+    return {scene: each for each in found for scene in each.scenes}
+
+
+def kind_of(config: Config) -> Kind:
+    """The Kind of a config's study."""
+    return kinds()[type(config.scene)]
+
+
+def study_of(config: Config, flocs: list | None = None, methods: dict | None = None) -> StudyKind:
+    """The study of a config of any kind; ``flocs`` are grown or read unless given."""
+    study: Any = kind_of(config).make(config, flocs, methods)
+    return study
+
+
+def flocs_of(config: Config) -> list:
+    """The flocs that a config's study needs, grown or read."""
+    return kind_of(config).flocs(config)
+
+
+def identity_of(study: StudyKind, machine: dict | None = None) -> dict:
+    """{name: text or number} of all that the rows of a study follow from."""
+    return kind_of(study.config).identity(study, machine)

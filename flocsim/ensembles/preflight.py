@@ -1,5 +1,16 @@
-"""What is wrong with a study can mostly be known before anything is compiled or run."""
+"""What is wrong with a study can mostly be known before anything is compiled or run; what is
+implausible in it, for the terminal and for the file.
 
+Impacts: how deep two spheres run into each other where they meet, against what the contact law
+covers. The contact law, whatever it is, is taken as the spring and dashpot that are worth it: as
+much work up to the deepest overlap, as much damping half way. A spring k with damping ζ of critical
+stops a mass M of speed v at v √(M/k) exp(−ζ acos ζ/√(1 − ζ²)), for critical damping v √(M/k)/e.
+
+Doubts: of flocs of measured sizes they look at the largest of each collision type, which settle
+fastest. ``flocs`` are those of the study, where they have been read.
+"""
+
+import math
 from collections.abc import Iterator, Sequence
 
 import attrs
@@ -8,17 +19,19 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.arrays import ContactView, OutlineView, PairView, work_of
 from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.pairings import Pairing, pairings_of
-from flocsim.ensembles.collision.thermal.release import refuse_release
+from flocsim.ensembles.collision.thermal import refuse_release
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.impact import too_deep
 from flocsim.errors import ConfigError, KernelError
-from flocsim.forces import ContactForce
+from flocsim.explain import pairs_of
+from flocsim.forces import Contact, ContactForce, Force
 from flocsim.forces.codegen import laws_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
@@ -26,8 +39,112 @@ from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
+from flocsim.plausibility.doubts import Names, doubts_of
+from flocsim.plausibility.ranges import ROUNDING
+from flocsim.plausibility.reynolds import settled
 from flocsim.system import System
 from flocsim.trajectories.blame import wrong_answer
+
+PARTS = 16
+"""Intervals of the work of the contact force, an even number."""
+
+
+def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
+    """Deepest overlap [m] of a mass [kg] at a speed [m/s] on a spring [N/m] and dashpot [N s/m]."""
+    omega = math.sqrt(stiffness / mass)
+    share = 0.5 * damping / (mass * omega)
+    if abs(share - 1.0) < 1e-6:
+        exponent = 1.0
+    elif share < 1.0:
+        exponent = share * math.acos(share) / math.sqrt(1.0 - share * share)
+    else:
+        exponent = share * math.acosh(share) / math.sqrt(share * share - 1.0)
+    return speed / omega * math.exp(-exponent)
+
+
+def spring_and_dashpot(
+    pair: Encounter, mass: float, radii: Sequence[float], speed: float
+) -> tuple[float, float] | None:
+    """(stiffness [N/m], damping [N s/m]) of the pair's contact law up to the deepest overlap.
+
+    None where it has no such thing: it gives no numbers, or does not push apart.
+    """
+    law, known = pair.system.pieces.laws["contact_force"], pair.system.pieces.parameters
+    deepest = DEEPEST_OVERLAP * sum(radii)
+
+    def normal(overlap, rate):
+        return float(law(ContactView(overlap, rate, 0.0, 0.0, mass, *radii), known)[0])
+
+    try:
+        with np.errstate(all="ignore"):
+            values = [normal(deepest * k / PARTS, 0.0) for k in range(1, PARTS + 1)]
+            middle, half = values[PARTS // 2 - 1], 0.5 * speed
+            damping = (normal(0.5 * deepest, half) - middle) / half
+    except (ArithmeticError, ValueError):
+        return None
+    # Simpson's rule; no force at no overlap.
+    work = (4.0 * sum(values[0::2]) + 2.0 * sum(values[1:-1:2]) + values[-1]) / (3.0 * PARTS)
+    stiffness = 2.0 * work / deepest
+    if not (0.0 < stiffness < math.inf and -math.inf < damping < math.inf):
+        return None
+    return stiffness, max(damping, 0.0)
+
+
+def stiffness_for(
+    deepest: float, speed: float, mass: float, stiffness: float, damping: float, scales: bool
+) -> float:
+    """Least stiffness [N/m] at which the overlap stays below ``deepest`` [m].
+
+    ``scales``: the damping is a share of critical damping, and grows with the stiffness.
+    """
+
+    def found(factor):
+        more = math.sqrt(factor) if scales else 1.0
+        return depth(speed, mass, factor * stiffness, more * damping)
+
+    from scipy.optimize import brentq
+
+    high = 2.0
+    while found(high) > deepest:
+        high *= 2.0
+    return stiffness * float(brentq(lambda factor: found(factor) - deepest, 1.0, high))
+
+
+def rounded_up(value: float) -> float:
+    """A value to two digits, not below it."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.2g}")
+
+
+def too_deep(
+    name: str, pair: Encounter, radii: Sequence[float], what: str
+) -> tuple[float, str] | None:
+    """How many times too soft the contact is for the equivalent spheres of a collision type, and
+    that in words with what would do; None where it is stiff enough, or has no stiffness.
+
+    ``radii`` [m] are those of the outlines that touch, of ``what``: spheroradii, or the spheres'.
+    The speed is that at which the spheres settle onto each other.
+    """
+    speed, deepest = math.hypot(*pair.drift), DEEPEST_OVERLAP * sum(radii)
+    [mass] = [mass for _, _, mass in pairs_of(pair.system)]
+    law = spring_and_dashpot(pair, mass, radii, speed)
+    if law is None or depth(speed, mass, *law) <= deepest:
+        return None
+    forces = [each for each in pair.system.forces if isinstance(each, ContactForce)]
+    alone = forces[0] if len(forces) == 1 else None
+    scales = isinstance(alone, Contact) and alone.damping_n == "critical"
+    wanted = stiffness_for(deepest, speed, mass, *law, scales)
+    cure = (
+        f"give forces.contact.k_n {rounded_up(wanted):g} N/m or more"
+        if type(alone) is Contact
+        else f"make the contact {rounded_up(wanted / law[0]):g} times as stiff"
+    )
+    return wanted / law[0], (
+        f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * depth(speed, mass, *law):.3g} um "
+        f"deep, more than the {1e6 * deepest:.3g} um that the contact law covers (half of "
+        f"r_i + r_j of {what}): {cure}, or lighter bodies"
+    )
+
 
 CLOSE_GAPS = (1e-9, 1e-12, 0.0, -1e-12)
 """Gaps [m] that every two bodies that collide come through: a pole at 0 turns a repulsion into an
@@ -213,3 +330,65 @@ def kinds(config: Config, spheres: Sequence[Shape]) -> Iterator[Sequence[Shape]]
         yield [stand_in(shape, config.shapes) for shape in spheres]
     if min(config.shapes.vertices) == 1:
         yield spheres
+
+
+def names_in(config: Config, acting: Sequence[Force]) -> Names:
+    """What a config calls the fluid, the bodies, and those of its forces that are acting."""
+    known = [id(force) for force in acting]
+    forces = zip(config.force_names, config.forces, strict=True)
+    return Names(
+        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
+        forces=tuple(f"forces.{name}" for name, force in forces if id(force) in known),
+    )  # fmt: skip
+
+
+IMPLIED = (
+    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as much "
+    "as water at its sizes: they settle faster than Stokes's drag holds for, and shape decides. At "
+    'real weight (preset = "si") whatever touches stays together: docs/presets.md'
+)
+
+
+def paper_weight(config: Config) -> bool:
+    """Whether bodies have the weight of the paper's preset, which implies what is doubtful of their
+    settling."""
+    given = PRESETS.get(config.preset or "", {}).get("bodies", {}).get("surface_density")
+    return given is not None and given == config.bodies.surface_density
+
+
+def said_doubts(config: Config, doubts: Sequence[str]) -> list[str]:
+    """Those of the doubts that every run says: not that the drag falls short, where the preset
+    implies it. The dry run says IMPLIED once in its place; the results file keeps all."""
+    if not paper_weight(config):
+        return list(doubts)
+    return [line for line in doubts if "settles at" not in line or "Re = " not in line]
+
+
+def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[str]:
+    """Lines on a study, by the equivalent spheres of its collision types; none where all is
+    usual."""
+    systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
+    # In a flow bodies meet without their weight.
+    lines = doubts_of(systems, names_in(config, systems[0].forces))
+    options = config.shapes
+    if options.own is None and options.size == "scene" and max(options.vertices) > 1:
+        least = min(min(each.radii) for each in pairings(config, flocs))
+        share = options.radius / least
+        lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
+    return [line for line in lines if line]
+
+
+def settling_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
+    """[{type, body, radius [m], speed [m/s], reynolds, stokes}] of every free equivalent sphere.
+
+    It is the same at every N: a floc settles as the sphere of its area. Nothing where bodies meet
+    by thermal motion alone, without their weight.
+    """
+    found = []
+    for name, pair in sphere_pairs(config, flocs, "largest"):
+        if pair.meeting == BROWNIAN:
+            continue
+        for letter, body in zip("ij", pair.system.bodies, strict=True):
+            if (each := settled(pair.system, body)) is not None:
+                found.append({"type": name, "body": letter, **each._asdict()})
+    return found

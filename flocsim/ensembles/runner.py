@@ -17,12 +17,10 @@ import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
-from flocsim.ensembles.config.consent import kept_sources
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.doubts import said_doubts
+from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.estimates.stop_rule import borders
-from flocsim.ensembles.kind import StudyKind
-from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
@@ -33,8 +31,7 @@ from flocsim.ensembles.parallel.communicator import (
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import ExitCode, Plan
 from flocsim.ensembles.parallel.processes import in_copies
-from flocsim.ensembles.parallel.schedule import Schedule
-from flocsim.ensembles.parallel.study_state import StudyState
+from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.pilot.choice import (
     Choice,
@@ -43,6 +40,7 @@ from flocsim.ensembles.pilot.choice import (
     recorded_choice,
 )
 from flocsim.ensembles.pilot.trials import Job, try_out
+from flocsim.ensembles.preflight import said_doubts
 from flocsim.ensembles.storage import first_rows
 from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, short

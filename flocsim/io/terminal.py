@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, TextIO
 
 from flocsim.compiler import waiting
@@ -243,3 +243,13 @@ class Progress:
         if self.tty and not self.quiet:
             renew("", self.stream, end="\r")
         return time.monotonic() - self.began
+
+
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table as text without a newline at its end; cells are shown by ``str``.
+
+    A bar inside a cell does not end it.
+    """
+    lines: list[Sequence[object]] = [heads, ["---"] * len(heads), *rows]
+    cells = ([str(cell).replace("|", "\\|") for cell in line] for line in lines)
+    return "\n".join("| " + " | ".join(line) + " |" for line in cells)

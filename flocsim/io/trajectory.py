@@ -13,7 +13,7 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.exchange.vtkhdf import write_vtkhdf
+from flocsim.io.exchange import write_vtkhdf
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.groups import write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of

@@ -285,7 +285,7 @@ class Trajectory:
         is left alone, unless ``overwrite``. UsageError where gsd is not installed
         (``pip install 'flocsim[formats]'``). For ParaView: `save`.
         """
-        from flocsim.io.exchange.gsd_file import write_gsd
+        from flocsim.io.exchange import write_gsd
         from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
 
         path, rule = Path(file), data_rule(overwrite)

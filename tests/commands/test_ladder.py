@@ -6,8 +6,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.commands.precision import ladder
 from flocsim.ensembles.pilot.choice import first_methods
-from flocsim.ensembles.pilot.sample import Task, sample_of
-from flocsim.ensembles.pilot.trials import Job
+from flocsim.ensembles.pilot.trials import Job, Task, sample_of
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from tests.helpers.small_study import small_config, small_study, write_small

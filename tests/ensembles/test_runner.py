@@ -6,7 +6,7 @@ import pytest
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
 from flocsim.ensembles.parallel import worker
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
-from flocsim.ensembles.parallel.study_state import Phase
+from flocsim.ensembles.parallel.schedule import Phase
 from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore

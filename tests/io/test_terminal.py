@@ -7,7 +7,7 @@ import os
 import pytest
 
 from flocsim.io import terminal
-from flocsim.io.terminal import Progress, duration, tell
+from flocsim.io.terminal import Progress, duration, markdown_table, tell
 
 
 class Terminal(io.StringIO):
@@ -190,3 +190,7 @@ def test_a_closed_stream_takes_what_it_is_given(monkeypatch, name):
     shown = "".join(each.getvalue() for each in streams)
     assert ("hello" in shown) == (name == "stderr")
     assert ("careful" in shown) == (name == "stdout")
+
+
+def test_a_bar_in_a_cell_does_not_end_it():
+    assert markdown_table(("a", "b"), [("x|y", 1)]) == "| a | b |\n| --- | --- |\n| x\\|y | 1 |"

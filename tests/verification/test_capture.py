@@ -13,8 +13,7 @@ from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.points import points_of
 from flocsim.ensembles.collision.start import place_pair
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels.sampling import settling_interval
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import settling_interval, study_of
 from flocsim.ensembles.runner import run
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.shapes.sphere import Sphere

@@ -1,6 +1,6 @@
 """The claims as a table in Markdown: every part with its value, interval and verdict."""
 
-from flocsim.io.markdown import markdown_table
+from flocsim.io.terminal import markdown_table
 
 
 def number_text(value):

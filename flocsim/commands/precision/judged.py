@@ -16,7 +16,7 @@ import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study, flocs_of

@@ -16,12 +16,11 @@ from flocsim.commands.trajectory import select
 from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pairs.replicates import with_one_count
 from flocsim.ensembles.pilot.choice import ALLOWED, first_methods, sampling_error, settled
 from flocsim.ensembles.pilot.ladder import DECADES, REFERENCE, Ladder, at_rung, scene_length
-from flocsim.ensembles.pilot.sample import sample_of
-from flocsim.ensembles.pilot.trials import Job, Trial, try_out
+from flocsim.ensembles.pilot.trials import Job, Trial, sample_of, try_out
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError

@@ -14,11 +14,14 @@ from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.ensembles.collision import meetings, outcomes
-from flocsim.ensembles.collision import observed as numbers
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
-from flocsim.ensembles.collision.thermal import kicked
-from flocsim.ensembles.collision.thermal.cage import caged_between
-from flocsim.ensembles.collision.thermal.release import ends_of, refuse_release, start_apart
+from flocsim.ensembles.collision.thermal import (
+    caged_between,
+    ends_of,
+    refuse_release,
+    start_apart,
+    watch_kicked_pair,
+)
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
@@ -47,7 +50,7 @@ OBSERVER: dict[Callable, Callable] = {
 }
 """What a binary collision puts into the driver."""
 
-KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: kicked.watch_kicked_pair}
+KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: watch_kicked_pair}
 """The same for one under thermal motion."""
 
 LIMIT_TURNS = 1000.0
@@ -297,26 +300,26 @@ class Encounter:
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
         options = self.options
-        observed = np.zeros(numbers.OBSERVED_SIZE)
+        observed = np.zeros(outcomes.OBSERVED_SIZE)
         given = options.escape_gap
         # "start_gap": what the water does from there on ends no way and turns none back.
         auto = isinstance(given, str) and isinstance(options.start_gap, str)
         escape = self.far_gap if auto else self.start_gap if isinstance(given, str) else given
-        observed[numbers.ZONE] = self.zone_distance
-        observed[numbers.ESCAPE] = escape
-        observed[numbers.REST_TIME] = self.rest_time()
-        observed[numbers.DRIFT_X : numbers.DRIFT_Y + 1] = self.drift
-        observed[numbers.MOBILITY_I], observed[numbers.MOBILITY_J] = self.mobilities
-        observed[numbers.LOAD] = self.largest_load
+        observed[outcomes.ZONE] = self.zone_distance
+        observed[outcomes.ESCAPE] = escape
+        observed[outcomes.REST_TIME] = self.rest_time()
+        observed[outcomes.DRIFT_X : outcomes.DRIFT_Y + 1] = self.drift
+        observed[outcomes.MOBILITY_I], observed[outcomes.MOBILITY_J] = self.mobilities
+        observed[outcomes.LOAD] = self.largest_load
         if self.rate is not None:
-            observed[numbers.IN_FLOW] = 1.0
-            flow = slice(numbers.FLOW_XX, numbers.FLOW_YY + 1)
+            observed[outcomes.IN_FLOW] = 1.0
+            flow = slice(outcomes.FLOW_XX, outcomes.FLOW_YY + 1)
             observed[flow] = self.system.fluid.gradient
         if self.meeting == BROWNIAN:
-            observed[numbers.BROWNIAN], observed[numbers.ESCAPE] = 1.0, self.ends[1]
+            observed[outcomes.BROWNIAN], observed[outcomes.ESCAPE] = 1.0, self.ends[1]
         if self.kick_energy:
-            observed[numbers.KICK_ENERGY] = self.kick_energy
-            observed[numbers.CAGE_LOW : numbers.CAGE_HIGH + 1] = self.cage
+            observed[outcomes.KICK_ENERGY] = self.kick_energy
+            observed[outcomes.CAGE_LOW : outcomes.CAGE_HIGH + 1] = self.cage
         return observed
 
     @functools.cached_property

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision import observed as numbers
-from flocsim.ensembles.collision.observed import COLLIDED, INSIDE
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
+from flocsim.ensembles.collision import outcomes
+from flocsim.ensembles.collision.outcomes import BOUND, COLLIDED, DEPARTED, HELD, INSIDE, MISSED
 from flocsim.ensembles.collision.start import orientations
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import (
@@ -81,22 +80,22 @@ def replicate_row(status, angles, run):
     observed = run.observed
     outcome, failure = outcome_of(status, run.code, observed)
     touched = collided(observed)
-    zone = observed[numbers.ZONE]
+    zone = observed[outcomes.ZONE]
     return {
         "angle_i": angles[0],
         "angle_j": angles[1],
-        "r_i": run.scene.bodies[numbers.BODY_I, at.EQUIVALENT_RADIUS],
-        "r_j": run.scene.bodies[numbers.BODY_J, at.EQUIVALENT_RADIUS],
+        "r_i": run.scene.bodies[outcomes.BODY_I, at.EQUIVALENT_RADIUS],
+        "r_j": run.scene.bodies[outcomes.BODY_J, at.EQUIVALENT_RADIUS],
         "D_0": zone,
         "outcome": outcome,
-        "inside": int(observed[numbers.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(observed[numbers.CROSSED]) if touched else NOT_APPLICABLE,
-        "bond": int(observed[numbers.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
-        "d_c_collision": observed[numbers.D_COLLISION] if touched else np.nan,
-        "d_c_over_D_0": observed[numbers.D_COLLISION] / zone if touched else np.nan,
-        "d_c_max": observed[numbers.D_MAX] if touched else np.nan,
-        "d_c_last": observed[numbers.D_LAST],
-        "t_collision": observed[numbers.T_COLLISION] if touched else np.nan,
+        "inside": int(observed[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
+        "crossed_zone": int(observed[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
+        "bond": int(observed[outcomes.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
+        "d_c_collision": observed[outcomes.D_COLLISION] if touched else np.nan,
+        "d_c_over_D_0": observed[outcomes.D_COLLISION] / zone if touched else np.nan,
+        "d_c_max": observed[outcomes.D_MAX] if touched else np.nan,
+        "d_c_last": observed[outcomes.D_LAST],
+        "t_collision": observed[outcomes.T_COLLISION] if touched else np.nan,
         "t_end": run.time,
         "steps": run.steps,
         "rejected": run.rejected,

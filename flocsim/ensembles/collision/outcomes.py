@@ -1,31 +1,59 @@
 """What becomes of two bodies: missed, held, or a collision that ends bound or departed.
 
 `watch_pair`, the observer, looks at the pair after every accepted step. Departed is a pair that
-touched and has parted for good (departure.py), missed one that parted so before it touched; held is
-one that has not touched and rests so, one body over the other, in a secondary minimum say; bound is
-one that has touched and is proved to stay together (flocsim.bonds).
+touched and has parted for good, missed one that parted so before it touched; held is one that has
+not touched and rests so, one body over the other, in a secondary minimum say; bound is one that has
+touched and is proved to stay together (flocsim.bonds).
+
+They have parted for good where the drift that is left cannot bring them together again. Body j is
+carried along the steady drift against i, at the orientations of now, by as much at a time as still
+lies between the outlines, until it has passed all of i. What is left of present velocities and
+spins, until drag has used it up, must fit into what remains between them on the way. In a flow
+alone, they have parted once it carries them apart beyond all reach of their outlines: in shear and
+in extension it does so for ever then.
+
+Of a bond the observer knows the load, and how long the pair has kept its pose. The proofs are those
+of flocsim.bonds. In a flow the load comes from everywhere, as the doublet turns round in it, and
+the rest time is that of a whole turn.
 """
 
+import math
+
 import flocsim.arrays as at
-from flocsim.bonds.bond import NO_BOND
-from flocsim.ensembles.collision.departure import has_departed
-from flocsim.ensembles.collision.observed import (
-    BODY_I,
-    BODY_J,
-    BOND,
-    COLLIDED,
-    CROSSED,
-    D_COLLISION,
-    D_LAST,
-    D_MAX,
-    INSIDE,
-    T_COLLISION,
-    ZONE,
-)
-from flocsim.ensembles.collision.resting import bond_of, rests_for_long
-from flocsim.geometry.contact.near_pairs import gap_between
+from flocsim.bonds.bond import CERTIFICATE, NO_BOND, Load, bond_between, doublet_pose, way_between
+from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
+from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
+from flocsim.geometry.contact.circle_tree import core_distance
+from flocsim.geometry.contact.near_pairs import gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.integrators.rhs.views import centre_line
+from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
+from flocsim.laws import (
+    CENTRE_FORCE,
+    VELOCITY_DERIVATIVES,
+    body_force,
+    centre_force,
+    has,
+    velocity_derivatives,
+)
+
+(
+    ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J, LOAD,
+    COLLIDED, INSIDE, CROSSED, D_COLLISION, D_MAX, D_LAST, T_COLLISION, BOND,
+    REST_SINCE, REST_X, REST_Y, REST_ANGLE, IN_FLOW, FLOW_XX, FLOW_XY, FLOW_YX, FLOW_YY,
+    KICK_ENERGY, BROWNIAN, CAGE_LOW, CAGE_HIGH,
+    OBSERVED_SIZE,
+) = range(30)  # fmt: skip
+"""Columns of `observed`. Given: D_0 [m], escape gap [m], rest time [s], velocity of j relative to i
+in settling, or about that in a flow [m/s], largest mobilities [s/kg], the largest load that
+settling, or the flow, can put on a bond [N]; whether they meet in a flow alone, and its gradient
+[1/s]; k_B T [J], 0 without kicks, whether they meet by thermal motion alone, when ESCAPE is the
+distance of their centres [m], and the gaps [m] of a secondary minimum between which kicks do not
+let a pair out. Found: flags, centre distances [m], time [s], the kind of
+bond (flocsim.bonds), and since when the doublet has been resting in which pose."""
+
+BODY_I, BODY_J = range(2)
+"""The two bodies of an encounter: the receiver, and the one that it meets."""
+
 
 BOUND, DEPARTED, MISSED, HELD = 1, 2, 3, 4
 """Codes of the observer."""
@@ -78,3 +106,178 @@ def watch_pair(scene, work, observed, time):
         return HELD if rests_for_long(scene, work, observed, time) else 0
     observed[BOND] = bond_of(scene, work, observed, time)
     return 0 if observed[BOND] == NO_BOND else BOUND
+
+
+MOST_ADVANCES = 200
+"""Moves along the drift until the outlines count as able to meet."""
+
+CLEARANCE = 0.25
+"""The outlines must stay further apart on the way than this share of the escape gap."""
+
+
+def is_parting(scene, work, observed, time, nx, ny):
+    """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
+    motion = work.motion
+    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
+    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
+    drift = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y]
+    if has(scene, CENTRE_FORCE):
+        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
+        drift += repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
+    return rate > 0.0 and drift > 0.0
+
+
+def is_away(scene, work, observed, distance, gap):
+    """Whether the outlines are further apart than the escape gap; cheap bounds first."""
+    far = (
+        distance
+        - scene.bodies[BODY_I, at.BOUNDING_RADIUS]
+        - scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    )
+    if far > observed[ESCAPE]:
+        return True
+    return (
+        gap > 0.0
+        and gap > observed[ESCAPE] * 0.25
+        and gap_between(scene, work, BODY_J, BODY_I) > observed[ESCAPE]
+    )
+
+
+def left_over(scene, work, observed):
+    """How far j may still be carried off the drift against i by its present velocity [m]."""
+    v, drift_time = work.motion, 0.0
+    for body, mobility in ((BODY_I, observed[MOBILITY_I]), (BODY_J, observed[MOBILITY_J])):
+        drift_time = max(drift_time, scene.bodies[body, at.MASS] * mobility)
+    x = v[at.NOW, BODY_J, at.VX] - v[at.NOW, BODY_I, at.VX] - observed[DRIFT_X]
+    y = v[at.NOW, BODY_J, at.VY] - v[at.NOW, BODY_I, at.VY] - observed[DRIFT_Y]
+    return drift_time * math.hypot(x, y)
+
+
+def turn_left(scene, work, time, body, passing):
+    """How far an outline may still be moved by its turning [m] within the time of passing [s]."""
+    outer = scene.bodies[body, at.BOUNDING_RADIUS]
+    spin, damping = work.motion[at.NOW, body, at.SPIN], 0.0
+    if not has(scene, VELOCITY_DERIVATIVES) or spin == 0.0:
+        return outer * abs(spin) * passing
+    view = body_view(scene, work, time, at.NOW, body)
+    damping = -velocity_derivatives(scene, view)[8]
+    if not damping > 0.0:
+        return outer * abs(spin) * passing
+    _, _, torque = body_force(scene, view)
+    last = spin + torque / damping
+    turned = abs(spin - last) * scene.bodies[body, at.INERTIA] / damping + abs(last) * passing
+    return outer * turned
+
+
+def can_meet_again(scene, work, observed, time):
+    """Whether the outlines may come together along the drift that is left."""
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
+    ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
+    x = work.motion[at.NOW, BODY_J, at.X] - work.motion[at.NOW, BODY_I, at.X]
+    y = work.motion[at.NOW, BODY_J, at.Y] - work.motion[at.NOW, BODY_I, at.Y]
+    along, aside = x * ux + y * uy, abs(x * uy - y * ux)
+    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
+    if (math.hypot(x, y) if along >= 0.0 else aside) >= outer + clear:
+        return False
+    passing = (outer + clear + max(-along, 0.0)) / drift
+    clear += turn_left(scene, work, time, BODY_I, passing)
+    clear += turn_left(scene, work, time, BODY_J, passing)
+    contact = scene.bodies[BODY_I, at.RADIUS] + scene.bodies[BODY_J, at.RADIUS]
+    turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
+    c, s = (
+        math.cos(work.motion[at.NOW, BODY_I, at.ANGLE]),
+        math.sin(work.motion[at.NOW, BODY_I, at.ANGLE]),
+    )
+    ux, uy = c * ux + s * uy, c * uy - s * ux
+    for _ in range(MOST_ADVANCES):
+        gap = core_distance(scene, BODY_J, BODY_I, (turn_c, turn_s, x, y)) - contact
+        if gap <= clear:
+            return True
+        # No further than the outlines are apart, so that nothing is passed over.
+        ahead = gap - 0.9 * clear
+        x, y = x + ahead * ux, y + ahead * uy
+        if x * ux + y * uy >= 0.0 and math.hypot(x, y) >= outer + clear:
+            return False
+    return True
+
+
+def is_carried_away(scene, work, observed, time, nx, ny, distance):
+    """Whether a flow alone draws the bodies apart, beyond where their outlines reach and faster
+    than attraction draws them together."""
+    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    if distance < outer + observed[ESCAPE]:
+        return False
+    stretch = nx * (observed[FLOW_XX] * nx + observed[FLOW_XY] * ny)
+    stretch += ny * (observed[FLOW_YX] * nx + observed[FLOW_YY] * ny)
+    speed = stretch * distance
+    if has(scene, CENTRE_FORCE):
+        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
+        speed += min(repulsion, 0.0) * (observed[MOBILITY_I] + observed[MOBILITY_J])
+    motion = work.motion
+    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
+    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
+    return speed > 0.0 and rate > 0.0
+
+
+def has_departed(scene, work, observed, time, nx, ny, distance, gap):
+    """Whether the bodies have parted for good; ``gap``: the least of the listed pairs [m]."""
+    if observed[IN_FLOW] != 0.0:
+        return is_carried_away(scene, work, observed, time, nx, ny, distance)
+    return (
+        is_parting(scene, work, observed, time, nx, ny)
+        and is_away(scene, work, observed, distance, gap)
+        and not can_meet_again(scene, work, observed, time)
+    )
+
+
+def load_on(observed):
+    """The Load on the bond of the two."""
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
+    x, y = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
+    if observed[IN_FLOW] != 0.0:
+        x, y = 0.0, 0.0
+    return Load(observed[LOAD], drift, x, y, 0.0, 1.0, observed[KICK_ENERGY])
+
+
+def start_rest(scene, work, observed, time):
+    """From now on the doublet may be resting as it is."""
+    observed[REST_SINCE] = time
+    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
+    observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = pose
+
+
+def rest_of(scene, work, observed, time, load):
+    """How long the doublet has kept its pose without swinging, in rest times."""
+    before = observed[REST_X], observed[REST_Y], observed[REST_ANGLE]
+    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
+    moved = way_between(scene, BODY_I, BODY_J, pose, before)
+    if moved > STILL * load.drift * observed[REST_TIME]:
+        start_rest(scene, work, observed, time)
+        return 0.0
+    if swings(scene, work, BODY_I, BODY_J, load):
+        return 0.0
+    return (time - observed[REST_SINCE]) / observed[REST_TIME]
+
+
+def rests_for_long(scene, work, observed, time):
+    """Whether two bodies have kept still against each other far longer than the rest time."""
+    return rest_of(scene, work, observed, time, load_on(observed)) >= FAR_LONGER
+
+
+def bond_of(scene, work, observed, time):
+    """The kind of bond of two bodies that have touched, NO_BOND where none is proved."""
+    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
+    if is_certain(scene, work, time, bond, load):
+        return CERTIFICATE
+    rested = rest_of(scene, work, observed, time, load)
+    return kind_at_rest(scene, work, time, bond, load, rested)
+
+
+def bond_in_kicks(scene, work, observed, time):
+    """The same where kicks may open it."""
+    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
+    if is_certain_in_kicks(scene, work, time, bond, load):
+        return CERTIFICATE
+    rested = rest_of(scene, work, observed, time, load)
+    return kind_at_rest(scene, work, time, bond, load, rested)

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from flocsim.ensembles.config.schema import excluded_by, without_following
-from flocsim.ensembles.config.text_limits import MOST_PARTS, text_problem
-from flocsim.ensembles.config.toml_text import DEEPEST_TABLE
+from flocsim.ensembles.config.toml_text import DEEPEST_TABLE, MOST_PARTS, text_problem
 from flocsim.errors import ConfigError
 
 

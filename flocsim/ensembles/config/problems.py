@@ -1,17 +1,15 @@
 """What is wrong with a config file: worded, collected, and told at once, each with its line."""
 
 import difflib
-import re
 from collections.abc import Iterable, Mapping
 
 import attrs
 
-from flocsim.ensembles.config.toml_text import key_lines
+from flocsim.ensembles.config.toml_text import BARE_KEY, key_lines
 from flocsim.errors import ConfigError, visible
 
 LONGEST_SHOWN = 60
 MOST_SHOWN = 50
-BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class Misfit(ValueError):

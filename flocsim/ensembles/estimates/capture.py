@@ -48,8 +48,7 @@ from flocsim.ensembles.estimates.numerical import (
     run_so,
 )
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
-from flocsim.ensembles.kernels.sampling import as_draws
-from flocsim.ensembles.kernels.study import KernelStudy, bounds_of, offsets_of
+from flocsim.ensembles.kernels import KernelStudy, as_draws, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import wilson

@@ -15,16 +15,15 @@ from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
-from flocsim.ensembles.doubts import settling_facts, study_doubts
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
-from flocsim.ensembles.estimates.outlines import OF_OUTLINES
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.stop_rule import StopRule
 from flocsim.ensembles.estimates.summary import (
     JOINT,
+    OF_OUTLINES,
     POOLED_NAMES,
     Reader,
     Sums,
@@ -32,11 +31,11 @@ from flocsim.ensembles.estimates.summary import (
     table_from,
     tables_of,
 )
-from flocsim.ensembles.kernels.study import KernelStudy, study_of
+from flocsim.ensembles.kernels import KernelStudy, study_of
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
     SCRAMBLES,
@@ -51,8 +50,7 @@ from flocsim.ensembles.report import (
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
-from flocsim.ensembles.storage.row_store import OldTable, RowStore
-from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
 from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FileError, FlocsimError, UsageError

@@ -9,10 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.config.consent import Consent, read_sources
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.config.sources import Consent, Sources, read_sources
 from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.equivalent_spheres import water_facts
 from flocsim.ensembles.pairs.replicates import (

@@ -9,7 +9,7 @@ import attrs
 import flocsim.arrays as at
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.study import Study, says_outcome
 from flocsim.errors import UsageError

@@ -22,8 +22,14 @@ from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.messages import ExitCode
-from flocsim.ensembles.storage.row_store import RowStore, longest, near
-from flocsim.ensembles.storage.shared_rows import OldColumns, ReadOnlyJournal, old_columns
+from flocsim.ensembles.storage.row_store import (
+    OldColumns,
+    ReadOnlyJournal,
+    RowStore,
+    longest,
+    near,
+    old_columns,
+)
 from flocsim.errors import FileError, FlocsimError
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file

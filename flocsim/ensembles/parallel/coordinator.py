@@ -22,7 +22,7 @@ from flocsim.ensembles.parallel.messages import (
     Kept,
     Request,
 )
-from flocsim.ensembles.parallel.study_state import Phase, StudyState
+from flocsim.ensembles.parallel.schedule import Phase, StudyState
 from flocsim.interruption import stop_requested
 
 GOING_SECONDS = 1.0

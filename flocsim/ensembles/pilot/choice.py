@@ -21,19 +21,27 @@ import attrs
 
 from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.schema import METHODS, Config
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.ladder import (
     DECADES,
     REFERENCE,
     RUNGS,
+    Belief,
     Ladder,
     at_rung,
+    beliefs,
     mean,
+    sampling_half_width,
     scene_length,
 )
-from flocsim.ensembles.pilot.model import Belief, beliefs, sampling_half_width
-from flocsim.ensembles.pilot.sample import expected_replicates, sample_of
-from flocsim.ensembles.pilot.trials import WEIGHTS, Job, Trial, try_out
+from flocsim.ensembles.pilot.trials import (
+    WEIGHTS,
+    Job,
+    Trial,
+    expected_replicates,
+    sample_of,
+    try_out,
+)
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.study import Study

@@ -18,8 +18,16 @@ import numpy as np
 from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.pilot.sample import MOST, Task, expected_replicates, sample_of
-from flocsim.ensembles.pilot.trials import Job, Trial, is_flip, try_out
+from flocsim.ensembles.pilot.trials import (
+    MOST,
+    Job,
+    Task,
+    Trial,
+    expected_replicates,
+    is_flip,
+    sample_of,
+    try_out,
+)
 from flocsim.ensembles.study import Study
 from flocsim.io.pieces import seal_size
 from flocsim.io.results.events import flips_easily

@@ -43,7 +43,7 @@ PHYSICS = (
     "hydrodynamics", "forces", "integrators", "geometry/shapes", "geometry/contact",
     "geometry/surfaces", "io/results/schema.py",
     "io/results/events.py",
-    "ensembles/collision", "ensembles/study.py", "ensembles/kernels",
+    "ensembles/collision", "ensembles/study.py", "ensembles/kernels.py",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
 makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py holds this

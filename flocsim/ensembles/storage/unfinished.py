@@ -1,4 +1,8 @@
-"""What the journal of an unfinished study holds, as a kind of study reads it, and its rows."""
+"""What an unfinished study has so far: read from its journal, which is neither locked nor changed.
+
+The job that writes the journal only ever appends to it, so that what is whole in it stays as it is
+while it is read here. A kind of study reads its rows from it.
+"""
 
 import math
 from collections.abc import Callable
@@ -10,10 +14,13 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, rows_of
-from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.kind import kinds
+from flocsim.ensembles.storage.plan import ASKED
+from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
+from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.errors import FileError
-from flocsim.io.journal.records import CHUNK, Record
+from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
+from flocsim.io.json_text import matches
 
 MOST_CONDITIONS = 20_000
 """Of a study that is read while it runs."""
@@ -82,3 +89,22 @@ def store_of(
     if not store.there():
         raise FileError(f"{journal.path} has no finished replicate yet: try again later")
     return store, notes, unread
+
+
+def read_unfinished(path: str | Path) -> Unfinished:
+    """What the journal at ``path`` holds; FileError where it holds no finished replicate."""
+    path = Path(path)
+    try:
+        with open(path, "rb") as file:
+            records = [each for each in scan(file) if isinstance(each, Record)]
+    except OSError as error:
+        raise FileError(f"{path} could not be read: {error.strerror}") from error
+    sessions = [each.description for each in records if each.kind == SESSION]
+    sessions = [each for each in sessions if is_session(each)]
+    if not sessions:
+        raise FileError(f"{path} is no journal of an unfinished run, or has just begun: try again")
+    asked = sessions[-1].get("asked")
+    # Pairs come first, and are all that says nothing of itself.
+    first, *others = kinds().values()
+    said = [each for each in others if each.asked and matches(asked, ASKED | each.asked)]
+    return (said or [first])[0].so_far(path, sessions, records)

@@ -18,8 +18,7 @@ from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning
-from flocsim.ensembles.storage.row_store import OldTable
-from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError

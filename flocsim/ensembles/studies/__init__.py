@@ -1,4 +1,4 @@
-"""Whole studies as a script has them: a Study, its results, two compared, one swept over a key.
+"""Whole studies as a script has them: a Study, and one swept over a key.
 
 A Study runs by the command, `flocsim ensemble`, in processes of its own: its files are the
 command's, bytes and rules.

@@ -10,13 +10,12 @@ from flocsim.ensembles.config.overrides import lay_over, nested
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import read_text_file
-from flocsim.ensembles.kinds import kind_of
+from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_text
+from flocsim.ensembles.contents import open_any
+from flocsim.ensembles.kind import kind_of
 from flocsim.ensembles.pairs.replicates import one_count_study, place_of, replicate_of
 from flocsim.ensembles.preflight import inputs_of
-from flocsim.ensembles.studies.opened import open_any
 from flocsim.ensembles.studies.process import run_command
-from flocsim.ensembles.studies.text import toml_text, value_text
 from flocsim.errors import ConfigError, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.journal.journal import SUFFIX

@@ -17,8 +17,8 @@ import numpy as np
 
 from flocsim.ensembles.comparison import identity_in
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
-from flocsim.ensembles.contents import Joined
-from flocsim.ensembles.kinds import flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.contents import Joined, open_any
+from flocsim.ensembles.kind import flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.storage.identity import machine_facts
 from flocsim.ensembles.storage.plan import (
@@ -33,7 +33,6 @@ from flocsim.ensembles.storage.plan import (
     read_plan,
     write_plan,
 )
-from flocsim.ensembles.studies.opened import open_any
 from flocsim.ensembles.studies.study import WAYS, Study
 from flocsim.ensembles.studies.sweep_contents import all_joined, joined_of, read_joined
 from flocsim.errors import UsageError

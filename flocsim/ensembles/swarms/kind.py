@@ -15,9 +15,9 @@ from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.ensembles.chunks import Condition, is_chunk
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.doubts import names_in
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.preflight import names_in
 from flocsim.ensembles.storage.identity import (
     PHYSICS,
     config_facts,
@@ -26,8 +26,7 @@ from flocsim.ensembles.storage.identity import (
     shape_numbers,
 )
 from flocsim.ensembles.storage.resume import Beginning
-from flocsim.ensembles.storage.row_store import OldTable
-from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished
 from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from
 from flocsim.ensembles.swarms.checks import FORM, Form, check_part

@@ -12,8 +12,7 @@ import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.io.files import Rule, write_file
-from flocsim.io.outputs import redrawn
-from flocsim.io.own_mark import marked
+from flocsim.io.outputs import marked, redrawn
 
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""

@@ -10,10 +10,9 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.bond import CERTIFICATE, HOOK, NO_BOND, REST, bond_between, energy_of
 from flocsim.bonds.certificate import CALM, SAFETY, attraction_at, is_held
 from flocsim.bonds.rest import FAR_LONGER, HANGING, NEST, STILL
-from flocsim.ensembles.collision import observed as numbers
+from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import make_encounter
-from flocsim.ensembles.collision.outcomes import BOUND, watch_pair
-from flocsim.ensembles.collision.resting import bond_of, load_on, start_rest
+from flocsim.ensembles.collision.outcomes import BOUND, bond_of, load_on, start_rest, watch_pair
 from flocsim.forces import VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
@@ -43,7 +42,7 @@ class Doublet:
         self.scene = self.encounter.system.scene(jit=False)
         self.work = self.encounter.start((0.0, 0.0), 0.0)
         self.observed = self.encounter.observed()
-        self.observed[numbers.COLLIDED] = 1.0
+        self.observed[outcomes.COLLIDED] = 1.0
         if places is None:
             places = [(0.0, 0.0, 0.0), (0.0, 1e-9 - sum(RADII), 0.0)]
         self.place(*places)
@@ -66,7 +65,7 @@ class Doublet:
     @property
     def load(self):
         """The greatest pull of settling on the bond [N]."""
-        return self.observed[numbers.LOAD]
+        return self.observed[outcomes.LOAD]
 
     @property
     def between(self):
@@ -83,7 +82,7 @@ class Doublet:
     def rest(self, turns):
         """The kind of bond after so many rest times in this pose."""
         start_rest(self.scene, self.work, self.observed, 0.0)
-        return self.bond(turns * self.observed[numbers.REST_TIME])
+        return self.bond(turns * self.observed[outcomes.REST_TIME])
 
 
 def strength_for(folder, share):
@@ -208,7 +207,7 @@ def test_spheres_that_rest_are_no_hook(tmp_path, share, expected):
 
 def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
-    rest = doublet.observed[numbers.REST_TIME]
+    rest = doublet.observed[outcomes.REST_TIME]
     start_rest(doublet.scene, doublet.work, doublet.observed, 0.0)
     (still, low), way = doublet.work.motion[at.NOW, :, :3].copy(), doublet.drift * rest
     doublet.place(still, low + [1.1 * STILL * way, 0.0, 0.0])
@@ -247,4 +246,4 @@ def test_a_nest_is_bound_after_ten_rest_times(tmp_path):
 def test_the_observer_keeps_the_kind_of_bond(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 10.0)))
     assert watch_pair(doublet.scene, doublet.work, doublet.observed, 0.0) == BOUND
-    assert doublet.observed[numbers.BOND] == CERTIFICATE
+    assert doublet.observed[outcomes.BOND] == CERTIFICATE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision import observed as numbers
+from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.start import draws, orientations
@@ -48,7 +48,7 @@ def test_automatic_times_are_turn_times(study):
     drift = math.hypot(*encounter.drift)
     turn = (16.41e-6 + 23.02e-6) / drift
     assert encounter.turn_time == pytest.approx(turn)
-    assert encounter.observed()[numbers.REST_TIME] == pytest.approx(REST_TURNS * turn)
+    assert encounter.observed()[outcomes.REST_TIME] == pytest.approx(REST_TURNS * turn)
     assert encounter.time_limit() == pytest.approx(LIMIT_TURNS * turn + 2e-6 / drift)
 
 
@@ -57,7 +57,7 @@ def test_times_and_gaps_that_are_given(tmp_path):
     encounter = small_study(tmp_path, {"scene": given}).encounter(0, 1, draws(1, 0))
     observed = encounter.observed()
     assert encounter.time_limit() == 3.0
-    assert (observed[numbers.REST_TIME], observed[numbers.ESCAPE]) == (0.5, 7e-6)
+    assert (observed[outcomes.REST_TIME], observed[outcomes.ESCAPE]) == (0.5, 7e-6)
     places = encounter.start((0.0, 0.0), 0.0).motion[at.NOW, :, 1]
     assert places[1] - places[0] == pytest.approx(16.41e-6 + 23.02e-6 + 3e-6, rel=1e-9)
 

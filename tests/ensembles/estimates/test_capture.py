@@ -17,7 +17,7 @@ from flocsim.ensembles.estimates.capture import (
     weighted,
     widened,
 )
-from flocsim.ensembles.kernels.study import study_of
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
 from flocsim.ensembles.runner import run
 from flocsim.io.results.kernel_group import ESTIMATES, WHAT

@@ -7,7 +7,7 @@ from flocsim.ensembles.parallel import communicator
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.messages import Assignment, Dismissal, Halt, Request
-from flocsim.ensembles.parallel.study_state import TooManyFailures
+from flocsim.ensembles.parallel.schedule import TooManyFailures
 from tests.helpers.study_state import make_state, result_of
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from flocsim.compiler import composer
-from flocsim.ensembles.kinds import flocs_of, study_of
+from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.processes import in_copies
 from tests.helpers.small_study import small_config

@@ -6,7 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.ensembles.chunks import MOST_ROWS, merged, missing, total
-from flocsim.ensembles.parallel.schedule import Schedule, chunk_seconds
+from flocsim.ensembles.parallel.schedule import (
+    Phase,
+    Schedule,
+    StudyState,
+    TooManyFailures,
+    chunk_seconds,
+)
+from tests.helpers.study_state import make_state, result_of
 
 INTERVALS = st.lists(
     st.tuples(st.integers(0, 30), st.integers(0, 10)).map(lambda pair: (pair[0], sum(pair)))
@@ -85,3 +92,73 @@ def test_an_earlier_stage_comes_first_and_an_end_stops_the_rest():
 @pytest.mark.parametrize(("size", "seconds"), [(1, 0.25), (100, 0.25), (10_000, 10.0)])
 def test_the_time_of_a_chunk_grows_with_the_ranks(size, seconds):
     assert chunk_seconds(size) == seconds
+
+
+def run_all(state):
+    """Run what the state hands out until there is no more."""
+    while (chunk := state.next_chunk()) is not None:
+        state.take_in(result_of(chunk))
+
+
+def test_a_study_runs_until_all_is_there():
+    state = make_state()
+    run_all(state)
+    assert (state.phase, state.computed, state.schedule.final) == (Phase.FINISHED, 4, 4)
+    assert list(state.store.read(0, "steps", 0, 4)) == [0, 1, 2, 3]
+
+
+def test_a_study_may_end_at_an_earlier_stage():
+    seen = []
+    state = make_state((2, 4, 8), lambda stop: seen.append(stop) or stop == 4)
+    run_all(state)
+    assert (state.phase, state.schedule.final, seen) == (Phase.FINISHED, 4, [2, 4])
+
+
+def test_with_nothing_missing_it_ends_at_the_first_look():
+    state = StudyState(Schedule.of([[(0, 4)]], [4], 1), None, None, 0)
+    state.look_at_stages()
+    assert state.phase is Phase.FINISHED
+
+
+def test_an_interrupted_study_hands_out_nothing_but_takes_in_what_is_finished():
+    state = make_state()
+    first = state.next_chunk()
+    state.interrupt()
+    assert state.next_chunk() is None
+    state.take_in(result_of(first))
+    assert (state.phase, state.computed, state.schedule.final) == (Phase.INTERRUPTED, 1, -1)
+
+
+def test_what_was_interrupted_may_have_been_the_last():
+    state = make_state((1,))
+    last = state.next_chunk()
+    state.interrupt()
+    state.take_in(result_of(last))
+    assert (state.phase, state.schedule.final) == (Phase.FINISHED, 1)
+    state.interrupt()
+    assert state.phase is Phase.FINISHED
+
+
+def test_what_is_given_up_takes_in_nothing():
+    state = make_state()
+    chunk = state.next_chunk()
+    state.give_up()
+    state.take_in(result_of(chunk))
+    state.interrupt()
+    assert (state.phase, state.computed, state.next_chunk()) == (Phase.GIVEN_UP, 0, None)
+
+
+def test_what_is_not_done_is_handed_out_again():
+    state = make_state((40,))
+    chunk = state.next_chunk()
+    assert chunk.stop - chunk.first == 13
+    state.take_in(result_of(chunk, 5))
+    assert state.next_chunk().first == 5
+
+
+def test_too_many_failures_end_the_study_after_what_came_was_written():
+    state = make_state(allowed=1)
+    state.take_in(result_of(state.next_chunk(), failed=1))
+    with pytest.raises(TooManyFailures, match=r"2 replicates failed, .* stalled"):
+        state.take_in(result_of(state.next_chunk(), failed=1))
+    assert (state.computed, len(state.notes)) == (2, 2)

@@ -19,8 +19,7 @@ from flocsim.ensembles.pilot.needless import (
     without_force,
     words_of,
 )
-from flocsim.ensembles.pilot.sample import Task
-from flocsim.ensembles.pilot.trials import Trial
+from flocsim.ensembles.pilot.trials import Task, Trial
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.small_study import small_study

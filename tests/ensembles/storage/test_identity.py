@@ -10,7 +10,7 @@ from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.identity import PACKAGE, physics_digest, physics_files
 
 ENTRIES = (
-    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/kernels/study.py",
+    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/kernels.py",
 )  # fmt: skip
 """From these files a replicate reaches all that it runs."""
 
@@ -32,12 +32,11 @@ NOT_PHYSICS = {
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",
     "io/trajectory.py": "writes motions",
     "io/plots/": "draws",
-    "io/exchange/": "writes motions for other programs",
+    "io/exchange.py": "writes motions for other programs",
     "io/results/kernel_group.py": "rates, which follow from rows",
     "io/groups.py": "how arrays are stored",
     "io/labelled.py": "how rates are named",
     "io/outputs.py": "what may be written to",
-    "io/own_mark.py": "what may be written to",
     "limits.py": "what the system allows; a row is what comes without an error",
     "io/files.py": "how files are written",
     "io/pieces.py": "how files are sealed",

@@ -9,7 +9,7 @@ import pytest
 from flocsim.ensembles import runner
 from flocsim.ensembles.parallel import worker
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
-from flocsim.ensembles.parallel.study_state import StudyState, TooManyFailures
+from flocsim.ensembles.parallel.schedule import StudyState, TooManyFailures
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME

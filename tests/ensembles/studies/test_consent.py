@@ -12,7 +12,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.config.consent import kept_sources
+from flocsim.ensembles.config.sources import kept_sources
 from flocsim.errors import ConfigError, UsageError
 from flocsim.io.results.file import read_results, write_results
 from tests.helpers.own_force import OWN, write_own

@@ -8,8 +8,8 @@ import pytest
 
 import flocsim
 from flocsim.ensembles import run
+from flocsim.ensembles.config.toml_text import toml_text
 from flocsim.ensembles.studies.study import settings_of
-from flocsim.ensembles.studies.text import toml_text
 from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
 from tests.helpers.small_study import SMALL, command, write_small
 

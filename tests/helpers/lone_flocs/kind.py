@@ -23,8 +23,7 @@ from flocsim.ensembles.storage.identity import (
     machine_facts,
     shape_numbers,
 )
-from flocsim.ensembles.storage.row_store import OldTable, RowStore
-from flocsim.ensembles.storage.shared_rows import ReadOnlyJournal
+from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
 from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import flocs_of
 from flocsim.geometry.shapes.sphere import Sphere

@@ -3,9 +3,19 @@
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.fit import Fit, fit_mask
+from flocsim.geometry.fit import fit_mask
+from flocsim.geometry.fit.fit import Fit
+from flocsim.geometry.shapes.synthetic import synthetic_floc
 from flocsim.io.images.pictures import segment
-from flocsim.io.plots.overlay import FLOC_COLOUR, REASON_COLOURS, draw_overlay, stretched
+from flocsim.io.plots.overlay import (
+    FLOC_COLOUR,
+    REASON_COLOURS,
+    covered_by,
+    draw_overlay,
+    single_fit,
+    stretched,
+    swept_rings,
+)
 from flocsim.io.plots.style import save
 
 
@@ -59,3 +69,28 @@ def test_a_dim_picture_becomes_visible():
     assert np.percentile(stretched(light), 20) == pytest.approx(0.35, abs=0.01)
     for flat in (np.zeros((5, 5)), np.ones((5, 5)), np.full((5, 5), 0.3)):
         assert np.isfinite(stretched(flat)).all()
+
+
+@pytest.mark.parametrize("vertices", [1, 4, 32])
+def test_the_pixels_that_differ_are_those_of_the_fit(vertices, tmp_path):
+    mask = np.pad(synthetic_floc((1, 3), 40, 1.8), 2)
+    fit = fit_mask(mask, vertices=vertices)
+    rings = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, 64)]
+    wrong = int((covered_by(rings, mask.shape) != mask).sum())
+    # Chords in the place of arcs may miss a pixel that lies on one.
+    assert wrong == pytest.approx(fit.wrong_pixels, abs=2)
+    figure = single_fit(mask, fit, "a$b#1")
+    assert [axes.get_title(loc="left").partition(" ")[0] for axes in figure.axes] == [
+        "mask:", "core:", "swept", "V"
+    ]  # fmt: skip
+    save(figure, tmp_path / "f.png")
+
+
+def test_holes_are_drawn_as_such():
+    y, x = np.mgrid[:50, :50]
+    mask = (np.hypot(x - 25, y - 25) < 20) & (np.hypot(x - 25, y - 25) > 8)
+    fit = fit_mask(mask, vertices=24, holes=True)
+    assert fit.hole_sizes
+    rings = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, 64)]
+    assert not covered_by(rings, mask.shape)[25, 25]
+    assert len(single_fit(mask, fit).axes[1].patches) == 2

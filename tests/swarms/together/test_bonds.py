@@ -14,8 +14,7 @@ from flocsim.bonds.certificate import CALM
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision.encounter import make_encounter
-from flocsim.ensembles.collision.observed import REST_TIME
-from flocsim.ensembles.collision.resting import bond_of, start_rest
+from flocsim.ensembles.collision.outcomes import REST_TIME, bond_of, start_rest
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts

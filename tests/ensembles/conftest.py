@@ -1,4 +1,4 @@
-"""A small study of spheres, run once for all tests of this folder."""
+"""A small study of spheres, run once for all tests that want one."""
 
 import pytest
 

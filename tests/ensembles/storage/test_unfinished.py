@@ -7,7 +7,7 @@ from flocsim.__main__ import main
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
 from flocsim.ensembles.pairs import kind as pairs
-from flocsim.ensembles.unfinished import read_unfinished
+from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
 from flocsim.io.journal.journal import Journal, journal_of
 from flocsim.io.journal.records import SESSION, encode

@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from flocsim.ensembles.pilot.sample import (
+from flocsim.ensembles.pilot.trials import (
     LADDER,
     LEAST,
     MOST,

@@ -1,4 +1,6 @@
-"""What becomes of two bodies under thermal motion: the observer where random forces kick them.
+"""Two bodies under thermal motion: where they are let go, and what becomes of them.
+
+Where random forces kick them the observer is `watch_kicked_pair`.
 
 No proof that follows from drifts and loads alone holds where kicks act, so that each is held
 against k_B T:
@@ -13,21 +15,28 @@ against k_B T:
 - Certificate, rest and hook: by BARRIER k_B T besides what they need without kicks (flocsim.bonds).
 - Held: by BARRIER k_B T on either side of a secondary minimum of spheres, or of surface forces.
 
-What is none of these goes on until it is, or is undecided at the end.
+What is none of these goes on until it is, or is undecided at the end. A pair that has not touched
+is kept by kicks between the barriers of a secondary minimum (`caged_between`).
 """
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 import flocsim.arrays as at
 from flocsim.bonds.bond import NO_BOND, are_spheres, bond_between, radii_of
-from flocsim.ensembles.collision.observed import (
+from flocsim.ensembles.collision.meetings import GAPS
+from flocsim.ensembles.collision.outcomes import (
     BODY_I,
     BODY_J,
     BOND,
+    BOUND,
     BROWNIAN,
     CAGE_HIGH,
     CAGE_LOW,
     COLLIDED,
+    DEPARTED,
     DRIFT_X,
     DRIFT_Y,
     ESCAPE,
@@ -35,13 +44,18 @@ from flocsim.ensembles.collision.observed import (
     FLOW_XY,
     FLOW_YX,
     FLOW_YY,
+    HELD,
     IN_FLOW,
     KICK_ENERGY,
+    MISSED,
     MOBILITY_I,
     MOBILITY_J,
+    bond_in_kicks,
+    look_at_pair,
 )
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED, look_at_pair
-from flocsim.ensembles.collision.resting import bond_in_kicks
+from flocsim.ensembles.config.pair_scene import PairScene
+from flocsim.errors import ConfigError
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.rhs.climb import repulsion_at
 
 RETURN_SHARE = 1e-4
@@ -118,3 +132,65 @@ def watch_kicked_pair(scene, work, observed, time):
         return HELD if is_caged(scene, work, observed, time) else 0
     observed[BOND] = bond_in_kicks(scene, work, observed, time)
     return 0 if observed[BOND] == NO_BOND else BOUND
+
+
+def caged_between(
+    speeds: np.ndarray, mobility: float, load: float, barrier: float
+) -> tuple[float, float]:  # fmt: skip
+    """Between which gaps [m] more than the energy ``barrier`` [J] lies on either side of a pair
+    that has not touched, a ``load`` [N] helping it out, or in; (0, 0) for no such place.
+
+    ``speeds`` as of `speeds_of`, which took this ``mobility``; of several such places the one of
+    the highest barriers.
+    """
+    repulsion = speeds[1] / mobility
+    rises = -0.5 * (repulsion[1:] + repulsion[:-1]) * np.diff(GAPS)
+    potential = np.append(0.0, np.cumsum(rises))
+    outwards, inwards = potential - load * GAPS, potential + load * GAPS
+    above = np.maximum.accumulate(outwards[::-1])[::-1] - outwards
+    below = np.maximum.accumulate(inwards) - inwards
+    least = np.minimum(above, below)
+    best = int(np.argmax(least))
+    if not least[best] > barrier:
+        return 0.0, 0.0
+    outside = np.flatnonzero(~(least > barrier))
+    first = int(outside[outside < best].max(initial=-1)) + 1
+    last = int(outside[outside > best].min(initial=len(GAPS))) - 1
+    return float(GAPS[first]), float(GAPS[last])
+
+
+def ends_of(options: PairScene, shapes: Sequence[Shape]) -> tuple[float, float]:
+    """Distances of the centres [m] at which two bodies are let go, and at which they have missed
+    each other."""
+    size = sum(shape.equivalent_radius for shape in shapes)
+    return options.release * size, options.escape * size
+
+
+def refuse_release(
+    options: PairScene, shapes: Sequence[Shape], diffusion: float = math.inf
+) -> None:
+    """ConfigError where two bodies do not diffuse, or their outlines may touch as they are let go.
+
+    ``diffusion``: D of the two against each other [m²/s].
+    """
+    if not diffusion > 0.0:
+        raise ConfigError(
+            "two bodies that do not diffuse never meet: add [forces.thermal], of a temperature "
+            "above 0 K"
+        )
+    size = sum(shape.equivalent_radius for shape in shapes)
+    outer = sum(shape.bounding_radius for shape in shapes)
+    if not outer < ends_of(options, shapes)[0]:
+        raise ConfigError(
+            f"scene.release = {options.release:g} (r_i + r_j) lets outlines touch that reach "
+            f"{outer / size:.3g} (r_i + r_j): give a larger one, and scene.escape above it"
+        )
+
+
+def start_apart(angles: Sequence[float], direction: float, far: float) -> np.ndarray:
+    """Places (2, 3) [m, m, rad] of i at the origin and j at a distance ``far``, in a direction that
+    is a share of a full turn."""
+    turn = 2.0 * math.pi * direction
+    return np.array(
+        [[0.0, 0.0, angles[0]], [far * math.cos(turn), far * math.sin(turn), angles[1]]]
+    )

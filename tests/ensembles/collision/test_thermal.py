@@ -10,12 +10,22 @@ import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.bond import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
-from flocsim.ensembles.collision import observed as numbers
+from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import KICKED, OBSERVER, make_encounter
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
-from flocsim.ensembles.collision.resting import bond_in_kicks
-from flocsim.ensembles.collision.thermal import kicked
+from flocsim.ensembles.collision.meetings import GAPS, speeds_of
+from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED, bond_in_kicks
+from flocsim.ensembles.collision.thermal import (
+    RETURN_SHARE,
+    caged_between,
+    ends_of,
+    refuse_release,
+    return_bound,
+    start_apart,
+    watch_kicked_pair,
+)
+from flocsim.ensembles.config.pair_scene import BrownianScene
 from flocsim.errors import UsageError
+from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes
@@ -44,7 +54,7 @@ class Pair:
         self.encounter.__dict__["scene"] = self.scene
         self.work = self.encounter.start((0.0, 0.0), 0.0)
         self.observed = self.encounter.observed()
-        self.observed[numbers.COLLIDED] = collided
+        self.observed[outcomes.COLLIDED] = collided
         self.total = sum(shape.radius for shape in self.shapes)
 
     def put(self, x, y, drifting=True):
@@ -62,11 +72,11 @@ class Pair:
         return self
 
     def seen(self):
-        return kicked.watch_kicked_pair(self.scene, self.work, self.observed, 0.0)
+        return watch_kicked_pair(self.scene, self.work, self.observed, 0.0)
 
     def bound(self):
         """The bound of the probability to come back."""
-        return kicked.return_bound(self.scene, self.work, self.observed, 0.0)
+        return return_bound(self.scene, self.work, self.observed, 0.0)
 
     def bond(self, time=0.0):
         return bond_in_kicks(self.scene, self.work, self.observed, time)
@@ -75,10 +85,10 @@ class Pair:
 def test_the_observer_is_that_of_kicks_where_there_are_any(tmp_path):
     pair = Pair(tmp_path)
     assert pair.encounter.observer is KICKED
-    assert pair.observed[numbers.KICK_ENERGY] == pytest.approx(ENERGY)
+    assert pair.observed[outcomes.KICK_ENERGY] == pytest.approx(ENERGY)
     cold = make_encounter(small_config(tmp_path), pair.shapes, 3.5e-6)
     assert cold.observer is OBSERVER
-    assert cold.observed()[numbers.KICK_ENERGY] == 0.0
+    assert cold.observed()[outcomes.KICK_ENERGY] == 0.0
 
 
 def disc_return(speed, diffusion, touch, distance):
@@ -102,11 +112,11 @@ def test_a_settling_pair_has_parted_where_it_hardly_comes_back(tmp_path):
         exact = disc_return(speed, diffusion, 3e-6, 3e-6 + gap)
         assert exact <= bounds[-1] <= 1.0
         assert bounds[-1] == pytest.approx(math.exp(-0.5 * gap / scale), rel=1e-6)
-    assert bounds[-1] > kicked.RETURN_SHARE
-    enough = -2.0 * math.log(kicked.RETURN_SHARE) * scale
+    assert bounds[-1] > RETURN_SHARE
+    enough = -2.0 * math.log(RETURN_SHARE) * scale
     assert pair.put(0.0, -3e-6 - 0.99 * enough).seen() == 0
     assert pair.put(0.0, -3e-6 - 1.01 * enough).seen() == MISSED
-    pair.observed[numbers.COLLIDED] = 1.0
+    pair.observed[outcomes.COLLIDED] = 1.0
     assert pair.put(0.0, -3e-6 - 1.01 * enough).seen() == DEPARTED
 
 
@@ -143,9 +153,9 @@ def test_a_brownian_pair_has_missed_where_the_study_says_so(tmp_path):
     assert pair.encounter.ends == pytest.approx((4.5e-6, 9e-6))
     assert pair.put(8.99e-6, 0.0).seen() == 0
     assert pair.put(0.0, -9.01e-6).seen() == MISSED
-    pair.observed[numbers.COLLIDED] = 1.0
+    pair.observed[outcomes.COLLIDED] = 1.0
     assert pair.put(6.4e-6, 6.4e-6).seen() == DEPARTED
-    assert pair.observed[numbers.LOAD] == 0.0
+    assert pair.observed[outcomes.LOAD] == 0.0
 
 
 def test_a_brownian_pair_starts_in_any_direction(tmp_path):
@@ -174,9 +184,9 @@ def test_a_bond_takes_more_than_twenty_thermal_energies(tmp_path, gap, depth, ki
 def test_in_settling_the_load_is_taken_off(tmp_path):
     forces = {"van_der_waals": {"hamaker": hamaker_of(21.5)}}
     pair = Pair(tmp_path, {}, forces, collided=1.0).put(0.0, -3e-6 + 1e-12, drifting=False)
-    pair.observed[numbers.LOAD] = 0.0
+    pair.observed[outcomes.LOAD] = 0.0
     assert pair.bond() == CERTIFICATE
-    pair.observed[numbers.LOAD] = 1e-12
+    pair.observed[outcomes.LOAD] = 1e-12
     assert pair.bond() == NO_BOND
 
 
@@ -205,10 +215,10 @@ def test_shapes_rest_where_kicks_cannot_lift_them_by_their_rounding(tmp_path, te
     shapes = [square(8e-6, 1e-6), square(14e-6, 1e-6)]
     warm = {"thermal": {"temperature": temperature, "kick": "1 ms"}}
     pair = Pair(tmp_path, {}, warm, shapes, collided=1.0).put(0.0, -24e-6 + 1e-12, drifting=False)
-    load = pair.observed[numbers.LOAD] * 1e-6 / (BOLTZMANN * temperature)
+    load = pair.observed[outcomes.LOAD] * 1e-6 / (BOLTZMANN * temperature)
     assert (load > BARRIER) == (kind == REST)
     pair.bond()
-    assert pair.bond(time=1.1 * pair.observed[numbers.REST_TIME]) == kind
+    assert pair.bond(time=1.1 * pair.observed[outcomes.REST_TIME]) == kind
 
 
 CAGING = {"van_der_waals": {"hamaker": "2e-19 J"},
@@ -217,14 +227,14 @@ CAGING = {"van_der_waals": {"hamaker": "2e-19 J"},
 
 def test_a_secondary_minimum_holds_above_twenty_thermal_energies_on_either_side(tmp_path):
     pair = Pair(tmp_path, BROWNIAN, CAGING)
-    low, high = pair.observed[numbers.CAGE_LOW : numbers.CAGE_HIGH + 1]
+    low, high = pair.observed[outcomes.CAGE_LOW : outcomes.CAGE_HIGH + 1]
     assert 0.0 < low < high < 1e-6
     middle = math.sqrt(low * high)
     assert pair.put(3e-6 + middle, 0.0).seen() == HELD
     assert pair.put(3e-6 + 0.9 * low, 0.0).seen() == pair.put(3e-6 + 1.1 * high, 0.0).seen() == 0
     weak = CAGING | {"van_der_waals": {"hamaker": "5e-21 J"}}
     shallow = Pair(tmp_path, BROWNIAN, weak)
-    assert shallow.observed[numbers.CAGE_HIGH] == 0.0
+    assert shallow.observed[outcomes.CAGE_HIGH] == 0.0
 
 
 def test_shapes_come_round_what_acts_between_their_centres(tmp_path):
@@ -238,3 +248,62 @@ def test_a_release_at_which_outlines_would_touch_is_refused(tmp_path):
     rod = SpheroPolygon([(-9e-6, 0.0), (9e-6, 0.0)], 5e-7)
     with pytest.raises(UsageError, match=r"scene.release = 2 \(r_i \+ r_j\) lets outlines touch"):
         Pair(tmp_path, BROWNIAN, shapes=[rod, rod])
+
+
+FORCES = (VanDerWaals(2e-19), DoubleLayer(50e-3, 20e-9))
+"""A secondary minimum of hundreds of k_B T behind a barrier."""
+
+
+def test_a_cage_has_the_barrier_on_both_sides():
+    radii, mobility = (5e-6, 5e-6), 1e7
+    speeds = speeds_of((*FORCES, StokesDrag()), None, radii, mobility)
+    potential = np.append(0.0, -np.cumsum(
+        0.5 * (speeds[1, 1:] + speeds[1, :-1]) * np.diff(GAPS)
+    )) / mobility  # fmt: skip
+    place = int(np.argmin(np.where(GAPS > 2e-8, potential, np.inf)))
+    depth = potential[-1] - potential[place]
+    low, high = caged_between(speeds, mobility, 0.0, 0.5 * depth)
+    assert low < GAPS[place] < high
+    for end in (low, high):
+        assert potential[-1] - potential[end == GAPS][0] >= 0.5 * depth
+    assert caged_between(speeds, mobility, 0.0, 1.1 * depth) == (0.0, 0.0)
+
+
+def test_a_load_may_open_a_cage():
+    speeds = speeds_of((*FORCES, StokesDrag()), None, (5e-6, 5e-6), 1e7)
+    strongest = -speeds[1][GAPS > 2e-8].min() / 1e7
+    assert caged_between(speeds, 1e7, 0.0, 1e-20)[1] > 0.0
+    assert caged_between(speeds, 1e7, 2.0 * strongest, 1e-20) == (0.0, 0.0)
+
+
+def test_what_attracts_everywhere_is_no_cage():
+    speeds = speeds_of((VanDerWaals(1e-18),), None, (5e-6, 5e-6), 1e7)
+    assert caged_between(speeds, 1e7, 0.0, 1e-21) == (0.0, 0.0)
+
+
+SPHERES = (Sphere(1e-6), Sphere(3e-6))
+SCENE = BrownianScene(release=1.5, escape=5.0)
+
+
+def test_distances_are_multiples_of_the_sum_of_radii():
+    assert ends_of(SCENE, SPHERES) == pytest.approx((6e-6, 2e-5))
+    usual = BrownianScene()
+    assert (usual.release, usual.escape, usual.delta) == (2.0, 4.0, (0.0,))
+
+
+def test_a_start_is_as_far_away_in_any_direction():
+    for share in (0.0, 0.3, 0.9):
+        places = start_apart((1.0, 2.0), share, 6e-6)
+        assert places[:, 2].tolist() == [1.0, 2.0] and places[0, :2].tolist() == [0.0, 0.0]
+        assert math.hypot(*places[1, :2]) == pytest.approx(6e-6)
+        turn = math.atan2(places[1, 1], places[1, 0]) / (2.0 * math.pi)
+        assert turn % 1.0 == pytest.approx(share)
+
+
+def test_what_never_meets_or_touches_at_first_is_refused():
+    refuse_release(SCENE, SPHERES, 1e-13)
+    with pytest.raises(UsageError, match="do not diffuse never meet"):
+        refuse_release(SCENE, SPHERES, 0.0)
+    rod = SpheroPolygon([(-9e-6, 0.0), (9e-6, 0.0)], 5e-7)
+    with pytest.raises(UsageError, match=r"scene.release = 1.5 \(r_i \+ r_j\) lets outlines"):
+        refuse_release(SCENE, (rod, rod), 1e-13)

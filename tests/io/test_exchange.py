@@ -7,14 +7,15 @@ import shapely
 from flocsim import Composite, Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import UsageError
-from flocsim.io.exchange.gsd_file import outer_ring, write_gsd
-from flocsim.io.exchange.outlines import (
+from flocsim.io.exchange import (
     MOST_FRAMES,
     area_of,
     frames_of,
     is_hole,
+    outer_ring,
     placed,
     rings_of,
+    write_gsd,
 )
 from flocsim.io.trajectory import read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from flocsim.io.own_mark import PLACES, is_marked, is_own, marked
+from flocsim.io.outputs import PLACES, is_marked, is_own, marked
 from flocsim.io.plots.collision import draw_distance
 from flocsim.io.plots.style import FORMATS, save
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.pilot.model import (
+from flocsim.ensembles.pilot.ladder import (
     EXPONENT,
     EXPONENT_SPREAD,
     EXPONENTS,

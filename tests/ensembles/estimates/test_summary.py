@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.outlines import outline_changes, outline_sums
 from flocsim.ensembles.estimates.statistics import CODES, COUNTED, tabulate
-from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
+from flocsim.ensembles.estimates.summary import (
+    added,
+    outline_changes,
+    outline_sums,
+    sums_of,
+    tables_of,
+)
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, OUTLINES
 
 A, B, C, D, MISSED, UNDECIDED = (

@@ -1,3 +1,0 @@
-"""Pairs under thermal motion: where they are let go (release), where kicks keep them apart (cage),
-and what becomes of them (kicked).
-"""
