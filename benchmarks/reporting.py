@@ -11,7 +11,7 @@ from pathlib import Path
 
 import attrs
 
-from flocsim.io.provenance import processor
+from flocsim.io.results.run_group import processor
 from flocsim.io.terminal import markdown_table
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
     from flocsim.io.results.sweep_file import SweepResults
-    from flocsim.swarms.swarm import Swarm
-    from flocsim.swarms.trajectory import SwarmTrajectory
-    from flocsim.swarms.walls import floor, wall
+    from flocsim.swarms.placement import floor, wall
+    from flocsim.swarms.swarm import Swarm, SwarmTrajectory
     from flocsim.system import System
     from flocsim.trajectories.trajectory import State, Trajectory
 
@@ -49,7 +48,7 @@ HOMES = {
     "Swarm": "swarms.swarm",
     "SwarmComparison": "ensembles.swarms.comparison",
     "SwarmResults": "io.results.swarm_file",
-    "SwarmTrajectory": "swarms.trajectory",
+    "SwarmTrajectory": "swarms.swarm",
     "Study": "ensembles.studies.study",
     "Comparison": "ensembles.pairs.comparison",
     "StudyResults": "ensembles.pairs.opened",
@@ -58,10 +57,10 @@ HOMES = {
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.comparison",
     "curvilinear_factor": "io.results.curvilinear",
-    "floor": "swarms.walls",
+    "floor": "swarms.placement",
     "open": "ensembles.contents:open_any",
     "sweep": "ensembles.studies.sweep",
-    "wall": "swarms.walls",
+    "wall": "swarms.placement",
 }
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked
 for: a job takes over Ctrl-C before it loads any."""

@@ -33,7 +33,7 @@ from flocsim.ensembles.pilot.trials import Job, is_flip, sample_of, try_out
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from flocsim.io.confidence import wilson
-from flocsim.io.results.run_words import choice_lines
+from flocsim.io.results.run_group import choice_lines
 
 STUDIES = {
     "tang2014 I": 'preset = "tang2014"\n[scene]\ntypes = ["I"]',

@@ -121,8 +121,7 @@ def read_masks_file(path):
 
 def read_config_file(path):
     """Load it, and take its text for a setting of the command line."""
-    from flocsim.ensembles.config.loader import load_config
-    from flocsim.ensembles.config.overrides import nested, parse_setting
+    from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 
     text = path.read_bytes().decode("utf-8", "replace")
     try:

@@ -14,7 +14,7 @@ from claims.table import number_text
 from output import marked, save_all, write_page, write_table
 from sweeps import TYPES, Sweep, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.config.overrides import nested
+from flocsim.ensembles.config.loader import nested
 from flocsim.io.plots.style import house_style, new_figure, set_probability_axis
 from flocsim.io.terminal import markdown_table
 

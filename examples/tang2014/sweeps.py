@@ -11,7 +11,7 @@ from claims.verdicts import interval_of
 from scipy.optimize import isotonic_regression
 
 from flocsim.ensembles import load_config, run
-from flocsim.ensembles.config.overrides import lay_over
+from flocsim.ensembles.config.loader import lay_over
 from flocsim.io.confidence import proportion
 from flocsim.io.results.file import CLASSES
 

@@ -27,8 +27,7 @@ from flocsim.commands.precision.judged import (
 )
 from flocsim.ensembles.collision.checking import TIGHTER, exact_method
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
 from flocsim.ensembles.preflight import check_study, measured_flocs

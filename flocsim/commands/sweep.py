@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
 from flocsim.io.outputs import OVERWRITE_HELP

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.overrides import nested, parse_setting
+from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pairs.replicates import chosen, one_count_study, replicate_of
 from flocsim.ensembles.preflight import check_study, inputs_of

@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 def overrides(arguments: argparse.Namespace) -> dict:
     """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.overrides import nested, parse_setting
+    from flocsim.ensembles.config.loader import nested, parse_setting
 
     given = nested(map(parse_setting, arguments.settings))
     if arguments.seed is not None:

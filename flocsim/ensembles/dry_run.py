@@ -40,7 +40,7 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.interruption import INTERRUPTION, stop_requested
-from flocsim.io.results.run_words import choice_lines, class_words, sphere_words
+from flocsim.io.results.run_group import choice_lines, class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.shapes.fit_report import coarse_line
 from flocsim.io.terminal import duration

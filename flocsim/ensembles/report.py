@@ -13,7 +13,7 @@ from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.events import HOOK, MOST_UNKNOWN
 from flocsim.io.results.file import CLASSES
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
-from flocsim.io.results.run_words import describe_note
+from flocsim.io.results.run_group import describe_note
 from flocsim.io.results.schema import Results
 
 ENDS = {

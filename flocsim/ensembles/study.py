@@ -25,7 +25,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.run_words import class_words
+from flocsim.io.results.run_group import class_words
 from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 

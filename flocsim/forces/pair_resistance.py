@@ -19,7 +19,7 @@ from flocsim.forces.drag import StokesDrag
 from flocsim.forces.shape_drag import facts_of
 from flocsim.forces.thermal import Thermal
 from flocsim.hydrodynamics import pair, pair_table, two_spheres
-from flocsim.hydrodynamics.fading import FADES_FROM, fading
+from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
 
 NEAR = 0.5
 """Gap of the outlines over the mean radius at which relative motion is that at the distance of the

@@ -3,11 +3,13 @@
 A window is tried until no body of it strays further from its straight path than others have counted
 on: where one did, islands are found anew with paths as wide as it went, those that merge by that
 are run anew, and after some tries the window is made shorter. What islands have come to is taken
-over all at once, so that a window leaves nothing behind that is half done.
+over all at once, so that a window leaves nothing behind that is half done. An island of the same
+bodies as before is not run again (`Finished`).
 """
 
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -16,17 +18,70 @@ import flocsim.arrays as at
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import (
     BEGIN,
+    EARLIER_BODY,
     END,
     FORCES_SUMMED,
     HORIZON_AT,
+    LATER_BODY,
+    LINK_COLUMNS,
+    SLIP_COLUMNS,
     STEPS_REJECTED,
     STEPS_TAKEN,
     Swarm,
     with_links,
 )
-from flocsim.swarms.finished import Finished
 from flocsim.swarms.leaving import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
+
+if TYPE_CHECKING:
+    from flocsim.swarms.runner import Islands
+
+NONE = -1
+"""Label of a body whose island has not been run."""
+
+
+class Finished:
+    """The islands that have been run to the end of one window, of ``free`` (n,) bodies that move.
+
+    ``labels`` (n,): which of them a free body is of; ``sizes`` (k,): bodies of each;
+    ``links`` and ``slips``: the contacts that they leave, in any order.
+    """
+
+    def __init__(self, free: np.ndarray) -> None:
+        self.free = free
+        self.labels = np.full(len(free), NONE)
+        self.sizes = np.zeros(0, dtype=np.int64)
+        self.links = np.zeros((0, LINK_COLUMNS), dtype=np.int64)
+        self.slips = np.zeros((0, SLIP_COLUMNS))
+
+    def owners(self, links: np.ndarray) -> np.ndarray:
+        """A free body of every contact."""
+        later = links[:, LATER_BODY]
+        return np.where(self.free[later], later, links[:, EARLIER_BODY])
+
+    def missing(self, islands: "Islands") -> np.ndarray:
+        """Which islands are not among them. One of the same free bodies, and as many fixed ones,
+        has the same of these: it can reach no fewer than before."""
+        if not len(self.sizes):
+            return np.arange(len(islands.sizes))
+        free, starts = self.free[islands.members], islands.starts[:-1]
+        labels = self.labels[islands.members]
+        last = np.maximum.reduceat(np.where(free, labels, NONE), starts)
+        first = np.minimum.reduceat(np.where(free, labels, len(self.sizes)), starts)
+        return np.flatnonzero((first != last) | (islands.sizes != self.sizes[last]))
+
+    def add(self, islands: "Islands", links: np.ndarray, slips: np.ndarray) -> None:
+        """Add islands, with the contacts that they leave; what was known of their bodies goes."""
+        island = np.repeat(np.arange(len(islands.sizes)), islands.sizes)
+        free = self.free[islands.members]
+        bodies = islands.members[free]
+        self.labels[bodies] = NONE
+        kept = self.labels[self.owners(self.links)] != NONE
+        self.labels[bodies] = len(self.sizes) + island[free]
+        self.sizes = np.append(self.sizes, islands.sizes)
+        self.links = np.concatenate([self.links[kept], links])
+        self.slips = np.concatenate([self.slips[kept], slips])
+
 
 LEAST_WANDER = 0.05
 """A body may stray by so many bounding radii at least."""

@@ -16,7 +16,7 @@ from flocsim.errors import ConfigError
 from flocsim.forces import Thermal
 from flocsim.io.confidence import wilson
 from flocsim.io.results.file import read_results, same_data
-from flocsim.io.results.run_words import sphere_words
+from flocsim.io.results.run_group import sphere_words
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 
 STUDY = """\

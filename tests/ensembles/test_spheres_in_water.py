@@ -5,7 +5,7 @@ import pytest
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.equivalent_spheres import water_facts
 from flocsim.errors import UsageError
-from flocsim.io.results.run_words import water_words
+from flocsim.io.results.run_group import water_words
 
 PAIRS = """\
 preset = "si"

@@ -3,13 +3,18 @@
 import math
 from itertools import combinations
 
+import attrs
 import numpy as np
 import pytest
 
-from flocsim import Sphere, SpheroPolygon
+from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
+from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.shapes.cores import distance_between
-from flocsim.swarms.placement import place_at_random
+from flocsim.integrators import Status
+from flocsim.swarms.placement import floor, place_at_random, wall
+from flocsim.swarms.swarm import Swarm
+from tests.helpers.swarm_scenes import WATER, R
 
 STAR = SpheroPolygon(
     np.array([
@@ -69,3 +74,119 @@ def test_what_cannot_be_placed_is_said():
         place_at_random([Sphere(1.0)] * 100, (side, side), np.random.default_rng(4))
     with pytest.raises(UsageError, match="too little for bodies of up to 2 m"):
         place_at_random([Sphere(1.0)], (3.0, 100.0), np.random.default_rng(4))
+
+
+THIN = 1e-5
+DISC = 50e-6
+LONG = 2e-3
+STIFFNESS = 20.0
+
+
+def laws():
+    """Springs without friction: what holds a disc at rest is exact."""
+    return [Gravity(), StokesDrag(), Contact(k_n=STIFFNESS, k_t=0.0)]
+
+
+def pit(slope, apart, above=1e-7):
+    """(two walls that rise from (∓apart, 0) at an angle, a disc just above both)."""
+    walls = [
+        wall(
+            (sign * apart, 0.0),
+            (sign * (apart + LONG * math.cos(slope)), LONG * math.sin(slope)),
+            radius=THIN,
+        )
+        for sign in (1.0, -1.0)
+    ]
+    height = (DISC + THIN - apart * math.sin(slope)) / math.cos(slope) + above
+    return walls, Body(Sphere(DISC), (0.0, height), density=2650.0)
+
+
+def loads(bodies, position):
+    """The overlap of the last body with each of the others, times k_n [N]; 0 where apart."""
+    parts = [
+        body.shape.placed_parts(*place)
+        for body, place in zip(bodies, position.tolist(), strict=True)
+    ]
+    from flocsim.geometry.shapes.parts import core_gap
+
+    gaps = [core_gap(each[0], parts[-1][0]) - each[0].radius - DISC for each in parts[:-1]]
+    return STIFFNESS * np.maximum(0.0, -np.array(gaps))
+
+
+@pytest.mark.parametrize("together", [System, Swarm])
+@pytest.mark.parametrize("extra", [0, 12])
+@pytest.mark.parametrize(("slope", "apart"), [(45.0, 0.0), (45.0, -1e-4), (30.0, 5e-6)])
+def test_walls_that_meet_or_cross_share_a_weight_evenly(slope, apart, extra, together):
+    """N = m g/(2 cos θ) on both, whether they meet in a corner or cross, and however many others
+    cross them below."""
+    walls, disc = pit(math.radians(slope), apart)
+    below = [
+        wall((-1e-3, -1e-5 * k - 2e-4), (1e-3, 1e-5 * k - 2e-4), radius=THIN) for k in range(extra)
+    ]
+    bodies = [*walls, *below, disc]
+    run = together(bodies, laws(), fluid=WATER).run(5.0)
+    assert run.status == Status.FINISHED
+    expected = 9.81 * disc.buoyant_mass(WATER) / (2.0 * math.cos(math.radians(slope)))
+    found = loads(bodies, run.position[-1])
+    assert found[:2] == pytest.approx(expected, rel=1e-4)
+    assert not found[2:].any()
+
+
+def test_a_corner_is_the_same_wherever_it_is_and_however_bodies_are_numbered():
+    walls, disc = pit(math.radians(45.0), 0.0, above=1e-5)
+    bodies = [*walls, disc]
+    there = Swarm(bodies, laws(), fluid=WATER).run(2.0)
+    shift = np.array([3.1e-3, -1.7e-3])
+    moved = [attrs.evolve(body, position=tuple(body.position + shift)) for body in bodies]
+    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
+        here = Swarm([moved[each] for each in order], laws(), fluid=WATER).run(2.0)
+        assert here.status == Status.FINISHED
+        back = here.position[-1, :, :2] - shift
+        assert np.abs(back - there.position[-1, order, :2]).max() < 1e-9
+
+
+def test_a_disc_is_pushed_into_the_corner_of_a_floor_and_a_wall_that_cross():
+    level = floor(1e-3, beyond=1e-4)
+    upright = wall((0.0, -1e-4), (0.0, 1e-3), radius=THIN)
+    disc = Body(Sphere(DISC), (DISC + 3e-5, DISC + 2e-5), velocity=(-1e-2, 0.0), density=2650.0)
+    for bodies in ([level, upright, disc], [disc, upright, level]):
+        run = Swarm(bodies, laws(), fluid=WATER).run(2.0)
+        x, y, _ = run.position[-1, bodies.index(disc)]
+        assert run.status == Status.FINISHED
+        weight = 9.81 * disc.buoyant_mass(WATER)
+        assert STIFFNESS * (DISC - y) == pytest.approx(weight, rel=1e-3)
+        assert x >= DISC + THIN - 1e-8
+
+
+@pytest.mark.parametrize("count", [5, 11, 40])
+def test_a_rough_floor_of_discs_that_overlap_carries_as_its_two_next_ones_do(count):
+    """A disc in the dip between two of them: N = m g/(2 cos α) from each, from no other."""
+    step = 1.2 * R
+    row = [
+        Body(Sphere(R), (step * (k - count // 2), 0.0), density=2650.0, fixed=True)
+        for k in range(count)
+    ]
+    height = math.sqrt((DISC + R) ** 2 - (0.5 * step) ** 2)
+    disc = Body(Sphere(DISC), (0.5 * step, height + 1e-8), density=2650.0)
+    for together in (System, Swarm):
+        run = together([*row, disc], laws(), fluid=WATER).run(5.0)
+        assert run.status == Status.FINISHED
+        away = run.position[-1, :-1, :2] - run.position[-1, -1, :2]
+        pushed = STIFFNESS * np.maximum(0.0, DISC + R - np.hypot(*away.T))
+        weight = 9.81 * disc.buoyant_mass(WATER)
+        lifted = pushed @ (-away[:, 1] / np.hypot(*away.T))
+        assert lifted == pytest.approx(weight, rel=1e-4)
+        two = pushed[[count // 2, count // 2 + 1]]
+        if count == 5:
+            assert two == pytest.approx(weight / 2.0 * (DISC + R) / height, rel=1e-3)
+
+
+def test_overlaps_at_the_start_are_refused_of_free_bodies_alone():
+    held = [Body(Sphere(R), (0.1 * R * k, 0.0), density=2650.0, fixed=True) for k in range(3)]
+    far = Body(Sphere(R), (0.0, 5.0 * R), density=2650.0)
+    inside = attrs.evolve(far, position=(0.2 * R, 0.5 * R))
+    for together in (System, Swarm):
+        assert together([*held, far], laws()).run(1e-6).status == Status.FINISHED
+        with pytest.raises(UsageError, match=r"bodies \d and \d start"):
+            together([*held, inside], laws()).run(1e-6)
+    assert System(held, laws()).run(1.0).status == Status.FINISHED

@@ -12,8 +12,8 @@ from flocsim.body import Fluid
 from flocsim.errors import UsageError
 from flocsim.forces import CentreForce, Contact, Gravity
 from flocsim.integrators import Status
+from flocsim.swarms.placement import floor, wall
 from flocsim.swarms.swarm import Swarm
-from flocsim.swarms.walls import floor, wall
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces
 
 SIDE = 12.0 * R

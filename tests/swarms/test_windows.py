@@ -17,9 +17,8 @@ from flocsim.swarms.arrays import (
     found_of,
     with_links,
 )
-from flocsim.swarms.finished import Finished
 from flocsim.swarms.islands import put_slips, take_slips, touch_plainly
-from flocsim.swarms.progress import Progress
+from flocsim.swarms.progress import Finished, Progress
 from flocsim.swarms.runner import CHUNK, Islands, chunks_of
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces

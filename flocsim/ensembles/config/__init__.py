@@ -2,7 +2,7 @@
 
 ``schema`` holds every table and key, ``pair_scene`` and ``kernel_scene`` those of [scene], a class
 for each kind of it, which other kinds keep in their folders (``kinds`` is the table of all);
-``loader`` makes a Config of a file. Under it lie ``presets``, over it ``--set`` (``overrides``);
+``loader`` makes a Config of a file. Under it lie ``presets``, over it ``--set``;
 ``sources`` keeps what was read of files. ``values`` reads one value, ``own_classes`` finds a user's
 force, integrator or shape,
 ``problems`` tells all that is wrong at once, with the lines that ``toml_text`` knows; ``page``

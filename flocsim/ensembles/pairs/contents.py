@@ -40,7 +40,7 @@ from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.sweep import SWEEP_FIGURES
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import OUTCOMES, Overview, read_overview, read_results, with_rows
-from flocsim.io.results.run_words import (
+from flocsim.io.results.run_group import (
     choice_lines,
     class_words,
     describe_note,
@@ -295,7 +295,7 @@ CONTENTS = Contents(
     title="results of a collision ensemble",
     read=partial(read_results, replicates=False), overview=read_overview, summary=summary,
     table=table, figures=figures, tables=tables_of,
-    examples=later("ensembles.pairs.examples", "examples_of"),
+    examples=later("ensembles.pairs.opened", "examples_of"),
     drawn={
         "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":
             FIGURES,

@@ -1,4 +1,6 @@
-"""StudyResults: a results file with its arrays, tables and figures, and its replicates anew."""
+"""StudyResults: a results file with its arrays, tables and figures, and its replicates anew; one of
+each class.
+"""
 
 import functools
 import os
@@ -12,7 +14,7 @@ import numpy as np
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Consent, Sources, read_sources
-from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.contents import Example, file_kind
 from flocsim.ensembles.equivalent_spheres import water_facts
 from flocsim.ensembles.pairs.replicates import (
     Place,
@@ -27,7 +29,7 @@ from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.study import Study, methods_of
-from flocsim.errors import ConfigError, FileError, UsageError
+from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.files import held
@@ -35,9 +37,9 @@ from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, save
-from flocsim.io.results.file import read_results, read_row
+from flocsim.io.results.file import first_of_each, read_results, read_row
 from flocsim.io.results.layout import FORMAT
-from flocsim.io.results.schema import GROUPS, Results
+from flocsim.io.results.schema import CLASSES, GROUPS, Results
 from flocsim.trajectories.trajectory import Trajectory
 
 STEPS_MORE = 1000
@@ -265,3 +267,24 @@ def open_results(
     file_kind(source, "rates")
     found = read_results(source, replicates=False)
     return StudyResults(found, source, None if folder is None else Path(folder), sources)
+
+
+def examples_of(path: str | os.PathLike, folder: str | os.PathLike | None) -> list[Example]:
+    """The first replicate of each class that the file has, of its flocs with the most vertices."""
+    opened = open_results(path, folder)
+    found = first_of_each(opened.source)
+    return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
+
+
+def example_of(opened: StudyResults, outcome: str, at: tuple[int, int, int, int]) -> Example:
+    """The Example at one place of the table of replicates."""
+    t, v, d, replicate = at
+    name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
+    title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {replicate}"
+    try:
+        trajectory = opened.replicate(replicate, name, vertices, delta)
+        place = place_of(opened.config, name, vertices, delta)
+        zone = opened.study_with(vertices).draw(*place, replicate).encounter.zone_distance
+    except FlocsimError as error:
+        return Example(outcome, title, reason=" ".join(str(error).split()))
+    return Example(outcome, title, trajectory, float(zone))

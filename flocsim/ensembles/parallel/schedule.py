@@ -20,7 +20,7 @@ from flocsim.ensembles.parallel.messages import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
 from flocsim.io.journal.records import data_digest, record_at
-from flocsim.io.results.run_words import describe_note
+from flocsim.io.results.run_group import describe_note
 
 SHORTEST_SECONDS = 0.25
 """Least time for a chunk [s]: asking costs about 1 ms."""

@@ -37,7 +37,7 @@ from flocsim.io.journal.records import CHUNK, SESSION, SNAPSHOT, encode
 from flocsim.io.json_text import matches
 from flocsim.io.opening import UNREADABLE
 from flocsim.io.outputs import extension_rule, in_the_way
-from flocsim.io.provenance import now
+from flocsim.io.results.run_group import now
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.config.overrides import lay_over, nested
+from flocsim.ensembles.config.loader import lay_over, load_any_config, nested
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources

@@ -23,9 +23,8 @@ from flocsim.io.journal.records import Record
 from flocsim.io.results.swarm_file import ENDS
 from flocsim.plausibility.settling import terminal_motion
 from flocsim.swarms.leaving import KEEP, Leaving
-from flocsim.swarms.placement import place_at_random
+from flocsim.swarms.placement import floor, place_at_random
 from flocsim.swarms.swarm import Swarm
-from flocsim.swarms.walls import floor
 from flocsim.system import System
 
 SPHERE = -1

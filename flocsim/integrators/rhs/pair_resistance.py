@@ -14,8 +14,8 @@ from collections.abc import Callable
 import flocsim.arrays as at
 from flocsim.compiler.composer import apart
 from flocsim.hooks import hook
-from flocsim.hydrodynamics.fading import fading
 from flocsim.hydrodynamics.pair_table import COLUMNS, NEAREST, NODES_A_UNIT
+from flocsim.hydrodynamics.two_spheres import fading
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.surface_gap import soften
 from flocsim.integrators.rhs.views import add_force, centre_line

@@ -9,8 +9,7 @@ import tomllib
 
 import pytest
 
-from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.overrides import lay_over
+from flocsim.ensembles.config.loader import lay_over, load_config
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import ROOT, problems
 

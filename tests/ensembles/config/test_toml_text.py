@@ -2,8 +2,7 @@
 
 import pytest
 
-from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.overrides import parse_setting
+from flocsim.ensembles.config.loader import load_config, parse_setting
 from flocsim.ensembles.config.toml_text import text_problem
 from flocsim.errors import ConfigError
 from tests.helpers.small_study import VALID

@@ -20,7 +20,7 @@ from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit
-from flocsim.io.results.run_words import choice_lines
+from flocsim.io.results.run_group import choice_lines
 from tests.helpers.small_study import small_config
 
 AUTO = {"integrator": {"accuracy": "auto"}, "shapes": {"vertices": [1]}}

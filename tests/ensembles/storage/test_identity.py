@@ -26,7 +26,7 @@ NOT_PHYSICS = {
     "io/hdf5/": "reads flocs, and these are compared themselves",
     "ensembles/kind.py": "what the machine asks of studies",
     "io/results/checks.py": "what is believed of files",
-    "io/results/run_words.py": "text for people",
+    "io/results/run_group.py": "text for people",
     "io/json_text.py": "reads flocs, and these are compared themselves",
     "io/opening.py": "reads flocs, and these are compared themselves",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",

@@ -10,7 +10,7 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators.rhs.error import FREE_SHARE
-from flocsim.swarms.walls import floor
+from flocsim.swarms.placement import floor
 from tests.helpers.one_step import Stage, from_anywhere, from_before
 from tests.helpers.swarm_scenes import WATER, R, forces
 

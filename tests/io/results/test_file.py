@@ -12,7 +12,6 @@ import pytest
 
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io import files
-from flocsim.io.provenance import provenance
 from flocsim.io.results.file import (
     OUTCOMES,
     REPLICATES,
@@ -22,6 +21,7 @@ from flocsim.io.results.file import (
     write_results,
 )
 from flocsim.io.results.layout import SCHEMA_VERSION
+from flocsim.io.results.run_group import provenance
 from tests.helpers.synthetic_results import FAILURES, make_results
 
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
