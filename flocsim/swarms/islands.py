@@ -9,36 +9,11 @@ changes no number.
 import math
 
 import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
 from flocsim.arrays import all_counting
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.slip_transfer import keep_slips
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
-from flocsim.swarms.arrays import (
-    AT_EDGE,
-    AT_VERTEX,
-    BEGIN,
-    EARLIER_BODY,
-    END,
-    ERROR_COLUMNS,
-    FORCES_SUMMED,
-    FURTHEST,
-    HALT,
-    HELD_FORCE,
-    HELD_GAP,
-    HORIZON_AT,
-    LATER_BODY,
-    MICRO_FLIGHTS,
-    MODE,
-    OFFSET,
-    PATH_VX,
-    PATH_VY,
-    SINCE,
-    SLIP,
-    START_X,
-    START_Y,
-    STEPS_REJECTED,
-    STEPS_TAKEN,
-)
 
 
 def watch_paths(scene, work, observed, time):
@@ -46,19 +21,19 @@ def watch_paths(scene, work, observed, time):
     stop."""
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, at.FREE] == 1.0:
-            since = time - observed[body, SINCE]
+            since = time - observed[body, sw.SINCE]
             x = (
                 work.motion[at.NOW, body, at.X]
-                - observed[body, START_X]
-                - since * observed[body, PATH_VX]
+                - observed[body, sw.START_X]
+                - since * observed[body, sw.PATH_VX]
             )
             y = (
                 work.motion[at.NOW, body, at.Y]
-                - observed[body, START_Y]
-                - since * observed[body, PATH_VY]
+                - observed[body, sw.START_Y]
+                - since * observed[body, sw.PATH_VY]
             )
-            observed[body, FURTHEST] = max(observed[body, FURTHEST], math.hypot(x, y))
-    return 1 if observed[0, HALT] != 0.0 else 0
+            observed[body, sw.FURTHEST] = max(observed[body, sw.FURTHEST], math.hypot(x, y))
+    return 1 if observed[0, sw.HALT] != 0.0 else 0
 
 
 def put_scene(swarm, scene, members, first):
@@ -95,7 +70,7 @@ def put_state(swarm, work, members, first):
         for axis in range(at.MOTION_COLUMNS):
             work.motion[at.NOW, body, axis] = swarm.motion[member, axis]
             work.motion[at.CARRIED, body, axis] = swarm.carried[member, axis]
-        for kind in range(ERROR_COLUMNS):
+        for kind in range(sw.ERROR_COLUMNS):
             work.bodies[body, at.ERROR_PLACE + kind] = swarm.errors[member, kind]
         work.order[body] = body
         work.cluster[body] = body
@@ -124,24 +99,24 @@ def put_slips(swarm, scene, work, members, first):
     for body in range(size):
         member = members[first + body]
         for link in range(swarm.first_link[member], swarm.first_link[member + 1]):
-            other = local_of(members, first, size, swarm.links[link, EARLIER_BODY])
+            other = local_of(members, first, size, swarm.links[link, sw.EARLIER_BODY])
             if other < 0:
                 continue
             if count == work.kept.shape[0]:
                 return False
             work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = body, other
             work.kept[count, at.KEPT_VERTEX] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, AT_VERTEX], body, other
+                swarm, scene, members, first, size, swarm.links[link, sw.AT_VERTEX], body, other
             )
             work.kept[count, at.KEPT_EDGE] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, AT_EDGE], body, other
+                swarm, scene, members, first, size, swarm.links[link, sw.AT_EDGE], body, other
             )
-            work.kept[count, at.KEPT_MODE] = swarm.links[link, MODE]
-            work.slip[at.KEPT_GAP, count] = swarm.slips[link, HELD_GAP]
-            work.slip[at.KEPT_FORCE, count] = swarm.slips[link, HELD_FORCE]
-            work.slip[at.KEPT_FLIGHTS, count] = swarm.slips[link, MICRO_FLIGHTS]
-            work.slip[at.KEPT_SLIP, count] = swarm.slips[link, SLIP]
-            work.slip[at.KEPT_OFFSET, count] = swarm.slips[link, OFFSET]
+            work.kept[count, at.KEPT_MODE] = swarm.links[link, sw.MODE]
+            work.slip[at.KEPT_GAP, count] = swarm.slips[link, sw.HELD_GAP]
+            work.slip[at.KEPT_FORCE, count] = swarm.slips[link, sw.HELD_FORCE]
+            work.slip[at.KEPT_FLIGHTS, count] = swarm.slips[link, sw.MICRO_FLIGHTS]
+            work.slip[at.KEPT_SLIP, count] = swarm.slips[link, sw.SLIP]
+            work.slip[at.KEPT_OFFSET, count] = swarm.slips[link, sw.OFFSET]
             count += 1
     work.tally[at.KEPT] = count + 1
     return True
@@ -178,8 +153,8 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
         clock[place] = start_clock[place]
     for place in range(at.COUNTS_SIZE):
         counts[place] = start_counts[place]
-    clock[at.TIME], clock[at.UNTIL] = swarm.times[BEGIN], swarm.times[END]
-    clock[at.HORIZON] = swarm.times[HORIZON_AT]
+    clock[at.TIME], clock[at.UNTIL] = swarm.times[sw.BEGIN], swarm.times[sw.END]
+    clock[at.HORIZON] = swarm.times[sw.HORIZON_AT]
     step, across = math.inf, 0.0
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
@@ -188,13 +163,13 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
             if other > across:
                 step, across = math.inf, other
             step = min(step, swarm.steps[member]) if other == across else step
-        observed[body, START_X], observed[body, START_Y] = (
+        observed[body, sw.START_X], observed[body, sw.START_Y] = (
             swarm.motion[member, at.X],
             swarm.motion[member, at.Y],
         )
-        observed[body, PATH_VX] = swarm.motion[member, at.VX]
-        observed[body, PATH_VY] = swarm.motion[member, at.VY]
-        observed[body, SINCE], observed[body, FURTHEST] = swarm.times[BEGIN], 0.0
+        observed[body, sw.PATH_VX] = swarm.motion[member, at.VX]
+        observed[body, sw.PATH_VY] = swarm.motion[member, at.VY]
+        observed[body, sw.SINCE], observed[body, sw.FURTHEST] = swarm.times[sw.BEGIN], 0.0
     clock[at.ACROSS] = across
     clock[at.STEP] = step if step < math.inf else start_clock[at.STEP]
 
@@ -208,20 +183,20 @@ def take_slips(swarm, scene, work, found, members, first):
     for kept in range(count):
         later, earlier = work.kept[kept, at.KEPT_LATER], work.kept[kept, at.KEPT_EARLIER]
         row = begin + kept
-        found.links[row, LATER_BODY] = members[first + later]
-        found.links[row, EARLIER_BODY] = members[first + earlier]
-        found.links[row, AT_VERTEX] = global_point(
+        found.links[row, sw.LATER_BODY] = members[first + later]
+        found.links[row, sw.EARLIER_BODY] = members[first + earlier]
+        found.links[row, sw.AT_VERTEX] = global_point(
             swarm, scene, members, first, work.kept[kept, at.KEPT_VERTEX], later, earlier
         )
-        found.links[row, AT_EDGE] = global_point(
+        found.links[row, sw.AT_EDGE] = global_point(
             swarm, scene, members, first, work.kept[kept, at.KEPT_EDGE], later, earlier
         )
-        found.links[row, MODE] = work.kept[kept, at.KEPT_MODE]
-        found.slips[row, HELD_GAP] = work.slip[at.KEPT_GAP, kept]
-        found.slips[row, HELD_FORCE] = work.slip[at.KEPT_FORCE, kept]
-        found.slips[row, MICRO_FLIGHTS] = work.slip[at.KEPT_FLIGHTS, kept]
-        found.slips[row, SLIP] = work.slip[at.KEPT_SLIP, kept]
-        found.slips[row, OFFSET] = work.slip[at.KEPT_OFFSET, kept]
+        found.links[row, sw.MODE] = work.kept[kept, at.KEPT_MODE]
+        found.slips[row, sw.HELD_GAP] = work.slip[at.KEPT_GAP, kept]
+        found.slips[row, sw.HELD_FORCE] = work.slip[at.KEPT_FORCE, kept]
+        found.slips[row, sw.MICRO_FLIGHTS] = work.slip[at.KEPT_FLIGHTS, kept]
+        found.slips[row, sw.SLIP] = work.slip[at.KEPT_SLIP, kept]
+        found.slips[row, sw.OFFSET] = work.slip[at.KEPT_OFFSET, kept]
     found.filled[0] = begin + count
     return True
 
@@ -230,13 +205,13 @@ def take_state(swarm, work, observed, clock, members, first):
     """Write the state of its bodies at the window's end, and how they got there."""
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
-        swarm.strayed[member] = observed[body, FURTHEST]
+        swarm.strayed[member] = observed[body, sw.FURTHEST]
         if swarm.bodies[member, at.FREE] == 0.0:
             continue
         for axis in range(at.MOTION_COLUMNS):
             swarm.new_motion[member, axis] = work.motion[at.NOW, body, axis]
             swarm.new_carried[member, axis] = work.motion[at.CARRIED, body, axis]
-        for kind in range(ERROR_COLUMNS):
+        for kind in range(sw.ERROR_COLUMNS):
             swarm.new_errors[member, kind] = work.bodies[body, at.ERROR_PLACE + kind]
         swarm.new_steps[member] = clock[at.STEP]
         swarm.stated[member] = work.bodies[body, at.STATED]
@@ -269,8 +244,8 @@ def run_islands(
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
             return island
         codes[island] = code
-        costs[island, STEPS_TAKEN] = counts[at.STEPS]
-        costs[island, STEPS_REJECTED] = counts[at.REJECTED]
-        costs[island, FORCES_SUMMED] = work.tally[at.EVALUATIONS]
+        costs[island, sw.STEPS_TAKEN] = counts[at.STEPS]
+        costs[island, sw.STEPS_REJECTED] = counts[at.REJECTED]
+        costs[island, sw.FORCES_SUMMED] = work.tally[at.EVALUATIONS]
         take_state(swarm, work, observed, clock, members, begin)
     return last

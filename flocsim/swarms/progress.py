@@ -15,21 +15,9 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
-from flocsim.swarms.arrays import (
-    BEGIN,
-    EARLIER_BODY,
-    END,
-    FORCES_SUMMED,
-    HORIZON_AT,
-    LATER_BODY,
-    LINK_COLUMNS,
-    SLIP_COLUMNS,
-    STEPS_REJECTED,
-    STEPS_TAKEN,
-    Swarm,
-    with_links,
-)
+from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.leaving import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
 
@@ -51,13 +39,13 @@ class Finished:
         self.free = free
         self.labels = np.full(len(free), NONE)
         self.sizes = np.zeros(0, dtype=np.int64)
-        self.links = np.zeros((0, LINK_COLUMNS), dtype=np.int64)
-        self.slips = np.zeros((0, SLIP_COLUMNS))
+        self.links = np.zeros((0, sw.LINK_COLUMNS), dtype=np.int64)
+        self.slips = np.zeros((0, sw.SLIP_COLUMNS))
 
     def owners(self, links: np.ndarray) -> np.ndarray:
         """A free body of every contact."""
-        later = links[:, LATER_BODY]
-        return np.where(self.free[later], later, links[:, EARLIER_BODY])
+        later = links[:, sw.LATER_BODY]
+        return np.where(self.free[later], later, links[:, sw.EARLIER_BODY])
 
     def missing(self, islands: "Islands") -> np.ndarray:
         """Which islands are not among them. One of the same free bodies, and as many fixed ones,
@@ -129,11 +117,11 @@ class Effort:
     def add(self, islands: Islands) -> None:
         """Add what islands have taken."""
         self.tries += 1
-        steps = islands.costs[:, STEPS_TAKEN]
+        steps = islands.costs[:, sw.STEPS_TAKEN]
         self.steps += int(steps.sum())
-        self.rejected += int(islands.costs[:, STEPS_REJECTED].sum())
+        self.rejected += int(islands.costs[:, sw.STEPS_REJECTED].sum())
         self.body_steps += int(np.sum(steps * islands.sizes))
-        self.evaluations += int(islands.costs[:, FORCES_SUMMED].sum())
+        self.evaluations += int(islands.costs[:, sw.FORCES_SUMMED].sum())
 
 
 class Progress:
@@ -154,7 +142,7 @@ class Progress:
         self.free = swarm.bodies[:, at.FREE] == 1.0
         self.least_wander = LEAST_WANDER * swarm.bodies[:, at.BOUNDING_RADIUS]
         swarm.wander[:] = self.least_wander
-        swarm.times[HORIZON_AT] = until
+        swarm.times[sw.HORIZON_AT] = until
         self.time, self.effort = 0.0, Effort()
         # Its own: a window that fails leaves that of the swarm half written.
         self.stated = np.zeros(len(swarm.bodies))
@@ -248,8 +236,11 @@ class Progress:
         finished = Finished(self.free)
         for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
-            swarm.times[BEGIN], swarm.times[END] = self.time, stop if whole else self.time + span
-            length = swarm.times[END] - self.time
+            swarm.times[sw.BEGIN], swarm.times[sw.END] = (
+                self.time,
+                stop if whole else self.time + span,
+            )
+            length = swarm.times[sw.END] - self.time
             islands = self.runner.islands_of(swarm, length, self.reach, self.box)
             fresh = islands.chosen(finished.missing(islands))
             if not len(fresh.sizes):
@@ -291,12 +282,12 @@ class Progress:
             (swarm.methods, swarm.new_methods),
         ):  # fmt: skip
             old[free] = new[free]
-        length = swarm.times[END] - swarm.times[BEGIN]
+        length = swarm.times[sw.END] - swarm.times[sw.BEGIN]
         swarm.motion[~free, : at.VX] += length * swarm.motion[~free, at.VX :]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, [(finished.links, finished.slips)])
-        self.time = float(swarm.times[END])
+        self.time = float(swarm.times[sw.END])
         self.stated[...] = swarm.stated
         self.effort.windows += 1
 

@@ -12,18 +12,10 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
 from flocsim.arrays import Scene, Work, with_room, work_of
 from flocsim.integrators.base import Integrator
-from flocsim.swarms.arrays import (
-    COST_COLUMNS,
-    HALT,
-    STEPS_REJECTED,
-    STEPS_TAKEN,
-    TRACK_COLUMNS,
-    Found,
-    Swarm,
-    found_of,
-)
+from flocsim.swarms.arrays import Found, Swarm, found_of
 
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
 """Room at first for pairs of features, for every body of so few, and of more."""
@@ -78,14 +70,14 @@ class ThreadArrays:
         """Let the islands that run stop at their next steps."""
         self.halted = True
         for each in [*self.by_size.values()]:
-            each.observed[0, HALT] = 1.0
+            each.observed[0, sw.HALT] = 1.0
 
     def begin(self) -> None:
         """Begin a window."""
         self.halted, self.running = False, None
         self.found.filled[0] = 0
         for each in self.by_size.values():
-            each.observed[0, HALT] = 0.0
+            each.observed[0, sw.HALT] = 0.0
 
     def of_size(self, size: int, integrator: Integrator) -> IslandArrays:
         """Arrays for islands of so many bodies."""
@@ -101,7 +93,7 @@ class ThreadArrays:
             room = size * (ROOM_OF_FEW if 1 < size <= FEW else ROOM_OF_MANY)
             work = work_of(scene, zeros, zeros, room, pairs=4 * size, blocks=8 * size)
             self.by_size[size] = IslandArrays(
-                scene, work, np.zeros((size, TRACK_COLUMNS)),
+                scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
                 integrator.fresh_clock(), integrator.fresh_counts(0),
             )  # fmt: skip
         return self.by_size[size]
@@ -136,7 +128,7 @@ class Islands:
         count = len(starts) - 1
         return cls(
             bodies[order], starts, np.zeros(count, dtype=np.int64),
-            np.zeros((count, COST_COLUMNS), dtype=np.int64),
+            np.zeros((count, sw.COST_COLUMNS), dtype=np.int64),
         )  # fmt: skip
 
     @property
@@ -237,7 +229,7 @@ class Runner:
             own.running = None
 
         def tried() -> int:
-            done = islands.costs[:, [STEPS_TAKEN, STEPS_REJECTED]].sum()
+            done = islands.costs[:, [sw.STEPS_TAKEN, sw.STEPS_REJECTED]].sum()
             return int(done) + sum(own.tried for own in self.threads)
 
         for own in self.threads:

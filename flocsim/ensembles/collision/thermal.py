@@ -26,33 +26,9 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.bonds.bond import NO_BOND, are_spheres, bond_between, radii_of
+from flocsim.ensembles.collision import outcomes as seen
 from flocsim.ensembles.collision.meetings import GAPS
-from flocsim.ensembles.collision.outcomes import (
-    BODY_I,
-    BODY_J,
-    BOND,
-    BOUND,
-    BROWNIAN,
-    CAGE_HIGH,
-    CAGE_LOW,
-    COLLIDED,
-    DEPARTED,
-    DRIFT_X,
-    DRIFT_Y,
-    ESCAPE,
-    FLOW_XX,
-    FLOW_XY,
-    FLOW_YX,
-    FLOW_YY,
-    HELD,
-    IN_FLOW,
-    KICK_ENERGY,
-    MISSED,
-    MOBILITY_I,
-    MOBILITY_J,
-    bond_in_kicks,
-    look_at_pair,
-)
+from flocsim.ensembles.collision.outcomes import bond_in_kicks, look_at_pair
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.errors import ConfigError
 from flocsim.geometry.shapes.shape import Shape
@@ -67,71 +43,79 @@ def drift_from(scene, work, observed, outer):
     ``outer`` of that [m/s], the speed of j besides the drift)."""
     v = work.motion
     x, y = (
-        v[at.NOW, BODY_J, at.X] - v[at.NOW, BODY_I, at.X],
-        v[at.NOW, BODY_J, at.Y] - v[at.NOW, BODY_I, at.Y],
+        v[at.NOW, seen.BODY_J, at.X] - v[at.NOW, seen.BODY_I, at.X],
+        v[at.NOW, seen.BODY_J, at.Y] - v[at.NOW, seen.BODY_I, at.Y],
     )
     ux, uy = (
-        v[at.NOW, BODY_J, at.VX] - v[at.NOW, BODY_I, at.VX],
-        v[at.NOW, BODY_J, at.VY] - v[at.NOW, BODY_I, at.VY],
+        v[at.NOW, seen.BODY_J, at.VX] - v[at.NOW, seen.BODY_I, at.VX],
+        v[at.NOW, seen.BODY_J, at.VY] - v[at.NOW, seen.BODY_I, at.VY],
     )
-    if observed[IN_FLOW] != 0.0:
+    if observed[seen.IN_FLOW] != 0.0:
         # An extension draws out along x.
-        ux -= observed[FLOW_XX] * x + observed[FLOW_XY] * y
-        uy -= observed[FLOW_YX] * x + observed[FLOW_YY] * y
-        return abs(x), observed[FLOW_XX] * 0.5 * (abs(x) + outer), math.hypot(ux, uy)
-    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
-    along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
-    return along, drift, math.hypot(ux - observed[DRIFT_X], uy - observed[DRIFT_Y])
+        ux -= observed[seen.FLOW_XX] * x + observed[seen.FLOW_XY] * y
+        uy -= observed[seen.FLOW_YX] * x + observed[seen.FLOW_YY] * y
+        return abs(x), observed[seen.FLOW_XX] * 0.5 * (abs(x) + outer), math.hypot(ux, uy)
+    drift = math.hypot(observed[seen.DRIFT_X], observed[seen.DRIFT_Y])
+    along = (x * observed[seen.DRIFT_X] + y * observed[seen.DRIFT_Y]) / drift
+    return (
+        along,
+        drift,
+        math.hypot(ux - observed[seen.DRIFT_X], uy - observed[seen.DRIFT_Y]),
+    )
 
 
 def return_bound(scene, work, observed, time):
     """A bound of the probability that the two ever come back against the drift."""
-    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    outer = (
+        scene.bodies[seen.BODY_I, at.BOUNDING_RADIUS]
+        + scene.bodies[seen.BODY_J, at.BOUNDING_RADIUS]
+    )
     along, drift, besides = drift_from(scene, work, observed, outer)
-    if along - outer <= observed[ESCAPE]:
+    if along - outer <= observed[seen.ESCAPE]:
         return 1.0
     half = 0.5 * (along - outer)
-    mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
+    mobility = observed[seen.MOBILITY_I] + observed[seen.MOBILITY_J]
     drift += mobility * min(
-        repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half), 0.0
+        repulsion_at(scene, work, time, seen.BODY_J, seen.BODY_I, outer + half, half, -half),
+        0.0,
     )
     relaxation = max(
-        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
-        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
+        scene.bodies[seen.BODY_I, at.MASS] * observed[seen.MOBILITY_I],
+        scene.bodies[seen.BODY_J, at.MASS] * observed[seen.MOBILITY_J],
     )
     way = half - relaxation * besides
     if drift <= 0.0 or way <= 0.0:
         return 1.0
-    return math.exp(-drift * way / (observed[KICK_ENERGY] * mobility))
+    return math.exp(-drift * way / (observed[seen.KICK_ENERGY] * mobility))
 
 
 def have_parted(scene, work, observed, time, distance):
     """Whether the two count as apart for good."""
-    if observed[BROWNIAN] != 0.0:
-        return distance >= observed[ESCAPE]
+    if observed[seen.BROWNIAN] != 0.0:
+        return distance >= observed[seen.ESCAPE]
     return return_bound(scene, work, observed, time) <= RETURN_SHARE
 
 
 def is_caged(scene, work, observed, time):
     """Whether two that never touched lie in a secondary minimum out of which kicks do not come."""
-    if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
+    if observed[seen.CAGE_HIGH] <= observed[seen.CAGE_LOW]:
         return False
-    bond = bond_between(scene, work, time, BODY_I, BODY_J)
+    bond = bond_between(scene, work, time, seen.BODY_I, seen.BODY_J)
     between = bond.surface_gap
     if are_spheres(scene, bond):
         between = bond.distance - radii_of(scene, bond)
-    return observed[CAGE_LOW] < between < observed[CAGE_HIGH]
+    return observed[seen.CAGE_LOW] < between < observed[seen.CAGE_HIGH]
 
 
 def watch_kicked_pair(scene, work, observed, time):
     """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
     _, _, distance, _ = look_at_pair(scene, work, observed, time)
     if have_parted(scene, work, observed, time, distance):
-        return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
-    if observed[COLLIDED] == 0.0:
-        return HELD if is_caged(scene, work, observed, time) else 0
-    observed[BOND] = bond_in_kicks(scene, work, observed, time)
-    return 0 if observed[BOND] == NO_BOND else BOUND
+        return seen.MISSED if observed[seen.COLLIDED] == 0.0 else seen.DEPARTED
+    if observed[seen.COLLIDED] == 0.0:
+        return seen.HELD if is_caged(scene, work, observed, time) else 0
+    observed[seen.BOND] = bond_in_kicks(scene, work, observed, time)
+    return 0 if observed[seen.BOND] == NO_BOND else seen.BOUND
 
 
 def caged_between(

@@ -7,19 +7,10 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
 from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
 from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
-from flocsim.swarms.arrays import (
-    AT_EDGE,
-    AT_VERTEX,
-    EARLIER_BODY,
-    ERROR_COLUMNS,
-    LATER_BODY,
-    LINK_COLUMNS,
-    MODE,
-    SLIP_COLUMNS,
-)
 from flocsim.swarms.progress import Effort
 
 EFFORT = tuple(field.name for field in attrs.fields(Effort))
@@ -122,15 +113,16 @@ def check_moment(part: Part, form: Form) -> None:
 
 
 def check_state(part: Part, form: Form) -> None:
-    n, links = form.bodies, part.arrays.get("links", np.zeros((0, LINK_COLUMNS)))
+    n, links = form.bodies, part.arrays.get("links", np.zeros((0, sw.LINK_COLUMNS)))
     count = len(links) if links.ndim else 0
     one: tuple[int, ...] = ()
     shaped(part, {
         "seen": ("f8", (n, 6)),
-        "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)), "errors": ("f8", (n, ERROR_COLUMNS)),
+        "motion": ("f8", (n, 6)), "carried": ("f8", (n, 6)),
+        "errors": ("f8", (n, sw.ERROR_COLUMNS)),
         "steps": ("f8", (n,)), "wander": ("f8", (n,)),
-        "methods": ("f8", (n,)), "links": ("i8", (count, LINK_COLUMNS)),
-        "slips": ("f8", (count, SLIP_COLUMNS)), "time": ("f8", one), "span": ("f8", one),
+        "methods": ("f8", (n,)), "links": ("i8", (count, sw.LINK_COLUMNS)),
+        "slips": ("f8", (count, sw.SLIP_COLUMNS)), "time": ("f8", one), "span": ("f8", one),
         "stated": ("f8", (n,)), "effort": ("i8", (len(EFFORT),)),
         "gone": ("i8", (n,)), "returns": ("i8", (n,)),
     })  # fmt: skip
@@ -141,10 +133,13 @@ def check_state(part: Part, form: Form) -> None:
     demand(0.0 <= part.arrays["time"] <= form.times[-1] and part.arrays["span"] > 0.0, "time")
     gone, returns = part.arrays["gone"], part.arrays["returns"]
     demand(np.all((gone >= 0) & (gone <= 1)) and np.all(returns >= 0), "gone")
-    bodies, points = links[:, [LATER_BODY, EARLIER_BODY]], links[:, [AT_VERTEX, AT_EDGE]]
+    bodies, points = (
+        links[:, [sw.LATER_BODY, sw.EARLIER_BODY]],
+        links[:, [sw.AT_VERTEX, sw.AT_EDGE]],
+    )
     demand(np.all((bodies >= 0) & (bodies < n)) and np.all(points >= 0), "links")
-    demand(np.all(np.diff(links[:, LATER_BODY]) >= 0), "links")
-    demand(np.all((links[:, MODE] >= at.OPEN) & (links[:, MODE] <= at.GRAZES)), "links")
+    demand(np.all(np.diff(links[:, sw.LATER_BODY]) >= 0), "links")
+    demand(np.all((links[:, sw.MODE] >= at.OPEN) & (links[:, sw.MODE] <= at.GRAZES)), "links")
     demand(is_count(part.facts.get("moments"), form.moments), "moments")
     demand(part.facts["moments"] >= 1, "moments")
 

@@ -8,47 +8,30 @@ import numpy as np
 from flocsim.io.groups import Group, scalars_in
 from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.hdf5.structure import Node
+from flocsim.io.results import schema
 from flocsim.io.results.kernel_group import KERNEL_GROUP
-from flocsim.io.results.schema import (
-    AGGREGATED,
-    AXES,
-    BAND_ENDS,
-    BONDS,
-    CLASSES,
-    EVENTS,
-    FAILED,
-    FLOCS,
-    GROUPS,
-    LAST_AXES,
-    NOT_APPLICABLE,
-    OUTCOMES,
-    RADII,
-    SHAPE_COLUMNS,
-    TABLE,
-    WORDS,
-    Results,
-)
+from flocsim.io.results.schema import Results
 
 OPTIONAL = ("pooled", "differences", "numerics", "outlines", "flocs", "kernel")
 MOST_CONDITIONS = 1_000_000
-FURTHER_RUNS = ("checked", "third", *BAND_ENDS)
+FURTHER_RUNS = ("checked", "third", *schema.BAND_ENDS)
 """What stands before the names of columns of a replicate's further runs."""
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
-BOUND_CLASSES = [CLASSES.index(name) for name in AGGREGATED]
+BOUND_CLASSES = [schema.CLASSES.index(name) for name in schema.AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
-def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = GROUPS) -> None:
+def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = schema.GROUPS) -> None:
     """ValueError unless the groups and datasets of a file are those of results.
 
     ``groups``: as the version of the file has them.
     """
-    declared = {"kernel": KERNEL_GROUP, **groups, "flocs": FLOCS}
+    declared = {"kernel": KERNEL_GROUP, **groups, "flocs": schema.FLOCS}
     wanted = {name: group.arrays for name, group in declared.items()}
     wanted["run"] = scalars_in(nodes, "run")
-    known = {axis: len(words) for axis, words in WORDS.items()}
+    known = {axis: len(words) for axis, words in schema.WORDS.items()}
     lengths = hold_against(nodes, wanted, wanted.keys() - set(OPTIONAL), known)
     if not 0 < lengths["type"] * lengths["vertices"] * lengths["delta"] <= MOST_CONDITIONS:
         raise ValueError(f"there are no conditions, or more than {MOST_CONDITIONS}")
@@ -63,15 +46,15 @@ def check_coordinates(file: Any) -> None:
     """ValueError where two groups of an open file have coordinates that differ."""
     first = file["probabilities"]
     for group in file.values():
-        for axis in {*AXES} & group.keys():
+        for axis in {*schema.AXES} & group.keys():
             if group[axis][()].tolist() != first[axis][()].tolist():
                 raise ValueError(f"{group.name.strip('/')}/{axis} is not probabilities/{axis}")
-    for name in {*RADII} & first.keys() if "pooled" in file else ():
+    for name in {*schema.RADII} & first.keys() if "pooled" in file else ():
         if not np.array_equal(file["pooled"][name][()], first[name][()], equal_nan=True):
             raise ValueError(f"pooled/{name} is not probabilities/{name}")
     lists = {f"{group}/{axis}": words for group in ("probabilities", "numerics", "outlines")
-             for axis, words in LAST_AXES.items()}  # fmt: skip
-    for path, words in (lists | {"differences/event": EVENTS}).items():
+             for axis, words in schema.LAST_AXES.items()}  # fmt: skip
+    for path, words in (lists | {"differences/event": schema.EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
             raise ValueError(f"{path} holds other words than {', '.join(words)}")
 
@@ -87,7 +70,7 @@ def check_tables(results: Results) -> None:
     for name, values in results.radii.items():
         refuse(np.any(values <= 0.0) or np.any(np.isinf(values)), f"{name} that are no radii")
     table = results.probabilities
-    for name in TABLE:
+    for name in schema.TABLE:
         if name.startswith("n_"):
             refuse(np.any(table[name] < 0), f"negative numbers in probabilities/{name}")
         else:
@@ -142,32 +125,32 @@ def check_rows(
     runs = [run for run in FURTHER_RUNS if f"{run}_outcome" not in lacking]
     for names, least, most in (
         (("inside", "crossed_zone", *(f"{run}_inside" for run in runs)), 0, 1),
-        ([f"{run}_outcome" for run in runs], 0, len(OUTCOMES) - 1),
-        ([f"{run}_bond" for run in runs], 1, len(BONDS)),
+        ([f"{run}_outcome" for run in runs], 0, len(schema.OUTCOMES) - 1),
+        ([f"{run}_bond" for run in runs], 1, len(schema.BONDS)),
     ):
         for name in names:
             codes = column(name)
-            refuse_row(((codes < least) | (codes > most)) & (codes != NOT_APPLICABLE), name)
+            refuse_row(((codes < least) | (codes > most)) & (codes != schema.NOT_APPLICABLE), name)
     if "third" in runs:
-        never = column("checked_outcome") == NOT_APPLICABLE
-        refuse_row(never & (column("third_outcome") != NOT_APPLICABLE), "third_outcome")
-    decided = outcome < len(CLASSES)
+        never = column("checked_outcome") == schema.NOT_APPLICABLE
+        refuse_row(never & (column("third_outcome") != schema.NOT_APPLICABLE), "third_outcome")
+    decided = outcome < len(schema.CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
     bound = np.isin(outcome, BOUND_CLASSES)
     bond = column("bond")
-    held = (bond >= 1) & (bond <= len(BONDS))
-    refuse_row(np.where(bound, ~held, bond != NOT_APPLICABLE), "bond")
+    held = (bond >= 1) & (bond <= len(schema.BONDS))
+    refuse_row(np.where(bound, ~held, bond != schema.NOT_APPLICABLE), "bond")
     for name in ("floc_i", "floc_j"):
         places = column(name)
         refuse_row((places < -1) | (places >= (flocs or 2**31)), name)
-    ended = outcome != FAILED
+    ended = outcome != schema.FAILED
     for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
         refuse_row(ended & ~np.isfinite(column(name)), name)
-    for name in {"r_i", "r_j", "D_0", *SHAPE_COLUMNS} - lacking:
+    for name in {"r_i", "r_j", "D_0", *schema.SHAPE_COLUMNS} - lacking:
         values = column(name)
         refuse_row(ended & ~((values > 0.0) & np.isfinite(values)), name)
-    touched = ended & (inside != NOT_APPLICABLE)
+    touched = ended & (inside != schema.NOT_APPLICABLE)
     for name in ("d_c_collision", "d_c_max", "t_collision"):
         refuse_row(touched & ~np.isfinite(column(name)), name)
     if "D_0" in lacking:
@@ -183,7 +166,7 @@ CODED = ("outcome", "failure", "steps", "rejected")
 
 def check_codes(columns: Mapping[str, np.ndarray], failures: int) -> None:
     """ValueError for codes without a word, or negative numbers, in columns of CODED."""
-    refuse_row(columns["outcome"] >= len(OUTCOMES), "outcome")
+    refuse_row(columns["outcome"] >= len(schema.OUTCOMES), "outcome")
     refuse_row(columns["failure"] >= failures, "failure")
     for name in ("steps", "rejected"):
         refuse_row(columns[name] < 0, name)

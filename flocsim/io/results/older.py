@@ -19,27 +19,11 @@ import numpy as np
 from flocsim.io.groups import Group, scalar_of, values_of
 from flocsim.io.hdf5.structure import Node
 from flocsim.io.opening import parsed
+from flocsim.io.results import schema
 from flocsim.io.results.checks import check_coordinates, check_structure
 from flocsim.io.results.kernel_group import CHANGE, ESTIMATES, KERNEL_GROUP, read_kernel
 from flocsim.io.results.layout import SCHEMA_VERSION, image_of
-from flocsim.io.results.schema import (
-    BAND_ENDS,
-    BLANKS,
-    BONDS,
-    BOUNDS,
-    CHANGES,
-    DIFFERENCES,
-    GROUPS,
-    NUMERICS,
-    POOLED,
-    PROBABILITIES,
-    RADII,
-    REPLICATES,
-    SHAPE_COLUMNS,
-    TABLE,
-    Results,
-    tail_of,
-)
+from flocsim.io.results.schema import Results, tail_of
 
 MOST_ROWS = 2**23
 """Of a file that is taken into memory, 1.5 GB."""
@@ -63,12 +47,12 @@ ADDED = {
         {
             "probabilities": frozenset(
                 {"n_bond", "n_checked", "n_flipped"}
-                | {f"{name}_numerical" for name in PROBABILITIES}
-                | {f"{name}{bound}" for name in BY_BOND for bound in BOUNDS}
-                | {f"{count}_{name}" for count in CHANGES for name in PROBABILITIES}
+                | {f"{name}_numerical" for name in schema.PROBABILITIES}
+                | {f"{name}{bound}" for name in BY_BOND for bound in schema.BOUNDS}
+                | {f"{count}_{name}" for count in schema.CHANGES for name in schema.PROBABILITIES}
             ),
             "pooled": frozenset(
-                name for name in POOLED
+                name for name in schema.POOLED
                 if name.endswith("_numerical") or any(each in name for each in BY_BOND)
             ),
             "replicates": frozenset({"checked_outcome", "checked_inside", "checked_bond"}),
@@ -77,9 +61,9 @@ ADDED = {
     ),
     4: Addition(
         {
-            "probabilities": frozenset(RADII),
-            "pooled": frozenset(RADII),
-            "replicates": frozenset({*RADII, "D_0", "d_c_over_D_0"}),
+            "probabilities": frozenset(schema.RADII),
+            "pooled": frozenset(schema.RADII),
+            "replicates": frozenset({*schema.RADII, "D_0", "d_c_over_D_0"}),
         },
         "they do not have the radii and D_0 that each was run with",
     ),
@@ -88,7 +72,7 @@ ADDED = {
         "pairs that rest apart without touching are not told from those that miss",
     ),
     6: Addition(
-        {"replicates": frozenset(SHAPE_COLUMNS)},
+        {"replicates": frozenset(schema.SHAPE_COLUMNS)},
         "they do not have the shape measures of the bodies",
     ),
     7: Addition(
@@ -96,7 +80,7 @@ ADDED = {
             "probabilities": frozenset({"n_third", "n_third_flipped"}),
             "replicates": frozenset(
                 f"{run}_{name}"
-                for run in ("third", *BAND_ENDS)
+                for run in ("third", *schema.BAND_ENDS)
                 for name in ("outcome", "inside", "bond")
             ),
             "kernel": frozenset(f"{name}{end}" for name in ESTIMATES for end in CHANGE),
@@ -130,7 +114,7 @@ def why_apart(file: Any) -> str:
 def groups_of(version: int) -> dict[str, Group]:
     """The groups as an older version had them."""
     found = {}
-    for name, group in (GROUPS | {"kernel": KERNEL_GROUP}).items():
+    for name, group in (schema.GROUPS | {"kernel": KERNEL_GROUP}).items():
         missing = lacking(version, name)
         columns = {key: each for key, each in group.columns.items() if key not in missing}
         beside = {key: each for key, each in group.beside.items() if key not in missing}
@@ -165,16 +149,19 @@ def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
              if name in file and name != "kernel"}  # fmt: skip
     table, rows = found["probabilities"], found["replicates"]
     shape = len(table["type"]), len(table["vertices"]), len(table["delta"])
-    blank = {name: np.full((*shape, *tail_of(name)), blank_of(TABLE[name])) for name in TABLE}
-    blank["n_bond"] = np.stack(
-        [np.sum(rows["bond"] == 1 + code, axis=-1) for code in range(len(BONDS))], axis=-1
-    )
-    pooled = {name: np.full(shape[:2], blank_of(POOLED[name])) for name in POOLED}
-    columns = {
-        name: np.full(rows["outcome"].shape, BLANKS[kind])
-        for name, (kind, _, _) in REPLICATES.items()
+    blank = {
+        name: np.full((*shape, *tail_of(name)), blank_of(schema.TABLE[name]))
+        for name in schema.TABLE
     }
-    radii = {name: np.full(shape[0], np.nan) for name in RADII}
+    blank["n_bond"] = np.stack(
+        [np.sum(rows["bond"] == 1 + code, axis=-1) for code in range(len(schema.BONDS))], axis=-1
+    )
+    pooled = {name: np.full(shape[:2], blank_of(schema.POOLED[name])) for name in schema.POOLED}
+    columns = {
+        name: np.full(rows["outcome"].shape, schema.BLANKS[kind])
+        for name, (kind, _, _) in schema.REPLICATES.items()
+    }
+    radii = {name: np.full(shape[0], np.nan) for name in schema.RADII}
     return Results(
         types=table["type"], vertices=table["vertices"], delta=table["delta"],
         replicates=filled(columns, rows), probabilities=filled(blank, table),
@@ -182,9 +169,9 @@ def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
         failures=file["replicates/failure"].attrs["flag_meanings"].split(),
         flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
         pooled=filled(pooled, found["pooled"]) if "pooled" in found else {},
-        differences={name: found["differences"][name] for name in DIFFERENCES}
+        differences={name: found["differences"][name] for name in schema.DIFFERENCES}
         if "differences" in found else {},
-        numerics={name: found["numerics"][name] for name in NUMERICS}
+        numerics={name: found["numerics"][name] for name in schema.NUMERICS}
         if "numerics" in found else {},
         radii=filled(radii, table), kernel=kernel,
     )  # fmt: skip
