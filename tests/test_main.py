@@ -8,7 +8,8 @@ import pytest
 
 from flocsim import __main__ as entry
 from flocsim.errors import ConfigError, FileError, FlocsimError
-from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import command, run_command, write_small
 from tests.helpers.synthetic_results import make_results
 

@@ -36,8 +36,9 @@ from flocsim.ensembles.study import Study
 from flocsim.io.files import read_sealed
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.journal.records import SESSION, encode
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import NOT_APPLICABLE
+from tests.helpers.results_files import same_data
 
 SHARE_OLD = 0.2
 """Of the replicates of an extended study, how many its older results file has."""

@@ -18,7 +18,8 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import Damage, scan
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 
 WHOLE_RERUNS = 25
 """Damaged journals that are finished and compared with the undisturbed run, byte for byte."""

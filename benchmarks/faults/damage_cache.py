@@ -21,7 +21,8 @@ import numpy as np
 from benchmarks.faults.job import Tally, make_study
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.compiler.disk_cache import DIGEST_SIZE, MARK
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 
 COUNT, QUICK = 500, 24
 PATIENCE = 600.0

@@ -16,7 +16,8 @@ from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.journal.records import CHUNK, Record, scan
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 
 BESIDE_PYTHON = Path(sys.executable).parent
 PATIENCE = 30.0

@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.faults.job import BESIDE_PYTHON, PATIENCE, STUDY, Tally
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.io.results.file import same_data
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import write_star_library
 
 SMALL = STUDY.replace("replicates = 200", "replicates = 30")

@@ -29,7 +29,7 @@ import attrs
 
 from benchmarks.faults.job import BESIDE_PYTHON, STUDY, Tally, run_here
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.io.results.file import same_data
+from tests.helpers.results_files import same_data
 
 ROOT = Path(__file__).resolve().parents[2]
 REPLICATES = 4000

@@ -5,8 +5,9 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
 from tests.helpers.kernel_study import kernel_text
+from tests.helpers.results_files import same_data
 
 SHEAR = {
     "meeting": '["settling", "shear"]',

@@ -9,7 +9,7 @@ from PIL import Image
 from flocsim.__main__ import main
 from flocsim.io.plots.results import overview
 from flocsim.io.plots.style import save
-from flocsim.io.results.file import write_results
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_small, write_star_library
 from tests.helpers.synthetic_results import make_results
 

@@ -13,8 +13,8 @@ from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.results.file import write_results
 from flocsim.io.results.run_group import provenance
+from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
 
 CONFIG = 'preset = "si"\nseed = 3\n'

@@ -17,10 +17,11 @@ from flocsim.ensembles.report import efficiency_rows
 from flocsim.ensembles.studies.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES
-from flocsim.io.results.file import first_of_each, read_results, write_results
+from flocsim.io.results.file import first_of_each, read_results
 from flocsim.io.results.run_group import provenance
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.browser import browser, open_page
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_small
 from tests.helpers.synthetic_results import make_results
 

@@ -11,8 +11,8 @@ from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.io.results.file import same_data
 from flocsim.io.shapes.library import read_library, write_library
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
 
 STUDY = """\

@@ -15,9 +15,10 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
 from flocsim.forces import Thermal
 from flocsim.io.confidence import wilson
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import sphere_words
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from tests.helpers.results_files import same_data
 
 STUDY = """\
 preset = "tang2014"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles import cli
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, run_command, write_small, write_star_library
 
 

@@ -8,8 +8,9 @@ import pytest
 
 import flocsim
 from flocsim.errors import FileError, UsageError
-from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import OUTCOMES
+from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
 
 

@@ -12,8 +12,9 @@ from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.journal.journal import MemoryJournal
-from flocsim.io.results.file import read_results, same_data, write_results
+from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
+from tests.helpers.results_files import same_data, write_results
 from tests.helpers.small_study import small_study
 
 

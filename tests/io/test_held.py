@@ -11,7 +11,8 @@ from flocsim.__main__ import main
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.errors import FileError
 from flocsim.io import files
-from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import SMALL, load_text, write_star_library
 from tests.helpers.synthetic_results import make_results
 

@@ -13,22 +13,20 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``outlines``       (type, vertices, delta): by how much outlines cut otherwise change it
 - ``run``            scalars: config text, versions, machine, wall times
 
-All that may differ between two runs of one config is in ``run``, so `same_data` can compare the
-rest byte for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.pieces`), is
-checked before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
+All that may differ between two runs of one config is in ``run``, so the rest can be compared byte
+for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.pieces`), is checked
+before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
 """
 
 import contextlib
 import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import FileError
-from flocsim.io.files import Rule, keep
 from flocsim.io.groups import scalar_of, values_of
 from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results import older
@@ -42,7 +40,6 @@ from flocsim.io.results.checks import (
 )
 from flocsim.io.results.kernel_group import read_kernel
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
-from flocsim.io.results.row_file import ROWS, new_row_file
 from flocsim.io.results.schema import (
     CLASSES,
     DIFFERENCES,
@@ -69,32 +66,11 @@ __all__ = [
     "read_overview",
     "read_results",
     "read_row",
-    "same_data",
     "with_rows",
-    "write_results",
 ]
 
 BLOCK = 262_144
 """Replicates of a condition that are read together."""
-
-
-def write_results(path: str | Path, results: Results, rule: Rule = keep) -> None:
-    """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
-
-    ``rule`` says what becomes of a file that is there. A table of replicates that is larger than
-    the memory: `flocsim.io.results.row_file`.
-    """
-    flat = {
-        name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(-1)
-        for name, array in (results.replicates or {}).items()
-    }
-    with new_row_file(path, results, rule) as file:
-        digests = {}
-        for block in range(file.plan.blocks):
-            rows = slice(block * ROWS, (block + 1) * ROWS)
-            columns = {name: values[rows] for name, values in flat.items()}
-            digests[block] = file.write_block(block, columns)
-        file.complete(results, digests)
 
 
 def read_results(path: str | os.PathLike, replicates: bool = True) -> Results:
@@ -305,27 +281,3 @@ def read_version(file, known):
         if known["schema_version"][0] == "text"
         else (int(file.attrs["schema_version"]))
     )
-
-
-def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
-    """Names of the datasets outside ``run`` whose shapes, types or bytes differ.
-
-    Coordinates included; a dataset that only one file has differs. Empty when all agree.
-    """
-
-    def content(dataset):
-        """Its values, some at a time: all of a file may be larger than the memory."""
-        for part in parts_of(dataset.shape):
-            values = dataset[part]
-            yield values.tolist() if dataset.dtype.kind == "O" else values.tobytes()
-
-    def agree(one, other):
-        if (one.shape, str(one.dtype)) != (other.shape, str(other.dtype)):
-            return False
-        pairs = zip(content(one), content(other), strict=True)
-        return all(mine == yours for mine, yours in pairs)
-
-    with opened(path_a) as a, opened(path_b) as b:
-        names = {f"{group}/{name}" for file in (a, b) for group in file if group != "run"
-                 for name in file[group]}  # fmt: skip
-        return sorted(n for n in names if n not in a or n not in b or not agree(a[n], b[n]))

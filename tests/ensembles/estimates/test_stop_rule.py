@@ -9,7 +9,8 @@ from flocsim.ensembles.estimates.stop_rule import StopRule, borders
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config
 from tests.helpers.synthetic_results import bonds_of
 

@@ -14,8 +14,9 @@ from flocsim.ensembles.parallel.agreement import Facts, Launch, disagreement, re
 from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.errors import KernelError, UsageError
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
 from tests.helpers.own_force import write_own
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import (
     SMALL,
     command,

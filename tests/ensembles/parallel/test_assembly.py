@@ -25,8 +25,8 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FileError
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.results import row_file
-from flocsim.io.results.file import same_data
 from flocsim.io.results.row_file import RowFile, new_row_file, shared_row_file
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import mpirun, problems, run_command
 
 REPLICATES = 12_000
@@ -304,7 +304,7 @@ PEAKS = """\
 import contextlib, io, resource, sys
 from flocsim.__main__ import main
 from flocsim.commands.plot import read_content
-from flocsim.io.results.file import same_data
+from tests.helpers.results_files import same_data
 
 for path in sys.argv[1:]:
     with contextlib.redirect_stdout(io.StringIO()):

@@ -15,7 +15,8 @@ from flocsim.ensembles.parallel.communicator import (
     launched_rank,
     launched_size,
 )
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import (
     BESIDE_PYTHON,
     SMALL,

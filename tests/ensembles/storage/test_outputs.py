@@ -8,7 +8,8 @@ from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.errors import FileError, UsageError
-from flocsim.io.results.file import read_results, same_data
+from flocsim.io.results.file import read_results
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config, write_small
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}

@@ -20,8 +20,8 @@ from flocsim.interruption import STOPPED
 from flocsim.io.journal import locked_file
 from flocsim.io.journal.journal import Journal
 from flocsim.io.journal.records import CHUNK
-from flocsim.io.results.file import same_data
 from tests.ensembles.storage.test_resume import stop_after
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, small_config
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}

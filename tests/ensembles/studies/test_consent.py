@@ -14,8 +14,9 @@ import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.errors import ConfigError, UsageError
-from flocsim.io.results.file import read_results, write_results
+from flocsim.io.results.file import read_results
 from tests.helpers.own_force import OWN, write_own
+from tests.helpers.results_files import write_results
 
 MARK = "import pathlib; pathlib.Path('was-run').touch()\n"
 NAMES = ("own_pull", "neighbour", "pack", "pack.inner")

@@ -10,8 +10,9 @@ import pytest
 from flocsim.errors import FileError
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.hdf5.structure import Unfit, structure_of
-from flocsim.io.results.file import read_overview, read_results, write_results
+from flocsim.io.results.file import read_overview, read_results
 from flocsim.io.shapes.library import read_library, read_settings
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_star_library
 from tests.helpers.synthetic_results import make_results
 

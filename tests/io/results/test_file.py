@@ -12,16 +12,10 @@ import pytest
 
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io import files
-from flocsim.io.results.file import (
-    OUTCOMES,
-    REPLICATES,
-    TABLE,
-    read_results,
-    same_data,
-    write_results,
-)
+from flocsim.io.results.file import OUTCOMES, REPLICATES, TABLE, read_results
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.run_group import provenance
+from tests.helpers.results_files import same_data, write_results
 from tests.helpers.synthetic_results import FAILURES, make_results
 
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}

@@ -16,9 +16,10 @@ from flocsim.__main__ import main
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.results import older
-from flocsim.io.results.file import read_overview, read_results, read_row, write_results
+from flocsim.io.results.file import read_overview, read_results, read_row
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES, TABLE
+from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
 
 STORED = Path(__file__).parents[2] / "data"
