@@ -3,6 +3,9 @@
 The text is short and has no numbers in it: a force's values travel in one flat array, so that new
 values never recompile. What a scene does not need (absent forces, forces out of reach,
 derivatives of what no kernel reads) is not written, and is no law of the scene.
+
+Derivatives of kernels are differences, of views that are shifted. The laws take the differences
+themselves: one call of a law costs less than one for every shift.
 """
 
 import functools
@@ -10,7 +13,7 @@ from collections.abc import Callable, Iterable
 
 import attrs
 
-from flocsim.arrays import NUMBERS_OF_SHAPES, PairView
+from flocsim.arrays import NUMBERS_OF_SHAPES, BodyView, ContactView, PairView, PlainBodyView
 from flocsim.body import NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
@@ -23,18 +26,72 @@ from flocsim.forces.check import (
     reach_of,
     sample_pairs,
 )
-from flocsim.forces.differences import (
-    body_change,
-    changed_body,
-    changed_contact,
-    changed_plain_body,
-    contact_change,
-    pressed_contact,
-)
 from flocsim.forces.outline import outlines_of_forces
 from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.forces.smoothing import smoothness
 from flocsim.laws import LAWS
+
+
+def body_change(view, axis):
+    """How much to change x, y, angle (axis 0–2) or vx, vy, spin (3–5) by [m, rad, m/s, rad/s]."""
+    if axis < 3:
+        return 1e-6 if axis == 2 else 1e-6 * view.radius
+    floor = 1e-9 / view.radius if axis == 5 else 1e-9
+    return 1e-3 * abs((view.vx, view.vy, view.spin)[axis - 3]) + floor
+
+
+def changed_body(view, axis, by):
+    """A BodyView with one of x, y, angle (axis 0–2) or vx, vy, spin (3–5) changed."""
+    return BodyView(
+        view.time,
+        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
+        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
+        view.mass, view.buoyant_mass, view.inertia, view.radius,
+        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
+        view.resistance_xx, view.resistance_xy, view.resistance_yy,
+        view.resistance_xs, view.resistance_ys, view.resistance_ss,
+        view.strain_xx_x, view.strain_xx_y, view.strain_xx_s,
+        view.strain_xy_x, view.strain_xy_y, view.strain_xy_s,
+    )  # fmt: skip
+
+
+def changed_plain_body(view, axis, by):
+    """The same of a PlainBodyView."""
+    return PlainBodyView(
+        view.time,
+        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
+        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
+        view.mass, view.buoyant_mass, view.inertia, view.radius,
+        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
+    )  # fmt: skip
+
+
+def contact_change(view, axis):
+    """How much to change an overlap, its rate, a slip or its rate (axis 0–3) by [m or m/s]."""
+    value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
+    floor = 1e-13 if axis % 2 == 0 else 1e-9
+    return 1e-3 * abs(value) + floor
+
+
+def changed_contact(view, axis, by):
+    """A ContactView with its overlap, overlap rate, slip or slip rate (axis 0–3) changed."""
+    return ContactView(
+        view.overlap + by * (axis == 0), view.overlap_rate + by * (axis == 1),
+        view.slip + by * (axis == 2), view.slip_rate + by * (axis == 3),
+        view.effective_mass, view.radius_i, view.radius_j,
+    )  # fmt: skip
+
+
+def pressed_contact(view):
+    """A ContactView without what is no overlap, as an own law of contact sees it.
+
+    Steps are tried beyond the end of a contact, where the two surfaces are apart.
+    """
+    return ContactView(
+        max(view.overlap, 0.0), view.overlap_rate, view.slip, view.slip_rate,
+        view.effective_mass, view.radius_i, view.radius_j,
+    )  # fmt: skip
+
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
@@ -143,7 +200,7 @@ def differences_text(name, force, view, parts, axes, keep, changed=None):
     """Source of a function with the one-sided differences of a sum of forces by some axes.
 
     It returns the ``parts`` of the force first where ``keep``, then their changes by each axis;
-    ``changed``: what changes a view, of differences.py, where its name does not tell.
+    ``changed``: what changes a view, as `changed_contact`, where its name does not tell.
     """
     changed = changed or f"changed_{view}"
     lines = [f"def {name}({view}, parameters):", f"    now = {force}({view}, parameters)"]

@@ -6,7 +6,7 @@ import os
 
 from flocsim.__main__ import main
 from flocsim.ensembles.studies import study as studies
-from flocsim.ensembles.studies.process import error_of
+from flocsim.ensembles.studies.study import error_of
 
 
 def run_here(words, text, folder, quiet):

@@ -5,8 +5,7 @@ import pytest
 
 from flocsim import Sphere
 from flocsim.ensembles.pairs.replicates import replicate_of
-from flocsim.trajectories.figures import frames_of
-from flocsim.trajectories.frames import frames_at, instants_along, travelled
+from flocsim.trajectories.figures import frames_at, frames_of, instants_along, travelled
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study
 

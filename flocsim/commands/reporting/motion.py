@@ -20,7 +20,7 @@ from flocsim.io.plots.collision import (
     time_unit,
 )
 from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS
-from flocsim.trajectories.frames import instants_along, seen_from_first
+from flocsim.trajectories.figures import instants_along, seen_from_first
 
 FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)

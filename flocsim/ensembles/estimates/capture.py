@@ -35,7 +35,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.points import points_of
+from flocsim.ensembles.collision.start import points_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.numerical import (

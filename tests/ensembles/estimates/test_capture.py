@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.points import points_of
+from flocsim.ensembles.collision.start import points_of
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
     estimate,

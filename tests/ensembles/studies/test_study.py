@@ -1,7 +1,12 @@
 """Study: from a file or a dict, changed, run as the command runs it, refused in one line."""
 
+import os
+import signal
 import subprocess
+import sys
+import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +16,7 @@ from flocsim.ensembles import run
 from flocsim.ensembles.config.toml_text import toml_text
 from flocsim.ensembles.studies.study import settings_of
 from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
-from tests.helpers.small_study import SMALL, command, write_small
+from tests.helpers.small_study import SMALL, command, run_command, write_small
 
 TABLES = {
     "preset": "tang2014", "seed": 1, "replicates": 3,
@@ -144,7 +149,7 @@ def test_a_replicate_of_a_study_is_kept_as_motion(tmp_path):
 
 
 def test_scripts_get_no_words_of_the_command():
-    from flocsim.ensembles.studies.process import error_of
+    from flocsim.ensembles.studies.study import error_of
 
     error = error_of(75, ["", "flocsim: stopped by SIGTERM: go on with --resume"])
     assert type(error) is FlocsimError
@@ -160,3 +165,71 @@ def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
     with pytest.warns(PlausibilityWarning, match="viscosity") as found:
         study.run()
     assert found[0].filename == __file__
+
+
+ENV = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
+SCRIPT = """\
+import flocsim
+if __name__ == "__main__":
+    flocsim.Study("small.toml").run({jobs}, output="run.h5", mode="resume")
+"""
+SWEEP = ["small.toml", "--over", "forces.van_der_waals.hamaker=1e-20,1e-19", "-o", "sweep.h5"]
+
+
+def members(group):
+    """Numbers of the processes of a group that still run."""
+    said = subprocess.run(["ps", "-eo", "pid,pgid,stat"], capture_output=True, text=True).stdout
+    rows = [line.split() for line in said.splitlines()[1:]]
+    return [int(pid) for pid, of, state in rows if int(of) == group and state[0] != "Z"]
+
+
+def until(condition, seconds):
+    """Whether a condition comes to hold within so long."""
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("what", ["script", "sweep"])
+def test_nobody_outlives_a_kill_and_the_run_goes_on(tmp_path, what, jobs):
+    write_small(tmp_path, replicates=30_000, vertices="[1]")
+    (tmp_path / "run.py").write_text(SCRIPT.format(jobs=jobs))
+    words, journal = [sys.executable, "run.py"], tmp_path / "run.h5.journal"
+    if what == "sweep":
+        words = command("sweep", *SWEEP, "--jobs", jobs, "--resume", module="flocsim")
+        journal = tmp_path / "sweep.parts" / "0000.h5.journal"
+    killed_after(words, tmp_path, journal)
+    killed_after(words, tmp_path, journal)  # where the first has stopped
+
+
+def killed_after(words, folder, journal):
+    """Start a command, kill it once it has written to its journal; nobody is left soon after."""
+    size = journal.stat().st_size if journal.exists() else 0
+    running = subprocess.Popen(words, cwd=folder, env=ENV, start_new_session=True)
+    try:
+        grown = until(lambda: journal.exists() and journal.stat().st_size > size + 5000, 120)
+        assert grown and running.poll() is None
+        running.kill()
+        running.wait()
+        assert until(lambda: not members(running.pid), 3.0)
+    finally:
+        for pid in members(running.pid):
+            os.kill(pid, signal.SIGKILL)
+
+
+@pytest.mark.slow
+def test_what_is_no_study_is_done_by_one_rank(tmp_path):
+    study = flocsim.Study(write_small(tmp_path, vertices="[1]", replicates=4))
+    study.run(output=tmp_path / "r.h5")
+    words = ["info", "r.h5"]
+    done = subprocess.run(
+        command(*words, ranks=2, module="flocsim"), cwd=tmp_path, env=ENV, capture_output=True,
+        text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    alone = run_command(tmp_path, *words, module="flocsim")
+    assert done.stdout == alone.stdout
+    assert done.stderr.count("is the work of one rank") == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.trajectories.frames import frames_at, travelled
+from flocsim.trajectories.figures import frames_at, travelled
 
 
 def fall(count=101):
