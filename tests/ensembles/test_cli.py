@@ -187,7 +187,7 @@ def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypat
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
-        (KeyboardInterrupt, 130, "flocsim: interrupted; go on with --resume\n"),
+        (KeyboardInterrupt, 130, "flocsim: interrupted; continue with --resume\n"),
         (MemoryError, 70, "flocsim: out of memory: ask for fewer ranks on a machine\n"),
     ],
 )
