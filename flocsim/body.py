@@ -96,12 +96,12 @@ class Fluid:
         help="I of a salt other than that of the sea, instead of `salinity`", kw_only=True,
     )  # fmt: skip
     viscosity: float = quantity(
-        "Pa s", above=0.0, help="γ; by default that of the water, where it is told",
+        "Pa s", above=0.0, help="γ; by default that of the water, where it is given",
         default=attrs.Factory(lambda self: self.of_water(water.viscosity, WATER_VISCOSITY), True),
         shown=f"{WATER_VISCOSITY}",
     )  # fmt: skip
     density: float = quantity(
-        "kg/m^3", at_least=0.0, help="ρ_f; by default that of the water, where it is told",
+        "kg/m^3", at_least=0.0, help="ρ_f; by default that of the water, where it is given",
         default=attrs.Factory(lambda self: self.of_water(water.density, WATER_DENSITY), True),
         shown=f"{WATER_DENSITY}",
     )  # fmt: skip

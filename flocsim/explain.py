@@ -41,7 +41,7 @@ LAWLESS = (
 """(law, what is left out where a scene has none, why)."""
 
 UNDERIVED = (
-    ("position_derivatives", "derivative by the place", "no body force reads a place or the time"),
+    ("position_derivatives", "derivative by position", "no body force depends on position or time"),
     ("velocity_derivatives", "derivative by the velocity", "no body force reads a velocity"),
 )
 """The same for the derivatives that an implicit method would take."""

@@ -65,7 +65,7 @@ def test_laws_that_a_scene_has_not_are_said_to_be_out():
     names = {
         "centre_force": "forces along lines of centres",
         "surface_force": "forces between outlines",
-        "position_derivatives": "derivative by the place",
+        "position_derivatives": "derivative by position",
         "velocity_derivatives": "derivative by the velocity",
     }
     for forces in ([], [VanDerWaals()], [VanDerWaals(gap="surface"), Trap()], [StokesDrag()]):

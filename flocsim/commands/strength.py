@@ -33,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
     add("--jobs", type=int, default=1, metavar="N",
         help="processes on this machine (default: %(default)d)")  # fmt: skip
     add("--resume", action="store_const", const="resume", default="new", dest="mode",
-        help="go on with a stopped survey, or test more (--count); starts one if there is "
+        help="continue a stopped survey, or test more (--count); starts one if there is "
         "none")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="default: NAME-strength.h5")
     add("--folder", metavar="DIR", help=FOLDER_HELP)

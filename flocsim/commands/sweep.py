@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
         help="of elasticities: the larger value over the smaller (default: 2)")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
     add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
-    add("--resume", action="store_true", help="go on with a sweep, extend it, or join its parts")
+    add("--resume", action="store_true", help="continue a sweep, extend it, or join its parts")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--dry-run", action="store_true", help="print a command for each value, and stop")
     parser.set_defaults(run=run)
@@ -91,7 +91,7 @@ def run(args: Namespace) -> int:
             overwrite=args.overwrite, tell=tell, ways=WAYS,
         )  # fmt: skip
     except KeyboardInterrupt:
-        tell("flocsim: stopped; what is finished is kept: go on with --resume")
+        tell("flocsim: stopped; what is finished is kept: continue with --resume")
         return STOPPED
     tell(os.fspath(output))
     return 0
@@ -120,7 +120,7 @@ def run_elasticities(args: Namespace, study: Any) -> int:
             tell=tell, ways=WAYS,
         )  # fmt: skip
     except KeyboardInterrupt:
-        tell("flocsim: stopped; what is finished is kept: go on with --resume")
+        tell("flocsim: stopped; what is finished is kept: continue with --resume")
         return STOPPED
     tell(found.table())
     save(figure_of(found), picture, rule)

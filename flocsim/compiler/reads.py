@@ -127,8 +127,8 @@ def module_reads(function: Any) -> dict[tuple[str, ...], Any]:
         while isinstance(value, types.ModuleType) and used < len(chain):
             if not hasattr(value, chain[used]):
                 raise KernelError(
-                    f"kernel {where(function)} reads {'.'.join(chain[: used + 1])}, which the "
-                    f"module {value.__name__} has not"
+                    f"kernel {where(function)} reads {'.'.join(chain[: used + 1])}, but "
+                    f"module {value.__name__} has no attribute {chain[used]}"
                 )
             value = plain(getattr(value, chain[used]))
             used += 1

@@ -54,11 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument(
         "--resume", action="store_const", const="resume", default="new", dest="mode",
-        help="go on with an unfinished run, or extend a finished one; starts one if there is none",
+        help="continue an unfinished run, or extend a finished one; starts one if there is none",
     )  # fmt: skip
     begin.add_argument(
         "--restart", action="store_const", const="restart", dest="mode",
-        help="start anew; an unfinished run is kept under another name (finished results: "
+        help="start over; an unfinished run is kept under another name (finished results: "
         "--overwrite)",
     )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
@@ -188,7 +188,7 @@ def study(config, comm, arguments):
             if ended.kept or ended.begun:
                 begun = f" and the states of {ended.begun} others" if ended.begun else ""
                 there = f"{ended.kept} finished replicates{begun} are in {ended.journal}"
-                what = f"{there}; go on with --resume"
+                what = f"{there}; continue with --resume"
             tell(f"flocsim: stopped by {who}: {what}", sys.stderr)
         return STOPPED
     if comm.rank > 0:
@@ -243,7 +243,7 @@ def guarded(comm, arguments):
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     except KeyboardInterrupt:
-        return end_all(comm, "interrupted; go on with --resume", INTERRUPTED)
+        return end_all(comm, "interrupted; continue with --resume", INTERRUPTED)
     except MemoryError:
         return end_all(
             comm, "out of memory: ask for fewer ranks on a machine", FlocsimError.exit_code

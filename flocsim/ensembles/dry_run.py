@@ -216,7 +216,7 @@ def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float)
         f"ran {len(found.runs)} replicates of {found.conditions} of the {conditions} conditions, "
         f"{len(again)} of them again ({flips} outcomes flipped); they ended {words}",
         f"core-hours{most}: {hours.value:.2g} ({hours.low:.2g} to {hours.high:.2g}), "
-        f"{100.0 * found.again:.0f} % of them for second runs; on {ranks} rank(s) "
+        f"{100.0 * found.again:.0f} % of them for second runs; on {ranks} rank{'s' * (ranks != 1)} "
         f"{duration(3600.0 * hours.value / ranks)} ({duration(3600.0 * hours.low / ranks)} to "
         f"{duration(3600.0 * hours.high / ranks)})",
         f"  besides compiling, once for each machine: took or loaded in {compiled:.0f} s here",
@@ -292,7 +292,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
     count = len(scene.names) * len(shapes.vertices) * len(scene.delta)
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
-        f"seed {config.seed}, {ranks} rank(s), results in {config.output.file}",
+        f"seed {config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
         f"  vertices {list(shapes.vertices)}, {way_words(scene)}",
         f"  flocs: {flocs}",
         *([f"  {words}"] if (words := config.fluid.words) else []),

@@ -101,10 +101,9 @@ class StudyKind:
     def title(self) -> str:
         """The study in a few words, before "on 2 ranks"."""
         types, vertices, delta, replicates = self.shape
-        return (
-            f"{self.size} replicates: {types} types x {vertices} numbers of vertices x {delta} "
-            f"displacements x {replicates}"
-        )
+        axes = ((types, "type"), (vertices, "vertex count"), (delta, "displacement"))
+        words = " x ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in axes)
+        return f"{self.size} replicates: {words} x {replicates}"
 
     @property
     def remark(self) -> str:

@@ -219,7 +219,7 @@ def share_jobs(study: Any, comm: Communicator, jobs: Sequence[Job], leads: bool 
     trials = []
     for job in jobs[comm.rank :: comm.size]:
         if comm.rank == 0 and stop_requested():
-            raise StopRequested(f"stopped by {INTERRUPTION.name}; go on with --resume")
+            raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
         trials.append(try_out(study, job)[0])
     shares = comm.gather(trials)
     if shares is None:

@@ -182,7 +182,7 @@ class Trajectory:
         """
         wanted = self.checked_times(t)
         if len(wanted) != 1:
-            raise UsageError("contacts are told at one time: ask for each by itself")
+            raise UsageError("contacts are those of one time: ask for one time after another")
         return next(Replay(self.known()).instants(wanted, self.all_steps[0])).contacts()
 
     def forces(self, t: Any = None) -> dict[str, np.ndarray]:

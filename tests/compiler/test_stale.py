@@ -243,7 +243,7 @@ REFUSED = {
     ),
     "module that lacks it": (
         "import beside\ndef kernel(x):\n    return beside.missing * x\n",
-        "reads beside.missing, which the module beside has not",
+        "reads beside.missing, but module beside has no attribute missing",
     ),
     "mutable default": (
         "def kernel(x, k=[@]):\n    return k[0] * x\n",

@@ -31,7 +31,7 @@ def test_a_run_prints_its_table_and_writes_its_file(folder, capsys):
     assert code == 0
     assert errors == ""
     lines = output.splitlines()
-    assert lines[0].startswith("12 replicates: 2 types x 1 numbers of vertices x 2 displacements")
+    assert lines[0].startswith("12 replicates: 2 types x 1 vertex count x 2 displacements")
     assert "type I" in lines
     assert lines[-1].startswith("small.h5: 12 replicates, 12 of them run in ")
     assert read_results(folder / "small.h5").replicates["outcome"].shape == (2, 1, 2, 3)
@@ -64,7 +64,7 @@ def test_options_replace_the_configs_values(folder, capsys):
 def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
     code, output, errors = call(capsys, "small.toml", "--dry-run", "--output", "no/where.h5")
     assert (code, errors) == (0, "")
-    assert output.startswith("4 conditions x 3 replicates = 12, seed 1, 1 rank(s), ")
+    assert output.startswith("4 conditions x 3 replicates = 12, seed 1, on 1 rank, ")
     for said in ("D_0 = 45.35 um", "settling 60.29 and 84.58 mm/s", "in:  StokesDrag(",
                  "out: vertex-edge pairs", "nothing was run (--dry-run)"):  # fmt: skip
         assert said in output
@@ -188,7 +188,7 @@ def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypat
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
-        (KeyboardInterrupt, 130, "flocsim: interrupted; go on with --resume\n"),
+        (KeyboardInterrupt, 130, "flocsim: interrupted; continue with --resume\n"),
         (MemoryError, 70, "flocsim: out of memory: ask for fewer ranks on a machine\n"),
     ],
 )

@@ -151,5 +151,5 @@ class Heartbeat:
         more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
         return (
             f"{who}{more} has not been heard of for {self.seconds:g} s, so that the job ends; "
-            "what was computed is kept: go on with --resume"
+            "what was computed is kept: continue with --resume"
         )

@@ -74,10 +74,10 @@ class ProcessCommunicator(Communicator):
         process = self.others[rank - 1]
         process.join(LAST_SECONDS)
         if process.exitcode == STOPPED or stop_requested():
-            raise StopRequested("stopped by a signal; go on with --resume")
+            raise StopRequested("stopped by a signal; continue with --resume")
         raise LostRank(
             f"the process of rank {rank} has died (exit code {process.exitcode}); what was "
-            "computed is kept: go on with --resume"
+            "computed is kept: continue with --resume"
         )
 
     def close(self) -> None:

@@ -61,6 +61,6 @@ def difference(
         if code in stored and stored[code] != ranks[0].get(code):
             return (
                 f"{which} comes out otherwise here than it is in the file: go on where the run was "
-                "begun, or begin anew by --restart"
+                "begun, or start over with --restart"
             )
     return ""

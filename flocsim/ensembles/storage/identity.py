@@ -357,7 +357,7 @@ def differences(stored: dict, current: dict) -> list[str]:
 
 EXPLAINED = {
     "arithmetic": "this machine rounds sin, exp and the like otherwise (another kind of processor, "
-    "another C library or numpy): go on where the run was begun, or begin anew",
+    "another C library or numpy): resume where the run was begun, or start over",
     "code": "flocsim's own code has changed",
     "flocs": "the flocs with N = {} have changed",
     "start": "what {} begins a run with has changed",

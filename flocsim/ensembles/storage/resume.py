@@ -139,7 +139,7 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
             )
         elif mode == NEW:
             raise UsageError(
-                f"{path} holds an unfinished run: go on with it by --resume, or begin anew by "
+                f"{path} holds an unfinished run: continue it with --resume, or start over with "
                 "--restart, which keeps it under another name"
             )
     except Exception:
@@ -288,7 +288,7 @@ def take_part(start, study, record, known, places):
 
 
 ELSEWHERE = "name another output"
-REMEDY = f"{ELSEWHERE}, or begin anew by --restart, which keeps it under another name"
+REMEDY = f"{ELSEWHERE}, or start over with --restart, which keeps it under another name"
 
 
 def refuse_other(start, path, stored, remedy=REMEDY):

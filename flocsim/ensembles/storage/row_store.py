@@ -67,7 +67,7 @@ class OldTable:
         if self.before and now and now[0] == self.before[0] and now != self.before:
             raise FileError(
                 f"{self.path} was changed by another program while it was extended: put the "
-                "original back, and go on with --resume"
+                "original back, and continue with --resume"
             )
         return values
 

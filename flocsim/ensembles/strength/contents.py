@@ -15,7 +15,7 @@ def facts_of(found: Strengths) -> Facts:
             for code, count in sorted(statuses.items())]  # fmt: skip
     used = Counter(found.column("tolerance").tolist())
     needed = [f"{count} at {tolerance:g} m" for tolerance, count in sorted(used.items())]
-    told = found.progress if found.complete else f"{found.progress} so far; go on with --resume"
+    told = found.progress if found.complete else f"{found.progress} so far; continue with --resume"
     facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
     return facts + [
         (name.replace("_", " "), str(value)) for name, value in found.about.items()

@@ -81,7 +81,7 @@ def dry_run(config: Config, ranks: int) -> str:
     sizes = "measured" if scene.is_measured else f"lognormal, ln r_eq of sd {scene.spread:g}"
     lines = [
         f"{config.replicates} swarms of {scene.number} bodies, N = {study.vertices}, seed "
-        f"{config.seed}, {ranks} rank(s), results in {config.output.file}",
+        f"{config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
         f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, "
         f"median {np.median(radii):.4g} ({sizes})",
         f"  box {1e6 * width:.5g} x {1e6 * height:.5g} um, repeats itself {repeats}"

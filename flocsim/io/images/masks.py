@@ -98,7 +98,7 @@ def _unpacked(path, arrays):
     for (key, bits), (height, width) in zip(arrays.items(), shapes.tolist(), strict=True):
         size = height * width
         if bits.dtype != np.uint8 or bits.ndim != 1 or not 0 < size <= 8 * bits.size:
-            raise ImageError(f"{path} {key}: has not the bits of {height} × {width} pixels")
+            raise ImageError(f"{path} {key}: not the bits of {height} × {width} pixels")
         if min(height, width) < 1:
             raise ImageError(f"{path} {key}: {height} × {width} is no size of a mask")
         masks.append((key, np.unpackbits(bits)[:size].reshape(height, width)))

@@ -147,7 +147,7 @@ class LockedFile:
             os.close(descriptor)
             raise FileError(
                 f"{self.path} was replaced by another file while this run wrote to it: what is "
-                f"finished is in {copy}; move either away, rename that one and go on with --resume"
+                f"finished is in {copy}; move either away, rename that one, continue with --resume"
             ) from error
         except OSError as error:
             os.close(descriptor)

@@ -100,11 +100,14 @@ def body_names(count):
 
 
 def name_bodies(axes, frame, names):
-    """Each body's name where it is widest."""
+    """Each body's name where it is widest, clear of the path drawn there."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=3.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
         colour = BODY_COLOURS[number % len(BODY_COLOURS)]
         axes.text(*deepest_inside(max(body, key=len)), name, ha="center", va="center", fontsize=9,
-                  color=colour, weight="bold", zorder=7)  # fmt: skip
+                  color=colour, weight="bold", zorder=7, path_effects=halo)  # fmt: skip
 
 
 def deepest_inside(polygon):
@@ -126,7 +129,7 @@ def deepest_inside(polygon):
 
 
 def strip_keys(names, seen_from):
-    """The keys of a strip's legend: bodies, the ways of their centres, contacts."""
+    """The keys of a strip's legend: bodies, the paths of their centres, contacts."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -138,7 +141,7 @@ def strip_keys(names, seen_from):
     ]  # fmt: skip
     seen = "" if seen_from is None else f", seen from {names[seen_from]}"
     keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
-                       label=f"way of a body's centre in the whole run{seen}"))  # fmt: skip
+                       label=f"path of a body's centre, whole run{seen}"))  # fmt: skip
     keys.append(Line2D([], [], **RING, label="contact"))
     return keys
 

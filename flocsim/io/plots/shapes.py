@@ -116,7 +116,9 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
                       edgecolor="white", linewidth=0.5)  # fmt: skip
             axes.axvline(np.median(values), color="0.25", linestyle="--",
                          label=f"median {np.median(values):.3g}")  # fmt: skip
-            axes.set(xlabel=label, ylabel="number of flocs")
+            room = 1.2 * axes.get_ylim()[1]  # for the legend above the bars
+            axes.set(xlabel=label, ylabel="number of flocs", ylim=(0.0, room))
+            axes.yaxis.get_major_locator().set_params(integer=True)
             axes.legend()
         draw_dimension(panels[3], areas, perimeters)
         return figure

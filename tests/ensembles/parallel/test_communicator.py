@@ -252,7 +252,7 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
     again = ["small.toml", "--output", f"late{ranks}.h5"]
     done = run_command(serial, *again, timeout=60)
     assert done.returncode == 2
-    assert "holds an unfinished run: go on with it by --resume" in done.stderr
+    assert "holds an unfinished run: continue it with --resume" in done.stderr
     done = run_command(serial, *again, "--resume", "--jobs", 2, timeout=60)
     assert done.returncode == 0
     # What was computed beyond the three replicates that are asked for now is not thrown away.

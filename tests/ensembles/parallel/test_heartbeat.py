@@ -77,7 +77,7 @@ def test_a_rank_that_falls_silent_ends_the_job_and_is_named(capsys):
     assert wire.ended_with == 75
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith("flocsim: rank 2 (node2, process 7) has not been heard of for 6 s")
-    assert "go on with --resume" in line
+    assert "continue with --resume" in line
     beat.turn()
     assert capsys.readouterr().err == ""
 

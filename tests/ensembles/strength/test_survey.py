@@ -313,16 +313,16 @@ def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
     assert command() == 75
     told = capsys.readouterr().err
     assert "stopped by SIGTERM: 3 finished replicates are in " in told
-    assert "study-strength.h5.journal; go on with --resume" in told
+    assert "study-strength.h5.journal; continue with --resume" in told
     assert not Path("study-strength.h5").exists()
     assert program.main(["info", "study-strength.h5"]) == 0
-    assert "3 of 5 doublets so far; go on with --resume" in capsys.readouterr().out
+    assert "3 of 5 doublets so far; continue with --resume" in capsys.readouterr().out
     assert program.main(["plot", "study-strength.h5"]) == 0
     fake.replicate, stop.signal = run_again, 0
     before = Path("study-strength.h5.journal").read_bytes()
     assert command() == 2 and command("--resume", "--flow", "extension") == 2
     told = capsys.readouterr().err
-    assert "holds an unfinished run: go on with it by --resume" in told
+    assert "holds an unfinished run: continue it with --resume" in told
     assert 'flow is "shear" in the file, "extension" now' in told and told.count("\n") == 2
     assert Path("study-strength.h5.journal").read_bytes() == before
     assert command("--resume") == 0

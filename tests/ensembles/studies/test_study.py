@@ -151,9 +151,9 @@ def test_a_replicate_of_a_study_is_kept_as_motion(tmp_path):
 def test_scripts_get_no_words_of_the_command():
     from flocsim.ensembles.studies.study import error_of
 
-    error = error_of(75, ["", "flocsim: stopped by SIGTERM: go on with --resume"])
+    error = error_of(75, ["", "flocsim: stopped by SIGTERM: continue with --resume"])
     assert type(error) is FlocsimError
-    assert str(error) == 'stopped by SIGTERM: go on with mode="resume"'
+    assert str(error) == 'stopped by SIGTERM: continue with mode="resume"'
     assert "killed" in str(error_of(-9, []))
 
 
