@@ -9,6 +9,8 @@ has is told and called through its laws (flocsim.laws).
 from collections.abc import Callable
 from typing import TypeVar
 
+from flocsim.compiler.linker import apart
+
 Function = TypeVar("Function", bound=Callable)
 
 HOOKS: dict[str, Callable] = {}
@@ -22,6 +24,7 @@ def hook(function: Function) -> Function:
 
 
 @hook
+@apart
 def attempt(scene, work, clock, step):
     """One step of the integrator: the local error over the tolerance, or −1 where it failed.
 
@@ -50,12 +53,14 @@ def choose_method(scene, work, clock, counts):
 
 
 @hook
+@apart
 def step_across(scene, work, clock, step):
     """One step of a method that may do both, across switches: what ``attempt`` returns."""
     return -1.0
 
 
 @hook
+@apart
 def leave_out_cycles(scene, work, clock, counts, until):
     """Go on by many equal cycles of switches at once, where they are, to before a time [s]."""
 

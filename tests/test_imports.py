@@ -40,8 +40,9 @@ ROWS = [
 INNER_ROWS = {
     "compiler": [
         ["composer"],
+        ["units"],
         ["fingerprint", "interpreter_calls"],
-        ["constants", "numba_internals"],
+        ["constants", "numba_internals", "linker"],
         ["by_pointer", "disk_cache", "object_code", "processor", "reads", "waiting"],
     ],
     "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],

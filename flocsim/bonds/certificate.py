@@ -21,7 +21,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, speeds_of
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
 from flocsim.integrators.rhs.outline_sum import outlines_apart

@@ -22,7 +22,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.bonds.bond import are_spheres, is_closed, resting_contact, size_of
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.laws import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit

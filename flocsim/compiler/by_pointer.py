@@ -371,6 +371,20 @@ def type_of(value: Any, *, arrays: bool, sizes: tuple[int, ...] = ()) -> Any:
     return types.float64 if isinstance(value, float) else types.int64
 
 
+def types_within(given: Sequence[Any]) -> dict[str, Any]:
+    """{words: numba type} of some types, of what they are made of, and of numbers."""
+    from numba import types
+
+    found = {str(each): each for each in (types.float64, types.int64, types.boolean)}
+    more = list(given)
+    for kind in more:  # grows
+        if str(kind) not in found:
+            found[str(kind)] = kind
+            more += [each for _, each in kind.fields] if hasattr(kind, "places") else []
+            more += [kind.array] if hasattr(kind, "array") else []
+    return found
+
+
 def argument_at(kind: Any, place: int) -> Any:
     """A function for compiled code: the argument of a type at a place of a table at an address."""
     from llvmlite import ir

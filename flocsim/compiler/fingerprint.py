@@ -10,7 +10,7 @@ import inspect
 import sys
 import types
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 from flocsim.compiler.constants import Untold, told
 from flocsim.compiler.processor import numba_settings, versions
@@ -81,14 +81,26 @@ def told_defaults(function):
         raise KernelError(f"kernel {where(function)} has a default argument, {error}") from None
 
 
-def tell(entry: Any, fillings: dict[Callable, Callable]) -> tuple[list[str], list, list]:
-    """(lines that tell all that a function does, the functions that it reaches, what they read).
+class Told(NamedTuple):
+    """What a function does, in ``lines``, the ``functions`` that it reaches and what they ``read``;
+    ``calls`` {name: function} what of that is compiled apart, where that is left out."""
+
+    lines: list[str]
+    functions: list[Callable]
+    read: list[Any]
+    calls: dict[str, Callable]
+
+
+def tell(entry: Any, fillings: dict[Callable, Callable], *, within: bool = False) -> Told:
+    """All that a function does; ``within``: but for functions that are compiled apart from it,
+    which it knows by name.
 
     KernelError, with the kernel's file and line and the name, for what cannot be told.
     """
     lines: list[str] = []
     seen: dict[Callable, int] = {}
     read: list[Any] = []
+    calls: dict[str, Callable] = {}
 
     def visit(function):
         function = fillings.get(function, function)
@@ -103,6 +115,10 @@ def tell(entry: Any, fillings: dict[Callable, Callable]) -> tuple[list[str], lis
         lines.append(f"{function.__qualname__} {code_digest(function.__code__)}")
         lines.append(told_defaults(function))
         for name, value in globals_read(function):
+            if within and hasattr(value, "apart"):
+                lines.append(f"{name}->{value.apart}")
+                calls[value.apart] = value
+                continue
             if isinstance(value, types.FunctionType):
                 # Two functions may share a name, so that a number has to tell which is called.
                 lines.append(f"{name}->{visit(value)}")
@@ -112,7 +128,7 @@ def tell(entry: Any, fillings: dict[Callable, Callable]) -> tuple[list[str], lis
         return seen[function]
 
     visit(entry)
-    return lines, list(seen), read
+    return Told(lines, list(seen), read, calls)
 
 
 def fingerprint(entry: Any, fillings: dict[Callable, Callable], options: str = "") -> str:
@@ -122,7 +138,12 @@ def fingerprint(entry: Any, fillings: dict[Callable, Callable], options: str = "
     """
     from flocsim.compiler.numba_internals import refuse_extensions
 
-    lines, functions, read = tell(entry, fillings)
-    refuse_extensions(functions, read)
+    found = tell(entry, fillings)
+    refuse_extensions(found.functions, found.read)
+    return hashed(found.lines, options)
+
+
+def hashed(lines: Iterable[str], options: str) -> str:
+    """The hash of what lines tell, and of how it is compiled."""
     text = "\n".join([compiler_text(), options, *lines])
     return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()

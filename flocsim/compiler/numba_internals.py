@@ -107,6 +107,35 @@ def call_by_address(signature: Any) -> Callable:
     return call
 
 
+def call_of_unit(names: tuple[str, ...], unit_for: Callable[[tuple[Any, ...]], Any]) -> Callable:
+    """A function for compiled code, of arguments of such names: it calls the unit for which
+    ``unit_for(numba types)`` gives (symbol, what it returns), by that symbol."""
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    def typed_call(given):
+        given = tuple(map(types.unliteral, given))
+        symbol, returned = unit_for(given)
+        kind = type_returned(returned)
+
+        def generate(context, builder, typed, values):
+            convention = context.call_conv
+            called = convention.get_function_type(kind, given)
+            function = cgutils.get_or_insert_function(builder.module, called, symbol)
+            status, result = convention.call_function(builder, function, kind, given, values)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return result
+
+        return kind(*given), generate
+
+    taken = ", ".join(names)
+    known: dict[str, Any] = {"typed_call": typed_call}
+    exec(f"def call(typing, {taken}):\n    return typed_call(({taken},))\n", known)
+    return intrinsic(known["call"])
+
+
 UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of functions that neither Python nor C calls by numba's wrappers, which take time."""
 
@@ -129,10 +158,23 @@ def returned_as(kind: Any) -> str:
     return letters[plain]
 
 
+def type_returned(letters: str) -> Any:
+    """The numba type of numbers that are returned, told as ``returned_as`` does."""
+    from numba import types
+
+    known = {
+        "?": types.boolean, "d": types.float64, "q": types.int64, "Q": types.uint64,
+        "f": types.float32, "i": types.int32,
+    }  # fmt: skip
+    kinds = [known[each] for each in letters]
+    return types.Tuple.from_types(kinds) if len(kinds) > 1 else next(iter(kinds), types.none)
+
+
 def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, bool]:
     """The machine code of a function of a signature, and whether another process can use it: not
     where it holds addresses of this one."""
     import numba
+    from numba.core.compiler_lock import global_compiler_lock
 
     dispatcher: Any = numba.njit(function, **options)
     dispatcher.typingctx.refresh()  # has to hear of new intrinsics
@@ -140,9 +182,11 @@ def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCod
     dispatcher.compile(signature)
     [result] = dispatcher.overloads.values()
     library = result.library
+    with global_compiler_lock:
+        library._ensure_finalized()
     declared = [each.name for each in library._final_module.functions if each.is_declaration]
     found = ObjectCode(
-        library._get_compiled_object(), result.fndesc.llvm_func_name,
+        library._codegen._tm.emit_object(library._final_module), result.fndesc.llvm_func_name,
         returned_as(result.signature.return_type),
         any(name.encode().startswith(LENT) for name in declared),
     )  # fmt: skip
@@ -167,12 +211,19 @@ def libraries():
     and of one that is run, with all that it reaches."""
     from numba.core.codegen import JITCodeLibrary
 
-    class LinkedLibrary(JITCodeLibrary):
-        """Code as it was lowered: neither optimised, linked nor made machine code of."""
+    class UnloadedLibrary(JITCodeLibrary):
+        """Code that numba does not load."""
 
         @property
         def codegen(self):
             return NoEnvironment(self._codegen)
+
+        def get_pointer_to_function(self, name):
+            """None: there is no machine code of it in this process."""
+            return 0
+
+    class LinkedLibrary(UnloadedLibrary):
+        """Code as it was lowered: neither optimised, linked nor made machine code of."""
 
         def _optimize_functions(self, module):
             """Left to the library that this one is linked into."""
@@ -184,10 +235,6 @@ def libraries():
             self._finalize_dynamic_globals()
             self._finalized = True
 
-        def get_pointer_to_function(self, name):
-            """None: there is no machine code."""
-            return 0
-
     def reached(library, found):
         """All libraries that one is linked to, through others, too."""
         for each in library._linking_libraries:
@@ -196,8 +243,8 @@ def libraries():
                 reached(each, found)
         return found
 
-    class WholeLibrary(JITCodeLibrary):
-        """Everything that a function reaches, linked and optimised once."""
+    class WholeLibrary(UnloadedLibrary):
+        """Everything that a function reaches, linked and optimised once, as an object file."""
 
         def finalize(self):
             """Link and optimise."""
@@ -217,6 +264,12 @@ def libraries():
                 loop_vectorize=False, slp_vectorize=False
             )
             passes.run(module, builder)
+
+        def _finalize_final_module(self):
+            """Ready for an object file: it cannot be loaded before the units that it calls are."""
+            self._finalize_dynamic_globals()
+            self._verify_declare_only_symbols()
+            self._finalized = True
 
     return LinkedLibrary, WholeLibrary
 
@@ -262,8 +315,6 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any]]:
             def run_pass(self, state):
                 name = state.func_id.func_qualname
                 state.library = library_class(state.targetctx.codegen(), name)
-                if library_class is whole:
-                    state.library.enable_object_caching()
                 changed = super().run_pass(state)
                 if library_class is linked and calls_python(state.library):
                     raise UnsupportedError(

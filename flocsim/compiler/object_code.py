@@ -7,10 +7,13 @@ what was raised, and the answer is whether anything was.
 """
 
 import ctypes
+import hashlib
+import json
 import pickle
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 LENT = b"numba_", b"NRT_", b"Py", b"_Py", b"__svml"
@@ -18,29 +21,43 @@ LENT = b"numba_", b"NRT_", b"Py", b"_Py", b"__svml"
 
 _lock = threading.Lock()
 _engines: list[Any] = []
+_linked: dict[tuple[Any, ...], int] = {}
+
+
+class Called(NamedTuple):
+    """A unit that another one calls: its ``symbol``, the name of its ``function``, the ``types`` of
+    its arguments in words, and what it is to have ``returned``, as for struct.unpack."""
+
+    symbol: str
+    function: str
+    types: list[str]
+    returned: str
 
 
 class ObjectCode(NamedTuple):
     """``code``, an object file; ``entry``, its symbol; ``returned``, what it returns, as for
-    struct.unpack; ``borrows``, whether it calls what only numba has."""
+    struct.unpack; ``borrows``, whether it calls what only numba has; the units that it ``calls``.
+    """
 
     code: bytes
     entry: str
     returned: str
     borrows: bool
+    calls: tuple[Called, ...] = ()
 
     def packed(self) -> bytes:
         """As the disk has it."""
-        head = f"{self.entry}\0{self.returned}\0{int(self.borrows)}\0"
-        return head.encode() + self.code
+        return json.dumps(self[1:]).encode() + b"\n" + self.code
 
     @classmethod
     def unpacked(cls, data: bytes) -> "ObjectCode":
-        entry, returned, borrows, code = data.split(b"\0", 3)
-        return cls(code, entry.decode(), returned.decode(), borrows == b"1")
+        head, code = data.split(b"\n", 1)
+        entry, returned, borrows, calls = json.loads(head)
+        return cls(code, entry, returned, borrows, tuple(Called(*each) for each in calls))
 
-    def load(self) -> int:
-        """The address of the entry; the code stays as long as the process lives."""
+    def load(self, called: Mapping[str, int] = MappingProxyType({})) -> int:
+        """The address of the entry; ``called`` {symbol: address} of the units that it calls. The
+        code stays as long as the process lives."""
         import llvmlite.binding as llvm
 
         if self.borrows:
@@ -50,6 +67,9 @@ class ObjectCode(NamedTuple):
         with _lock:
             llvm.initialize_native_target()
             llvm.initialize_native_asmprinter()
+            # For the process as a whole, and yet for this file: those before are linked already.
+            for symbol, address in called.items():
+                llvm.add_symbol(symbol, address)
             machine = llvm.Target.from_default_triple().create_target_machine()
             # One of its own: symbols of two object files may have the same names.
             engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
@@ -57,6 +77,16 @@ class ObjectCode(NamedTuple):
             engine.finalize_object()
             _engines.append(engine)
             return engine.get_function_address(self.entry)
+
+
+def link(code: ObjectCode, units: dict[str, ObjectCode]) -> int:
+    """The address of a unit, linked with ``units`` {symbol: ObjectCode}, as far as it calls them;
+    what is linked with the same ones is loaded once."""
+    called = {each.symbol: link(units[each.symbol], units) for each in code.calls}
+    key = hashlib.blake2b(code.code, digest_size=16).digest(), code.entry, *called.items()
+    if key not in _linked:
+        _linked[key] = code.load(called)
+    return _linked[key]
 
 
 def function_at(entry: int, returned: str) -> Callable[[int], Any]:

@@ -12,6 +12,7 @@ the vertex is shifted along t: 0 where the foot lies inside the edge, which alon
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.rotation import cosine_and_sine
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.shapes.cores import closest_share
@@ -114,6 +115,7 @@ def locate_spheres(scene, work, state, row):
     store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
 
 
+@apart
 def locate_contacts(scene, work, state):
     """Geometry of all listed pairs in a state; the smallest gap (inf without pairs)."""
     turn_bodies(work, state)

@@ -19,7 +19,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
     add_product,

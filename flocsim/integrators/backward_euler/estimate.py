@@ -12,7 +12,7 @@ error of velocity is sent through once more, for what the next step leaves of it
 """
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product

@@ -23,7 +23,7 @@ friction nearly everywhere.
 import math
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
     friction_force,

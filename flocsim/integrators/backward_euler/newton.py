@@ -14,7 +14,7 @@ meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
 import math
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.backward_euler.contact_mean import (

@@ -9,7 +9,7 @@ which pairs close and slide, with those where they have come to.
 import math
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
     change_pairs,

@@ -7,7 +7,7 @@ do not resolve they damp: bodies come to rest at the first touch, as they do by 
 import math
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.backward_euler.contact_mean import takes_part
 from flocsim.integrators.backward_euler.estimate import estimate_step, write_rates
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end

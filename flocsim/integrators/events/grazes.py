@@ -11,6 +11,7 @@ followed, and left out (cycles.py). Where the tolerance resolves these, the law 
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding
@@ -253,6 +254,7 @@ def part(scene, work, clock, row):
     return True
 
 
+@apart
 def settle(scene, work, clock):
     """Let pairs begin and cease to graze at the end of a step; whether any has."""
     changed, entered = False, False

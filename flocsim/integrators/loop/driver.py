@@ -3,6 +3,7 @@
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
@@ -76,6 +77,7 @@ def take_new_state(work):
             work.slip[at.NOW, row] = work.slip[at.NEW, row]
 
 
+@apart
 def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
@@ -131,6 +133,7 @@ def pause_reason(clock, counts, record):
     return 0
 
 
+@apart
 def keep_lists(scene, work, counts, ahead):
     """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
     or they are too wide; False without room."""

@@ -8,6 +8,7 @@ real and one complex system of 3n equations.
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import apart
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
@@ -82,6 +83,7 @@ def slip_stages(scene, work, step, first):
                 slip[state, row] = slip_in(scene, work, state, row, stuck)
 
 
+@apart
 def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
@@ -159,6 +161,7 @@ def expected_pace(clock, step):
     return min(max(DOUBTED_PACE * clock[at.SEEN_PACE] * longer * longer, LEAST_PACE), FIRST_PACE)
 
 
+@apart
 def solve_stages(scene, work, clock, step):
     """Find the stages' velocities; False where Newton's method does not converge."""
     guess_stages(scene, work, clock, step)

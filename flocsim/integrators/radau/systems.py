@@ -6,7 +6,7 @@ those of many in an order in which little fills in (elimination.py).
 """
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
 from flocsim.integrators.radau.dense import factorise, solve_dense
 from flocsim.integrators.radau.elimination import factorise_sparse, solve_sparse

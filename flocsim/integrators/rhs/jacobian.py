@@ -13,6 +13,7 @@ the torque changes by N σ.
 
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import row_radii
 from flocsim.geometry.contact.separation import separation
 from flocsim.hooks import hook
@@ -350,6 +351,7 @@ def assemble_others(scene, work, time, remaining):
     add_pair_damping(scene, work)
 
 
+@apart
 def assemble_jacobian(scene, work, time, remaining):
     """DAMPING and STIFFNESS of the current state, whose contact geometry is located."""
     assemble_others(scene, work, time, remaining)

@@ -9,7 +9,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.arrays import MOST_FEET, OutlineView
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.surfaces.attraction import EIGHT, piece_at_point
 from flocsim.geometry.surfaces.distances import (

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import apart
+from flocsim.compiler.linker import apart
 from flocsim.hooks import hook
 from flocsim.hydrodynamics.pair_table import COLUMNS, NEAREST, NODES_A_UNIT
 from flocsim.hydrodynamics.two_spheres import fading

@@ -22,6 +22,7 @@ or the other, is told by a nudged companion alone.
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.separation import length_of
 from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
@@ -77,6 +78,7 @@ def carry_vector(scene, work, clock, step):
     return math.inf
 
 
+@apart
 def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
     known, errors = False, work.bodies

@@ -1,0 +1,282 @@
+"""Units of machine code: what is compiled by itself, kept on the disk, and linked where it is used.
+
+The first unit of an engine is its driver; each function marked @apart (flocsim.compiler.linker) is
+another. A unit knows those that it calls by the names of their functions alone, as a C file knows
+what it includes no body of; which ones these are is settled when they are loaded. Engines of
+spheres and of polygons, of two bodies and of many, of one observer and of another therefore share
+most of their machine code, and an edited function compiles its own unit.
+
+A unit's file is named by a hash of what it does up to the units that it calls, of the types that it
+is given, and of what they return; the engine's, by a hash of everything, lists them all.
+"""
+
+import contextlib
+import functools
+import hashlib
+import json
+import re
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flocsim.compiler import disk_cache
+from flocsim.compiler.by_pointer import types_within
+from flocsim.compiler.constants import Intrinsic
+from flocsim.compiler.fingerprint import hashed, tell
+from flocsim.compiler.linker import Linker
+from flocsim.compiler.object_code import Called, ObjectCode, link
+from flocsim.compiler.processor import compiled_for, numba_settings, versions
+from flocsim.compiler.waiting import compiling
+from flocsim.errors import FlocsimError, KernelError
+from flocsim.limits import COMPILING, lacking
+
+INLINED_SIZE = 400
+"""Functions of less bytecode [bytes] are always inlined; of the others LLVM decides."""
+
+MADE = re.compile(r"<flocsim_(scene|law|unit)_[0-9a-f]+>$")
+"""Code that is made here, and says nothing to a user."""
+
+
+def run_of(module, entry, **readers):
+    """The function of a module that numba compiles, and keeps: ``run``, which calls the ``driver``
+    of its globals with the same arguments, or with those that ``readers`` find in a table by its
+    address (by_pointer)."""
+    names = argument_names(entry)
+    taken = "address" if readers else ", ".join(names)
+    handed = ", ".join(f"read_{name}(address)" if readers else name for name in names)
+    source = (
+        f'"""Made by flocsim from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
+        f"def run({taken}):\n    return driver({handed})\n"
+    )
+    known = vars(module) | {f"read_{name}": each for name, each in readers.items()}
+    exec(compile(source, f"<{module.__name__}>", "exec"), known)
+    return known["run"]
+
+
+def argument_names(function):
+    """The names of a function's arguments."""
+    return function.__code__.co_varnames[: function.__code__.co_argcount]
+
+
+class Code:
+    """A linked entry and how it is compiled: as module ``name``; ``what`` it is in words;
+    ``allocates``, whether it makes arrays for itself."""
+
+    def __init__(self, entry, name, allocates=False, what="its kernels"):
+        self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
+        if numba_settings()["DISABLE_JIT"] != "0":
+            raise KernelError(
+                "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs "
+                "compiled code only: unset it (in Python, jit=False runs a scene uncompiled)"
+            )
+
+    def loaded(self, told, typed):
+        """(address of its machine code, what it returns), from the disk or compiled; ``told`` tells
+        all that ``typed()``, the signature and the readers of arguments (see run_of), follow from.
+        """
+        key = key_of(told)
+        if (data := disk_cache.read(self.name, key)) is not None:
+            # What fails was written by this code, and yet is of no use: it is compiled anew.
+            with contextlib.suppress(Exception):
+                return from_files(data)
+        build = Build(self)
+        code = build.entry(*typed())
+        if build.lasts:
+            head = json.dumps(build.files).encode()
+            disk_cache.write(self.name, key, head + b"\n" + code.packed())
+        return link(code, build.units), code.returned
+
+
+def key_of(told):
+    """What machine code depends on beside the name: types, processor, versions."""
+    return repr((told, compiled_for(), versions()))
+
+
+def from_files(data):
+    """(address, what it returns) of an engine as the disk has it, of units that it has, too."""
+    head, packed = data.split(b"\n", 1)
+    code = ObjectCode.unpacked(packed)
+    units = {
+        symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
+        for symbol, file in json.loads(head).items()
+    }
+    return link(code, units), code.returned
+
+
+class Build:
+    """An engine while it is compiled, unit after unit: ``units`` {symbol: ObjectCode} and ``files``
+    {symbol: (name, key)} on the disk; ``lasts``: whether another process can use all of them;
+    ``known`` {words: numba type} of arguments."""
+
+    def __init__(self, code):
+        self.code = code
+        self.units: dict[str, ObjectCode] = {}
+        self.files: dict[str, tuple[str, str]] = {}
+        self.lasts = True
+        self.known: dict[str, Any] = {}
+        self.dispatchers: list[Any] = []
+
+    def entry(self, signature, readers):
+        """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
+        be compiled."""
+        from flocsim.compiler import numba_internals as internals
+
+        if text := lacking(COMPILING, "compiling"):
+            raise FlocsimError(text)  # LLVM ends the process where it gets no memory
+        code = self.code
+        try:
+            with compiling(code.what, to_compile(code.entry)), internals.quick_typing():
+                return self.compiled(code.entry, code.name, signature, readers)
+        except internals.compiler_error() as error:
+            raise KernelError(compiler_complaint(str(error))) from None
+        finally:
+            internals.forget(self.dispatchers)
+
+    def compiled(self, entry, name, signature, readers):
+        """The ObjectCode of the unit that begins with a function."""
+        import numba
+
+        from flocsim.compiler import numba_internals as internals
+
+        # Without the interpreter's lock, dividing by zero as numpy does.
+        options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
+        options |= {} if self.code.allocates else internals.NO_COUNTING
+        for_inner, for_entry = internals.compilers()
+        calls: dict[str, Called] = {}
+        parts = []
+
+        def transform(clone):
+            clone.__module__, clone.__qualname__ = name, f"{clone.__qualname__}_{len(parts)}"
+            small = len(clone.__code__.co_code) < INLINED_SIZE
+            inner = numba.njit(clone, **options, **for_inner, forceinline=small)
+            parts.append(internals.typed_once(inner))
+            return parts[-1]
+
+        def called(function):
+            def unit_for(given):
+                symbol, unit = self.unit(function, given)
+                calls[symbol] = Called(symbol, function.apart, told_types(given), unit.returned)
+                return symbol, unit.returned
+
+            return internals.call_of_unit(argument_names(function), unit_for)
+
+        module = types.ModuleType(name)
+        sys.modules[name] = module  # where numba looks for its name
+        try:
+            run = run_of(module, entry, **readers)
+            run.__globals__["driver"] = Linker(
+                {}, transform, made, called if for_entry else None
+            ).link(entry)
+            code, lasts = internals.object_code(run, signature, {**options, **for_entry})
+        finally:
+            del sys.modules[name]
+            self.dispatchers += parts
+        self.lasts &= lasts
+        return code._replace(calls=tuple(calls.values()))
+
+    def unit(self, function, given):
+        """(symbol, ObjectCode) of a function marked @apart for arguments of such numba types."""
+        self.known |= types_within(given)
+        told = told_types(given)
+        symbol = symbol_of(function.apart, told)
+        if symbol not in self.units and not self.found(function, told):
+            name = unit_of(function).name
+            code = self.compiled(function, name, given, {})
+            self.add(symbol, name, told, code)
+            disk_cache.write(name, key_of(told), code.packed())
+        return symbol, self.units[symbol]
+
+    def found(self, function, told):
+        """Whether a unit is on the disk, and what it calls returns what it expects; of that, what
+        is not on the disk is compiled."""
+        symbol, unit = symbol_of(function.apart, told), unit_of(function)
+        if symbol in self.units:
+            return True
+        if (data := disk_cache.read(unit.name, key_of(told))) is None:
+            return False
+        code = ObjectCode.unpacked(data)
+        for each in code.calls:
+            if not self.known.keys() >= set(each.types):
+                return False
+            called = unit.calls[each.function]
+            given = tuple(self.known[name] for name in each.types)
+            if self.unit(called, given)[1].returned != each.returned:
+                return False
+        self.add(symbol, unit.name, told, code)
+        return True
+
+    def add(self, symbol, name, told, code):
+        """Take a unit in."""
+        self.units[symbol], self.files[symbol] = code, (name, key_of(told))
+
+
+def told_types(given):
+    """numba types in words."""
+    return [str(each) for each in given]
+
+
+def symbol_of(function, told):
+    """By what name a unit is called: that of its function, for arguments of such types."""
+    words = " ".join([function, *told])
+    return f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
+
+
+class Unit(NamedTuple):
+    """The ``name`` of a unit's file, by what it does up to the units that it ``calls`` {name:
+    function}; how many ``functions`` it has."""
+
+    name: str
+    calls: dict[str, Callable]
+    functions: int
+
+
+@functools.lru_cache(maxsize=4096)
+def unit_of(function: Callable) -> Unit:
+    """The Unit that begins with a function."""
+    found = tell(function, {}, within=True)
+    name = f"flocsim_unit_{hashed(found.lines, options_text(False))}"
+    return Unit(name, found.calls, len(found.functions))
+
+
+def to_compile(entry):
+    """How many functions there are in an engine's units that are not on the disk."""
+    units, more = {entry}, [entry]
+    for each in more:  # grows
+        new = set(unit_of(each).calls.values()) - units
+        units |= new
+        more += new
+    found = [unit_of(each) for each in units if each is not entry]
+    missing = [unit for unit in found if not disk_cache.has(unit.name)]
+    return sum(unit.functions for unit in [unit_of(entry), *missing])
+
+
+def made(value):
+    """What numba is to see in the place of a value."""
+    return value.make() if isinstance(value, Intrinsic) else value
+
+
+def compiler_complaint(text):
+    """ "file:line: what is wrong" from numba's many lines: the innermost place of a kernel."""
+    words, complaint = "", ""
+    for line in text.splitlines():
+        found = re.match(r'\s*File "(.+)", line (\d+)', line)
+        if found and not (MADE.search(found[1]) or words.startswith("During:")):
+            complaint = f"{found[1]}:{found[2]}: {words}"
+        elif line.strip():
+            words = line.strip()
+    complaint = complaint or text.strip().splitlines()[0]
+    return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
+
+
+@functools.cache
+def options_text(allocates: bool) -> str:
+    """How functions are compiled, for the hash: options, and the code that says how."""
+    from flocsim.compiler import by_pointer, numba_internals
+
+    source = b"".join(
+        Path(str(each.__file__)).read_bytes() for each in (by_pointer, numba_internals)
+    )
+    digest = hashlib.blake2b(source, digest_size=8).hexdigest()
+    return f"{INLINED_SIZE} {allocates} {digest}"

@@ -1,0 +1,140 @@
+"""Units of machine code: shared by engines, made anew where they differ, never mixed up."""
+
+import numpy as np
+import pytest
+
+from flocsim.compiler import composer, disk_cache, units
+from flocsim.compiler.composer import compose
+from flocsim.compiler.linker import apart
+
+
+@apart
+def law(x):
+    return x * x
+
+
+def cubed(x):
+    return x * x * x
+
+
+def whole(x):
+    return 3
+
+
+@apart
+def energy(values, x):
+    total = 0.0
+    for k in range(values.shape[0]):
+        total += law(values[k]) + x
+    return total
+
+
+def drive(values, x):
+    return energy(values, x), law(x) + 1.0
+
+
+def watched(values, x):
+    return energy(values, x), law(x) - 1.0
+
+
+@apart
+def checked(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x, x > 1.0
+
+
+def drive_checked(x):
+    number, large = checked(x)
+    return number if large else -number
+
+
+VALUES = np.array([1.0, 2.0, 3.0])
+
+
+@pytest.fixture
+def made(monkeypatch, tmp_path):
+    """Names of the functions with which compiled units begin, in the order in which they end."""
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
+    monkeypatch.setattr(composer, "_composed", {})
+    names = []
+    real = units.Build.compiled
+
+    def compiled(self, entry, *more):
+        code = real(self, entry, *more)
+        names.append(entry.__name__)
+        return code
+
+    monkeypatch.setattr(units.Build, "compiled", compiled)
+    return names
+
+
+def files(folder):
+    return {path.name: path.read_bytes() for path in folder.glob(f"*{disk_cache.SUFFIX}")}
+
+
+def test_each_marked_function_is_a_unit_that_computes_what_python_does(made, tmp_path):
+    assert compose(drive, {})(VALUES, 2.0) == drive(VALUES, 2.0)
+    assert made == ["law", "energy", "drive"]
+    assert sum(name.startswith("flocsim_unit_") for name in files(tmp_path)) == 2
+
+
+def test_two_engines_share_their_units(made, tmp_path):
+    compose(drive, {})(VALUES, 2.0)
+    before = files(tmp_path)
+    assert compose(watched, {})(VALUES, 2.0) == watched(VALUES, 2.0)
+    assert made == ["law", "energy", "drive", "watched"]
+    after = files(tmp_path)
+    assert len(after) == len(before) + 1 and before.items() <= after.items()
+
+
+def test_what_fills_a_hook_is_linked_to_what_calls_the_hook(made):
+    first, second = compose(drive, {}), compose(drive, {law: cubed})
+    assert first(VALUES, 2.0) == (14.0 + 6.0, 5.0)
+    assert second(VALUES, 2.0) == (36.0 + 6.0, 9.0)
+    assert first(VALUES, 2.0) == (14.0 + 6.0, 5.0)
+    # The sum is compiled once: it knows the law by its name.
+    assert made == ["law", "energy", "drive", "cubed", "drive"]
+
+
+def test_a_unit_that_returns_other_types_has_its_callers_compiled_anew(made):
+    compose(drive, {})(VALUES, 2.0)
+    assert compose(drive, {law: whole})(VALUES, 2.0) == (15.0, 4.0)
+    assert made[3:] == ["whole", "energy", "drive"]
+    assert compose(drive, {law: cubed})(VALUES, 2.0) == (42.0, 9.0)
+
+
+@pytest.mark.parametrize("again", [drive, watched])
+@pytest.mark.parametrize("harm", ["removed", "cut", "exchanged"])
+def test_a_unit_that_is_missing_or_damaged_is_compiled_anew(
+    made, tmp_path, monkeypatch, again, harm
+):
+    compose(drive, {})(VALUES, 2.0)
+    found = sorted(tmp_path.glob("flocsim_unit_*"))
+    if harm == "exchanged":
+        content = [path.read_bytes() for path in found]
+        for path, other in zip(found, reversed(content), strict=True):
+            path.write_bytes(other)
+    for path in found[:1] if harm != "exchanged" else []:
+        path.unlink() if harm == "removed" else path.write_bytes(path.read_bytes()[:-9])
+    monkeypatch.setattr(composer, "_composed", {})
+    assert compose(again, {})(VALUES, 2.0) == again(VALUES, 2.0)
+    assert len(made) > 3
+    count = len(made)
+    monkeypatch.setattr(composer, "_composed", {})
+    assert compose(again, {})(VALUES, 2.0) == again(VALUES, 2.0)
+    assert len(made) == count
+
+
+def test_what_a_unit_raises_comes_through(made):
+    driver = compose(drive_checked, {})
+    assert (driver(2.0), driver(0.5)) == (2.0, -0.5)
+    with pytest.raises(ValueError, match="below zero"):
+        driver(-1.0)
+
+
+def test_functions_to_compile_are_those_of_units_that_are_not_there(made):
+    driver = compose(drive, {})
+    assert units.to_compile(driver.code.entry) == 3
+    driver(VALUES, 2.0)
+    assert units.to_compile(compose(watched, {}).code.entry) == 1
