@@ -34,15 +34,13 @@ class Linker:
         self.made = made
         self.called = called
         self.clones: dict[Callable, Any] = {}
-        self.begun = False
 
     def link(self, function: Callable) -> Any:
         """The clone of a function, all that it calls linked as well."""
         filled = self.fillings.get(function, function)
-        entry, self.begun = not self.begun, True
         if filled not in self.clones:
             refuse_closure(filled)
-            if self.called and hasattr(filled, "apart") and not entry:
+            if self.called and hasattr(filled, "apart"):
                 self.clones[filled] = self.called(filled)
             else:
                 clone = self.clone(filled)
@@ -50,6 +48,11 @@ class Linker:
                     clone.apart = function.apart
                 self.clones[filled] = self.transform(clone)
         return self.clones[filled]
+
+    def first(self, function: Callable) -> Any:
+        """The clone of the function that a unit begins with, though others call it by its name."""
+        refuse_closure(function)
+        return self.transform(self.clone(function))
 
     def linked_value(self, value):
         """A function linked, anything else as it is, or as numba is to see it."""

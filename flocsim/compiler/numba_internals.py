@@ -170,9 +170,9 @@ def type_returned(letters: str) -> Any:
     return types.Tuple.from_types(kinds) if len(kinds) > 1 else next(iter(kinds), types.none)
 
 
-def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, bool]:
-    """The machine code of a function of a signature, and whether another process can use it: not
-    where it holds addresses of this one."""
+def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, list[str], bool]:
+    """The machine code of a function of a signature, the symbols that it lacks, and whether another
+    process can use it: not where it holds addresses of this one."""
     import numba
     from numba.core.compiler_lock import global_compiler_lock
 
@@ -190,7 +190,7 @@ def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCod
         returned_as(result.signature.return_type),
         any(name.encode().startswith(LENT) for name in declared),
     )  # fmt: skip
-    return found, not library.has_dynamic_globals
+    return found, declared, not library.has_dynamic_globals
 
 
 class NoEnvironment:

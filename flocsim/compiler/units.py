@@ -108,15 +108,16 @@ def from_files(data):
 class Build:
     """An engine while it is compiled, unit after unit: ``units`` {symbol: ObjectCode} and ``files``
     {symbol: (name, key)} on the disk; ``lasts``: whether another process can use all of them;
-    ``known`` {words: numba type} of arguments."""
+    ``known`` {words: numba type} of arguments. Functions of several units are lowered once."""
 
     def __init__(self, code):
         self.code = code
         self.units: dict[str, ObjectCode] = {}
         self.files: dict[str, tuple[str, str]] = {}
+        self.calls: dict[str, Called] = {}
         self.lasts = True
         self.known: dict[str, Any] = {}
-        self.dispatchers: list[Any] = []
+        self.parts: list[Any] = []
 
     def entry(self, signature, readers):
         """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
@@ -126,55 +127,60 @@ class Build:
         if text := lacking(COMPILING, "compiling"):
             raise FlocsimError(text)  # LLVM ends the process where it gets no memory
         code = self.code
+        # Without the interpreter's lock, dividing by zero as numpy does.
+        self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
+        self.options |= {} if code.allocates else internals.NO_COUNTING
+        self.for_inner, self.for_entry = internals.compilers()
+        self.linker = Linker({}, self.inner, made, self.called if self.for_entry else None)
         try:
             with compiling(code.what, to_compile(code.entry)), internals.quick_typing():
                 return self.compiled(code.entry, code.name, signature, readers)
         except internals.compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         finally:
-            internals.forget(self.dispatchers)
+            internals.forget(self.parts)
 
-    def compiled(self, entry, name, signature, readers):
-        """The ObjectCode of the unit that begins with a function."""
+    def inner(self, clone):
+        """What numba is to compile of a function, and to put into those that call it."""
         import numba
 
         from flocsim.compiler import numba_internals as internals
 
-        # Without the interpreter's lock, dividing by zero as numpy does.
-        options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
-        options |= {} if self.code.allocates else internals.NO_COUNTING
-        for_inner, for_entry = internals.compilers()
-        calls: dict[str, Called] = {}
-        parts = []
+        clone.__module__ = self.code.name
+        clone.__qualname__ = f"{clone.__qualname__}_{len(self.parts)}"
+        small = len(clone.__code__.co_code) < INLINED_SIZE
+        found = numba.njit(clone, **self.options, **self.for_inner, forceinline=small)
+        self.parts.append(internals.typed_once(found))
+        return self.parts[-1]
 
-        def transform(clone):
-            clone.__module__, clone.__qualname__ = name, f"{clone.__qualname__}_{len(parts)}"
-            small = len(clone.__code__.co_code) < INLINED_SIZE
-            inner = numba.njit(clone, **options, **for_inner, forceinline=small)
-            parts.append(internals.typed_once(inner))
-            return parts[-1]
+    def called(self, function):
+        """What calls a function that is compiled apart."""
+        from flocsim.compiler import numba_internals as internals
 
-        def called(function):
-            def unit_for(given):
-                symbol, unit = self.unit(function, given)
-                calls[symbol] = Called(symbol, function.apart, told_types(given), unit.returned)
-                return symbol, unit.returned
+        def unit_for(given):
+            symbol, unit = self.unit(function, given)
+            self.calls[symbol] = Called(symbol, function.apart, told_types(given), unit.returned)
+            return symbol, unit.returned
 
-            return internals.call_of_unit(argument_names(function), unit_for)
+        return internals.call_of_unit(argument_names(function), unit_for)
+
+    def compiled(self, entry, name, signature, readers):
+        """The ObjectCode of the unit that begins with a function."""
+        from flocsim.compiler import numba_internals as internals
 
         module = types.ModuleType(name)
         sys.modules[name] = module  # where numba looks for its name
         try:
             run = run_of(module, entry, **readers)
-            run.__globals__["driver"] = Linker(
-                {}, transform, made, called if for_entry else None
-            ).link(entry)
-            code, lasts = internals.object_code(run, signature, {**options, **for_entry})
+            run.__globals__["driver"] = self.linker.first(entry)
+            options = {**self.options, **self.for_entry}
+            code, missing, lasts = internals.object_code(run, signature, options)
         finally:
             del sys.modules[name]
-            self.dispatchers += parts
         self.lasts &= lasts
-        return code._replace(calls=tuple(calls.values()))
+        return code._replace(
+            calls=tuple(self.calls[each] for each in missing if each in self.calls)
+        )
 
     def unit(self, function, given):
         """(symbol, ObjectCode) of a function marked @apart for arguments of such numba types."""

@@ -88,7 +88,7 @@ OPTIONS = {"nogil": True, **NO_COUNTING, **UNWRAPPED}
 def address_of(function):
     """The address of a compiled function (number, parameters)."""
     with quick_typing():
-        code, lasts = object_code(function, ONE.args, {**OPTIONS, **compilers()[1]})
+        code, _, lasts = object_code(function, ONE.args, {**OPTIONS, **compilers()[1]})
     assert lasts
     return code.load()
 
