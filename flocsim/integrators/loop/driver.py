@@ -239,8 +239,8 @@ def advance(scene, work, observed, clock, counts, record):
             leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
         if switched != SAME:
-            clock[at.STEP] = min(clock[at.STEP], step_behind_touch(scene, work, clock))
             clock[at.STEP] = max(clock[at.STEP], shortest_needed(scene, work))
+            clock[at.STEP] = min(clock[at.STEP], step_behind_touch(scene, work, clock))
         limit, trials = math.inf, 0
         status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:
