@@ -299,7 +299,7 @@ strain pulls at them with."""
     TOLERANCE,  # [m]; inf: steps are fixed
     ERROR,  # the stated error [m]
     LARGEST_STEP,  # [s]
-    PREVIOUS_STEP,  # size of the step before [s]; inf: there was none, 0: it was rejected
+    PREVIOUS_STEP,  # size of the step before [s]; inf: there was none, 0: a trial has failed
     PREVIOUS_RATIO,  # its error over the tolerance
     PACE,  # by how much each of Newton's iterations shrinks the last change
     STAGED_STEP,  # size of the step whose stages are still there [s]; 0: none are

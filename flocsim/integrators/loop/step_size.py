@@ -41,17 +41,19 @@ def seen_order(clock, step, ratio, order):
 def adaptive_factor(clock, step, ratio, order):
     """By how much to change the step after one whose error was ``ratio`` times the tolerance.
 
-    The trend of the last two steps is carried on, and a step behind a rejected one does not grow
-    (Gustafsson 1994, as in Hairer & Wanner, Solving Ordinary Differential Equations II, IV.8).
+    The trend of the last two steps that were taken is carried on, also past rejected ones: towards
+    an attraction that diverges every step has to be shorter than the one before. A step behind a
+    rejected one does not grow (Gustafsson 1994, as in Hairer & Wanner, Solving Ordinary
+    Differential Equations II, IV.8).
     """
     ratio = max(ratio, 1e-12)
     if ratio > 1.0:
         order = seen_order(clock, step, ratio, order)
     factor = SAFETY * ratio ** (-1.0 / order)
     before = clock[at.PREVIOUS_STEP]
-    if ratio <= 1.0 and before == 0.0:
+    if ratio <= 1.0 and (before == 0.0 or clock[at.REJECTED_STEP] > 0.0):
         factor = min(factor, 1.0)
-    elif ratio <= 1.0 and before < math.inf:
+    if ratio <= 1.0 and 0.0 < before < math.inf:
         trend = max(clock[at.PREVIOUS_RATIO], 1e-2) / (ratio * ratio)
         factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
     return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
@@ -128,9 +130,10 @@ def moves(clock, step):
 def reject(clock, counts, step, ratio, too_far):
     """Choose a smaller step; False where there is none."""
     counts[at.REJECTED] += 1
-    clock[at.PREVIOUS_STEP] = 0.0
     clock[at.STAGED_STEP] = 0.0
     failed = ratio < 0.0 or too_far
+    if failed:
+        clock[at.PREVIOUS_STEP] = 0.0
     clock[at.STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
     clock[at.REJECTED_STEP] = 0.0 if failed else step
     clock[at.REJECTED_RATIO] = ratio
@@ -170,7 +173,6 @@ def step_behind_touch(scene, work, clock):
 
 def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
-    clock[at.REJECTED_STEP] = 0.0
     if switched == OTHER_CONTACTS:
         # The forces are new, and settle about as fast as behind the last switch.
         clock[at.PREVIOUS_STEP] = math.inf
@@ -198,3 +200,4 @@ def plan(clock, step, ratio, was_cut, switched):
         clock[at.BEARABLE_STEP] *= RECOVERY
         clock[at.PREVIOUS_STEP] = math.inf if cut else step
         clock[at.PREVIOUS_RATIO] = ratio
+    clock[at.REJECTED_STEP] = 0.0
