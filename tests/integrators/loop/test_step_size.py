@@ -1,4 +1,4 @@
-"""The first step behind a touch, told by the speed of it and by how stiff the contact is."""
+"""The next step: by the trend of errors, and behind a touch by its speed and stiffness."""
 
 import math
 
@@ -8,11 +8,12 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
-from flocsim.forces import Contact
+from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import Implicit
-from flocsim.integrators.loop.step_size import step_behind_touch
+from flocsim.integrators.events.modes import SAME
+from flocsim.integrators.loop.step_size import adaptive_factor, plan, reject, step_behind_touch
 
 R = 10e-6
 
@@ -54,3 +55,45 @@ def test_it_goes_with_the_root_of_the_stiffness_and_the_fourth_root_of_what_is_a
 
 def test_contacts_that_part_need_none():
     assert first_step(-0.01) == math.inf
+
+
+def approach(order=5.0):
+    """(steps, rejected trials) of a motion whose error is (h/left)^order over a tolerance, until
+    what is left of the time to a singular force is a millionth."""
+    method = Implicit(tolerance=1e-9)
+    linked = {each: compose(each, dict(method.fillings), jit=False) for each in (reject, plan)}
+    clock, counts = method.fresh_clock(), method.fresh_counts(1000)
+    left, steps = 1.0, 0
+    clock[at.STEP] = 0.1
+    while left > 1e-6:
+        step = clock[at.STEP]
+        ratio = (step / (0.2 * left)) ** order
+        if ratio > 1.0:
+            linked[reject](clock, counts, step, ratio, False)
+            continue
+        left -= step
+        steps += 1
+        linked[plan](clock, step, ratio, False, SAME)
+    return steps, counts[at.REJECTED]
+
+
+def test_towards_a_singular_force_steps_shrink_without_being_rejected():
+    steps, rejected = approach()
+    assert rejected <= 1 and steps < 90  # 62 of a fifth of what is left
+
+
+def test_two_spheres_that_pull_each_other_together_try_few_steps_in_vain():
+    bodies = [Body(Sphere(R), (x, 0.0), density=2650.0) for x in (0.0, 2.2 * R)]
+    laws = [StokesDrag(), VanDerWaals(hamaker=1e-18, d_min=1e-9), Contact(k_n=20.0)]
+    found = System(bodies, laws, Implicit()).run(until=1.0)
+    assert found.status.name == "FINISHED"
+    assert found.rejected < 0.3 * found.steps
+
+
+def test_a_step_behind_a_rejected_one_does_not_grow():
+    clock = Implicit().fresh_clock()
+    clock[at.PREVIOUS_STEP], clock[at.PREVIOUS_RATIO] = 1e-5, 1.0
+    clock[at.REJECTED_STEP] = 2e-5
+    assert adaptive_factor(clock, 1e-5, 1e-6, 5.0) == 1.0
+    clock[at.REJECTED_STEP] = 0.0
+    assert adaptive_factor(clock, 1e-5, 1e-6, 5.0) > 1.0
