@@ -81,7 +81,12 @@ class ObjectCode(NamedTuple):
 
 def link(code: ObjectCode, units: dict[str, ObjectCode]) -> int:
     """The address of a unit, linked with ``units`` {symbol: ObjectCode}, as far as it calls them;
-    what is linked with the same ones is loaded once."""
+    what is linked with the same ones is loaded once.
+
+    ValueError where one returns another thing than its caller was compiled for.
+    """
+    if any(units[each.symbol].returned != each.returned for each in code.calls):
+        raise ValueError("a unit was compiled for another one than it is linked with")
     called = {each.symbol: link(units[each.symbol], units) for each in code.calls}
     key = hashlib.blake2b(code.code, digest_size=16).digest(), code.entry, *called.items()
     if key not in _linked:

@@ -111,7 +111,15 @@ class Build:
     ``known`` {words: numba type} of arguments. Functions of several units are lowered once."""
 
     def __init__(self, code):
+        from flocsim.compiler import numba_internals as internals
+
         self.code = code
+        # Without the interpreter's lock, dividing by zero as numpy does.
+        self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
+        self.options |= {} if code.allocates else internals.NO_COUNTING
+        self.for_inner, self.for_entry = internals.compilers()
+        by_units = self.for_entry and not code.allocates
+        self.linker = Linker({}, self.inner, made, self.called if by_units else None)
         self.units: dict[str, ObjectCode] = {}
         self.files: dict[str, tuple[str, str]] = {}
         self.calls: dict[str, Called] = {}
@@ -127,11 +135,6 @@ class Build:
         if text := lacking(COMPILING, "compiling"):
             raise FlocsimError(text)  # LLVM ends the process where it gets no memory
         code = self.code
-        # Without the interpreter's lock, dividing by zero as numpy does.
-        self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
-        self.options |= {} if code.allocates else internals.NO_COUNTING
-        self.for_inner, self.for_entry = internals.compilers()
-        self.linker = Linker({}, self.inner, made, self.called if self.for_entry else None)
         try:
             with compiling(code.what, to_compile(code.entry)), internals.quick_typing():
                 return self.compiled(code.entry, code.name, signature, readers)

@@ -104,6 +104,18 @@ def test_a_unit_that_returns_other_types_has_its_callers_compiled_anew(made):
     assert compose(drive, {law: cubed})(VALUES, 2.0) == (42.0, 9.0)
 
 
+def test_an_engine_whose_unit_was_compiled_for_another_one_since_is_compiled_anew(
+    made, monkeypatch
+):
+    compose(drive, {})(VALUES, 2.0)
+    compose(drive, {law: whole})(
+        VALUES, 2.0
+    )  # the sum's file is now of one that adds whole numbers
+    monkeypatch.setattr(composer, "_composed", {})
+    assert compose(drive, {})(VALUES, 2.0) == drive(VALUES, 2.0)
+    assert compose(drive, {law: whole})(VALUES, 2.0) == (15.0, 4.0)
+
+
 @pytest.mark.parametrize("again", [drive, watched])
 @pytest.mark.parametrize("harm", ["removed", "cut", "exchanged"])
 def test_a_unit_that_is_missing_or_damaged_is_compiled_anew(
