@@ -115,33 +115,49 @@ def private_parts():
     return table
 
 
-def started(tree, code):
+def started(tree, code, cache):
     """(CPU time [s], memory at most [MB]) of a process that starts a scene with the flocsim of a
-    folder, with nothing compiled before."""
+    folder, with what a cache folder has of compiled code."""
     told = "\nimport resource\nfound = resource.getrusage(resource.RUSAGE_SELF)\n"
     told += "print(found.ru_utime + found.ru_stime, found.ru_maxrss / 1024)"
-    with tempfile.TemporaryDirectory() as cache:
-        script = Path(cache) / "start.py"
-        script.write_text(code + told)
-        environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": cache}
-        found = subprocess.run(
-            [sys.executable, script], check=True, env=environment, cwd=cache,
-            stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
+    script = Path(cache) / "start.py"
+    script.write_text(code + told)
+    environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": cache}
+    found = subprocess.run(
+        [sys.executable, script], check=True, env=environment, cwd=cache,
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
     return tuple(map(float, found.stdout.split()))
 
 
+def started_anew(tree, code):
+    """The same with nothing compiled before."""
+    with tempfile.TemporaryDirectory() as cache:
+        return started(tree, code, cache)
+
+
+def started_in_turn(tree):
+    """The same of all scenes, one behind the other, with what those before have compiled."""
+    with tempfile.TemporaryDirectory() as cache:
+        return [started(tree, code, cache) for code in STARTS.values()]
+
+
 def beside(commit):
-    """The table of cold starts here and at another commit."""
+    """The table of cold starts here and at another commit, each scene with nothing compiled before
+    and then behind the others."""
     heads = ("scene", "CPU there [s]", "here [s]", "ratio", "memory there [MB]", "here [MB]")
     table = Table(f"Cold starts beside {commit}", heads)
     with tempfile.TemporaryDirectory() as folder:
         there = other_tree(commit, Path(folder))
         for name, code in STARTS.items():
             order = (there, ROOT, ROOT, there)
-            found = [started(tree, code) for tree in order]
+            found = [started_anew(tree, code) for tree in order]
             (old, old_memory), (new, new_memory) = min(found[::3]), min(found[1:3])
             table.add(name, old, new, new / old, old_memory, new_memory)
+        in_turn = zip(STARTS, *map(started_in_turn, (there, ROOT)), strict=True)
+        for name, (old, old_memory), (new, new_memory) in list(in_turn)[1:]:
+            label = f"{name}, behind those above"
+            table.add(label, old, new, new / old, old_memory, new_memory)
     return table
 
 
