@@ -19,6 +19,7 @@ from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_sta
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
+from flocsim.integrators.rhs.surface_gap import length_at
 from flocsim.integrators.rhs.views import along_normal, lever, memory_of
 
 MOST_ITERATIONS = 10
@@ -37,6 +38,11 @@ did when it was last made, its pace going with the square of the step, …"""
 OVERLAP_SHARE = 2e-3
 """Overlaps are found to this share of themselves: what presses is decided by them, however far
 below the tolerance they are."""
+
+SMOOTHING_SHARE = 2e-3
+"""Gaps through which surface forces act are found to this share of the length over which these
+change hands between pairs of features (surface_gap.py): what is left of a gap shakes bodies that
+lie flat in a well, however far below the tolerance it is."""
 
 GRAZING_SHARE, LEAST_EFFECT = 0.02, 0.1
 """Forces of pairs that graze are found to this share of themselves, or until what they move is this
@@ -99,17 +105,22 @@ def change_of_forces(scene, work, step, stage, goal):
     """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
-    largest, least = 0.0, above_rounding(work, at.NOW, 0.0)
+    largest, least, state = 0.0, above_rounding(work, at.NOW, 0.0), at.FIRST_STAGE + stage
     for row in range(work.tally[at.CANDIDATES]):
         if work.candidates[row, at.CLOSED] == at.TOUCHES:
             change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
-            overlap = abs(work.geometry[at.FIRST_STAGE + stage, row, at.GAP])
+            overlap = abs(work.geometry[state, row, at.GAP])
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
+            largest = max(largest, goal * change / allowed)
+        elif work.candidates[row, at.NEAR] == 1 and work.geometry[state, row, at.SHARE] > 0.0:
+            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
+            length = length_at(scene, work.geometry[state, row, at.GAP])
+            allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
         elif work.candidates[row, at.CLOSED] == at.GRAZES:
             resistance, memory = work.slip[at.GRAZING_RESISTANCE, row], memory_of(work, row)
             change = abs(resistance * along_normal(work, row, at.CHANGE, at.VELOCITY))
-            force = abs(grazing_force(work, at.FIRST_STAGE + stage, row))
+            force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
