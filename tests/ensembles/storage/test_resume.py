@@ -88,7 +88,7 @@ def test_it_may_be_stopped_as_often_as_one_likes(tmp_path, monkeypatch, whole):
 
 def test_an_unfinished_run_is_in_the_way_of_a_new_one(stopped, whole):
     with pytest.raises(
-        SharedError, match=r"r.h5.journal holds an unfinished run: go on .* --resume"
+        SharedError, match=r"r.h5.journal holds an unfinished run: continue it with --resume"
     ):
         go_on(stopped, NEW)
     before = (stopped / "r.h5.journal").read_bytes()
