@@ -112,11 +112,6 @@ def change_of_forces(scene, work, step, stage, goal):
             overlap = abs(work.geometry[state, row, at.GAP])
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
-        elif work.candidates[row, at.NEAR] == 1 and work.geometry[state, row, at.SHARE] > 0.0:
-            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
-            length = length_at(scene, work.geometry[state, row, at.GAP])
-            allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
-            largest = max(largest, goal * change / allowed)
         elif work.candidates[row, at.CLOSED] == at.GRAZES:
             resistance, memory = work.slip[at.GRAZING_RESISTANCE, row], memory_of(work, row)
             change = abs(resistance * along_normal(work, row, at.CHANGE, at.VELOCITY))
@@ -124,6 +119,11 @@ def change_of_forces(scene, work, step, stage, goal):
             # A force that moves nothing by more than a share of the goal does not count.
             lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
+            largest = max(largest, goal * change / allowed)
+        elif work.candidates[row, at.NEAR] == 1 and work.geometry[state, row, at.SHARE] > 0.0:
+            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
+            length = length_at(scene, work.geometry[state, row, at.GAP])
+            allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
     return largest
 
