@@ -265,19 +265,23 @@ def rests_for_long(scene, work, observed, time):
     return rest_of(scene, work, observed, time, load_on(observed)) >= FAR_LONGER
 
 
-def bond_of(scene, work, observed, time):
-    """The kind of bond of two bodies that have touched, NO_BOND where none is proved."""
-    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
-    if is_certain(scene, work, time, bond, load):
+def kind_of_bond(scene, work, observed, time, bond, load, certain):
+    """The kind of a bond between two bodies, ``certain`` or proved by their rest."""
+    if certain:
         return CERTIFICATE
     rested = rest_of(scene, work, observed, time, load)
     return kind_at_rest(scene, work, time, bond, load, rested)
+
+
+def bond_of(scene, work, observed, time):
+    """The kind of bond of two bodies that have touched, NO_BOND where none is proved."""
+    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
+    certain = is_certain(scene, work, time, bond, load)
+    return kind_of_bond(scene, work, observed, time, bond, load, certain)
 
 
 def bond_in_kicks(scene, work, observed, time):
     """The same where kicks may open it."""
     bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
-    if is_certain_in_kicks(scene, work, time, bond, load):
-        return CERTIFICATE
-    rested = rest_of(scene, work, observed, time, load)
-    return kind_at_rest(scene, work, time, bond, load, rested)
+    certain = is_certain_in_kicks(scene, work, time, bond, load)
+    return kind_of_bond(scene, work, observed, time, bond, load, certain)
