@@ -6,8 +6,9 @@ what it includes no body of; which ones these are is settled when they are loade
 spheres and of polygons, of two bodies and of many, of one observer and of another therefore share
 most of their machine code, and an edited function compiles its own unit.
 
-A unit's file is named by a hash of what it does up to the units that it calls, of the types that it
-is given, and of what they return; the engine's, by a hash of everything, lists them all.
+A unit's file is named by a hash of what it does up to the units that it calls, and of the types
+that it is given; it says what these have to return. The engine's, named by a hash of everything,
+lists them all.
 """
 
 import contextlib
@@ -190,35 +191,29 @@ class Build:
         self.known |= types_within(given)
         told = told_types(given)
         symbol = symbol_of(function.apart, told)
-        if symbol not in self.units and not self.found(function, told):
-            name = unit_of(function).name
-            code = self.compiled(function, name, given, {})
-            self.add(symbol, name, told, code)
-            disk_cache.write(name, key_of(told), code.packed())
+        if symbol not in self.units:
+            name, key = unit_of(function).name, key_of(told)
+            code = self.found(function, name, key)
+            if code is None:
+                code = self.compiled(function, name, given, {})
+                if self.lasts:
+                    disk_cache.write(name, key, code.packed())
+            self.units[symbol], self.files[symbol] = code, (name, key)
         return symbol, self.units[symbol]
 
-    def found(self, function, told):
-        """Whether a unit is on the disk, and what it calls returns what it expects; of that, what
-        is not on the disk is compiled."""
-        symbol, unit = symbol_of(function.apart, told), unit_of(function)
-        if symbol in self.units:
-            return True
-        if (data := disk_cache.read(unit.name, key_of(told))) is None:
-            return False
-        code = ObjectCode.unpacked(data)
+    def found(self, function, name, key):
+        """The ObjectCode of a unit that is on the disk, if what it calls returns what it expects;
+        of that, what is not on the disk is compiled."""
+        if (data := disk_cache.read(name, key)) is None:
+            return None
+        code, calls = ObjectCode.unpacked(data), unit_of(function).calls
         for each in code.calls:
             if not self.known.keys() >= set(each.types):
-                return False
-            called = unit.calls[each.function]
-            given = tuple(self.known[name] for name in each.types)
-            if self.unit(called, given)[1].returned != each.returned:
-                return False
-        self.add(symbol, unit.name, told, code)
-        return True
-
-    def add(self, symbol, name, told, code):
-        """Take a unit in."""
-        self.units[symbol], self.files[symbol] = code, (name, key_of(told))
+                return None
+            given = tuple(self.known[words] for words in each.types)
+            if self.unit(calls[each.function], given)[1].returned != each.returned:
+                return None
+        return code
 
 
 def told_types(given):
@@ -234,11 +229,11 @@ def symbol_of(function, told):
 
 class Unit(NamedTuple):
     """The ``name`` of a unit's file, by what it does up to the units that it ``calls`` {name:
-    function}; how many ``functions`` it has."""
+    function}; its ``functions``."""
 
     name: str
     calls: dict[str, Callable]
-    functions: int
+    functions: list[Callable]
 
 
 @functools.lru_cache(maxsize=4096)
@@ -246,7 +241,7 @@ def unit_of(function: Callable) -> Unit:
     """The Unit that begins with a function."""
     found = tell(function, {}, within=True)
     name = f"flocsim_unit_{hashed(found.lines, options_text(False))}"
-    return Unit(name, found.calls, len(found.functions))
+    return Unit(name, found.calls, found.functions)
 
 
 def to_compile(entry):
@@ -258,7 +253,7 @@ def to_compile(entry):
         more += new
     found = [unit_of(each) for each in units if each is not entry]
     missing = [unit for unit in found if not disk_cache.has(unit.name)]
-    return sum(unit.functions for unit in [unit_of(entry), *missing])
+    return len(set().union(*(unit.functions for unit in [unit_of(entry), *missing])))
 
 
 def made(value):
