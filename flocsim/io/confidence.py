@@ -4,7 +4,9 @@ They live in this room because the figures need them for pooled counts and may n
 `flocsim.ensembles`, whose `statistics` module offers them to users.
 """
 
+from collections.abc import Sequence
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -235,10 +237,20 @@ MEANS = np.geomspace(1e-5, 0.3, 16)
 """Gamma distributions of rates over conditions: from a few that flip to all alike."""
 
 
+class FurtherFlips(NamedTuple):
+    """How many more may flip: arrays of one shape, a place for each condition."""
+
+    most: np.ndarray
+    """No more than so many, with the probability that was asked for."""
+    mean: np.ndarray
+    none: np.ndarray
+    """Probability that none does."""
+
+
 def further_flips(
     flipped: ArrayLike, checked: ArrayLike, exposed: ArrayLike, confidence: float = 0.95
-) -> np.ndarray:
-    """How many more flip at most, with this probability, of what was not run again.
+) -> FurtherFlips:
+    """How many more flip.
 
     Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
     others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
@@ -257,7 +269,8 @@ def further_flips(
         *(np.asarray(each, float) for each in (flipped, checked, exposed))
     )
     if not np.any(c > 0.0):
-        return np.where(u > 0.0, np.nan, 0.0)
+        unknown = np.where(u > 0.0, np.nan, 0.0)
+        return FurtherFlips(unknown, unknown, 1.0 + unknown)
     seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
     rate = (k / m)[:, np.newaxis]
@@ -283,7 +296,28 @@ def further_flips(
         split = high - low > 1.0
         low = np.where(split & ~enough, middle, low)
         high = np.where(split & enough, middle, high)
-    return high[places.reshape(f.shape)]
+    mean = np.minimum(weights @ (shape * u_here / b), u_here)
+    none = weights @ (b / (b + u_here)) ** shape
+    return FurtherFlips(*(each[places.reshape(f.shape)] for each in (high, mean, none)))
+
+
+def flips_together(parts: Sequence[FurtherFlips], confidence: float = 0.95) -> np.ndarray:
+    """How many more flip at most, with this probability, of independent parts.
+
+    With means µ and bounds q of the parts, each at the same probability,
+    Σ µ + √(Σ (q − µ)²), upwards to a whole number; 0 where all parts together are so likely to
+    have none. One part keeps its bound. Added up, the bounds would hold far more often than they
+    are asked to, as all parts reach theirs together hardly ever.
+    Source: G. Y. Zou and A. Donner, Stat. Med. 27 (2008) 1693-1702.
+    """
+    most, mean, none = (np.stack(each) for each in zip(*parts, strict=True))
+    bound = mean.sum(axis=0) + np.sqrt(np.sum(np.maximum(most - mean, 0.0) ** 2, axis=0))
+    bound = np.ceil(bound * (1.0 - ROUNDED))
+    return np.where(none.prod(axis=0) >= confidence, 0.0, bound)
+
+
+ROUNDED = 1e-12
+"""What a sum of whole numbers may be off by, so that it does not count as one more."""
 
 
 NEGLIGIBLE = 1e-6

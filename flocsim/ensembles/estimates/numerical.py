@@ -9,16 +9,16 @@ Where all were run exactly, S of M would be S' of M'. What was run again is know
 most exact run of each of these alone make the one part of the change. Of the others so many may
 gain, and so many lose, as `flocsim.io.confidence.further_flips` says from what did of the same kind
 (`io.results.events.KINDS`) between first and second runs; and of all that were not run a third
-time, as it says from what changed between second and third ones. Each counts at most 1/M: the
-interval of the change goes from the first part less what may be lost to the first part and what may
-be gained.
+time, as it says from what changed between second and third ones. What these parts come to together
+is said by `flips_together`. Each flip counts at most 1/M: the interval of the change goes from the
+first part less what may be lost to the first part and what may be gained.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from flocsim.io.confidence import further_flips
+from flocsim.io.confidence import FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import WITHOUT_OUTCOME, Events, events, events_of, kinds_of
 from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES, last_axis
 
@@ -135,15 +135,19 @@ SIDES = ("gained", "lost")
 def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
     """[how many more gain at most, and lose] of kind_changes and kind_counts (…).
 
-    Without any third run second ones are taken for exact.
+    Without any third run second ones are taken for exact. NaN where no replicate was run again.
     """
+    if of_kinds.ndim > counts.ndim:  # each class or bond by itself
+        of_each = [further(of_kinds[..., k], counts) for k in range(of_kinds.shape[-1])]
+        return [np.stack(side, axis=-1) for side in zip(*of_each, strict=True)]
     members, checked, thrice, lost_sight = np.moveaxis(counts, 1, 0)
     found = []
     for side in range(len(SIDES)):
-        more = further_of_kinds(of_kinds[:, side], checked, members - checked + lost_sight)
+        parts = further_of_kinds(of_kinds[:, side], checked, members - checked + lost_sight)
         if thrice.any():
-            more = more + further_of_all(of_kinds[:, 2 + side], thrice, members - thrice)
-        found.append(more)
+            third = of_kinds[:, 2 + side], thrice, members - thrice
+            parts.append(further_of_all(*(each.sum(axis=0) for each in third)))
+        found.append(flips_together(parts, EACH_SIDE))
     return found
 
 
@@ -182,45 +186,42 @@ def over_displacements(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     return {name: values.sum(axis=leading_axes(name) + 2) for name, values in counts.items()}
 
 
-def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
-    """How many more flip at most, of all kinds together: arrays (kind, type, vertices, …), whose
-    rates are compared among the conditions of one N, those of each class by themselves.
+def further_of_kinds(
+    flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
+) -> list[FurtherFlips]:
+    """How many more flip of each kind: arrays (kind, type, vertices, …), whose rates are compared
+    among the conditions of one N.
 
     Of a kind of which none was run again at this N all may flip; NaN where no replicate was.
     """
-    if flipped.ndim > checked.ndim:
-        return of_each_class(further_of_kinds, flipped, checked, exposed)
-    total = np.zeros(flipped.shape[1:])
-    together: list = [...]
-    if total.ndim > 1:
-        together = [np.s_[:, n] for n in range(len(total[0]))]
-    for kind in range(len(flipped)):
-        for at in together:
-            more = further_flips(flipped[kind][at], checked[kind][at], exposed[kind][at], EACH_SIDE)
-            some = np.any(checked[(slice(None), *np.index_exp[at])])
-            total[at] += np.where(np.isnan(more) & some, np.ceil(exposed[kind][at]), more)
-    return total
+    together: list = [np.s_[:, n] for n in range(checked.shape[2])] if checked.ndim > 2 else [...]
+    found = np.zeros((len(flipped), len(FurtherFlips._fields), *flipped.shape[1:]))
+    for at in together:
+        some = np.any(checked[(slice(None), *np.index_exp[at])])
+        for kind in range(len(flipped)):
+            f, c, u = (each[kind][at] for each in (flipped, checked, exposed))
+            more = further_flips(f, c, u, EACH_SIDE)
+            all_of_them = np.ceil(u), u, np.zeros(u.shape)
+            found[(kind, slice(None), *np.index_exp[at])] = np.where(
+                np.isnan(more.most) & some, all_of_them, more
+            )
+    return [FurtherFlips(*each) for each in found]
 
 
-def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
-    """The same where rates are compared among all kinds and conditions, and with SEEN_BEFORE: of
-    third runs, which are few."""
-    if flipped.ndim > checked.ndim:
-        return of_each_class(further_of_all, flipped, checked, exposed)
+def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> FurtherFlips:
+    """How many more flip of third runs, which are few: rates are compared among all conditions,
+    and with SEEN_BEFORE."""
     f, c, u = (
         np.append(each.ravel(), before)
         for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, 0.0))
     )
-    return further_flips(f, c, u, EACH_SIDE)[:-1].reshape(flipped.shape).sum(axis=0)
+    more = further_flips(f, c, u, EACH_SIDE)
+    return FurtherFlips(*(each[:-1].reshape(flipped.shape) for each in more))
 
 
 SEEN_BEFORE = 1, 500
 """How many third runs ended otherwise than second ones, of so many, where this was looked at before
 (benchmarks.accuracy.numerical_error): it counts as one condition more."""
-
-
-def of_each_class(more_of, flipped, *others):
-    return np.stack([more_of(flipped[..., k], *others) for k in range(flipped.shape[-1])], axis=-1)
 
 
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import nbinom
+from scipy.stats import nbinom, poisson
 
 from flocsim.ensembles.estimates.numerical import (
     change_intervals,
@@ -13,7 +13,7 @@ from flocsim.ensembles.estimates.numerical import (
 )
 from flocsim.ensembles.estimates.statistics import COUNTED, EXACT_RUNS, by_runs, count, tabulate
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
-from flocsim.io.confidence import MEANS, SHAPES, further_flips
+from flocsim.io.confidence import MEANS, SHAPES, FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import Events, events, events_of
 from flocsim.io.results.schema import PROBABILITIES
 from tests.helpers.synthetic_results import (
@@ -110,7 +110,7 @@ def test_further_flips_are_the_quantile_of_a_mixture_of_negative_binomials():
     rng = np.random.default_rng(5)
     checked = rng.integers(0, 200, 12)
     flipped, exposed = rng.binomial(checked, 0.03), rng.integers(1, 2000, 12)
-    found = further_flips(flipped, checked, exposed, 0.975)
+    bound, mean, none = further_flips(flipped, checked, exposed, 0.975)
     logs, parts = [], []
     for m in MEANS:
         for k in SHAPES:
@@ -124,21 +124,41 @@ def test_further_flips_are_the_quantile_of_a_mixture_of_negative_binomials():
         terms = [nbinom.cdf(q, n, b / (b + exposed)) for n, b in parts]
         return weights @ np.array(terms)
 
-    assert np.all(at_most(found) >= 0.975 - 1e-5)
-    assert np.all((at_most(found - 1) < 0.975 + 1e-5) | (found == 0))
+    assert np.all(at_most(bound) >= 0.975 - 1e-5)
+    assert np.all((at_most(bound - 1) < 0.975 + 1e-5) | (bound == 0))
+    np.testing.assert_allclose(none, at_most(np.zeros(12)), rtol=1e-3)
+    means = weights @ np.array([nbinom.mean(n, b / (b + exposed)) for n, b in parts])
+    np.testing.assert_allclose(mean, np.minimum(means, exposed), rtol=1e-3)
+
+
+def test_parts_together_need_less_than_the_sum_of_their_bounds_and_hold():
+    rng = np.random.default_rng(6)
+    means = np.array([0.2, 1.0, 6.0])
+    parts = [
+        FurtherFlips(*(np.array([each]) for each in (poisson.ppf(0.975, m), m, np.exp(-m))))
+        for m in means
+    ]
+    (bound,) = flips_together(parts, 0.975)
+    assert bound < sum(part.most[0] for part in parts)
+    assert np.mean(rng.poisson(means, (100_000, 3)).sum(axis=1) <= bound) >= 0.975
+    for part in parts:
+        assert flips_together([part], 0.975) == part.most
+    rare = [FurtherFlips(*map(np.array, ([1.0], [0.01], [0.99])))] * 2
+    assert flips_together(rare, 0.975) == 0.0 or 0.99**2 < 0.975
+    assert flips_together(rare * 2, 0.975) > 0.0
 
 
 def test_where_nothing_may_flip_nothing_does_and_nothing_seen_says_nothing():
-    assert further_flips([3, 0], [50, 20], [0, 0]).tolist() == [0.0, 0.0]
-    assert further_flips([0, 0], [0, 0], [5, 0])[1] == 0.0
-    assert np.isnan(further_flips([0, 0], [0, 0], [5, 0])[0])
+    assert further_flips([3, 0], [50, 20], [0, 0]).most.tolist() == [0.0, 0.0]
+    assert further_flips([0, 0], [0, 0], [5, 0]).most[1] == 0.0
+    assert np.isnan(further_flips([0, 0], [0, 0], [5, 0]).most[0])
     # Where none of one condition was run again, the others speak for it.
-    borrowed = further_flips([0, 10], [0, 1000], [100, 0])
+    borrowed = further_flips([0, 10], [0, 1000], [100, 0]).most
     assert 1 < borrowed[0] < 50
 
 
 def test_more_checks_without_flips_make_it_smaller():
-    bounds = [float(further_flips([0], [c], [1000 - c])[0]) for c in (2, 20, 200, 900, 1000)]
+    bounds = [float(further_flips([0], [c], [1000 - c]).most[0]) for c in (2, 20, 200, 900, 1000)]
     assert all(np.diff(bounds) <= 0.0) and bounds[0] > bounds[1] > bounds[2] > bounds[-1] == 0.0
 
 
@@ -156,7 +176,7 @@ def test_the_bound_holds_also_in_the_conditions_that_flip(mean, spread):
     known = rng.binomial(checked, rates)
     more = rng.binomial(trials - checked, rates)
     bound = np.array([
-        further_flips(each, np.full(20, checked), np.full(20, trials - checked), 0.975)
+        further_flips(each, np.full(20, checked), np.full(20, trials - checked), 0.975).most
         for each in known
     ])  # fmt: skip
     assert np.mean(bound >= more) >= 0.95
@@ -289,7 +309,8 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
 def test_of_a_kind_that_was_never_run_again_all_may_flip():
     checked = np.array([[[0], [0]], [[12], [12]]])  # of (kind, type, N)
     exposed = np.array([[[2.0], [0.0]], [[0.0], [0.0]]])
-    more = further_of_kinds(np.zeros((2, 2, 1)), checked, exposed)
+    more = flips_together(further_of_kinds(np.zeros((2, 2, 1)), checked, exposed))
     assert more.tolist() == [[2.0], [0.0]]
     nothing = further_of_kinds(np.zeros((2, 2, 1)), np.zeros((2, 2, 1)), exposed)
+    nothing = flips_together(nothing)
     assert np.isnan(nothing[0, 0]) and nothing[1, 0] == 0.0
