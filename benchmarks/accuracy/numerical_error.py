@@ -2,12 +2,13 @@
 
     python -m benchmarks.accuracy.numerical_error [--presets tang2014 si] [--k-n 20 2e3 2e5]
         [--tolerances 1e-6 1e-7 1e-8 1e-9] [--replicates 400] [--folder DIR] [--choices 100]
+        [--size N]
 
 runs Types I to III, N = 1, 16, 64 and δ from 0 to 1 at each preset, stiffness k_n [N/m] (k_t a
 tenth of it) and tolerance, at those of its second and third runs, and at 1e-12 m, taken for the
 truth. What has been run is kept in a folder and not run again; ``--stored``: nothing is run, and
-what the folder does not have is left out. Small studies are drawn from these replicates, with
-replacement, and of each those are run again that the study itself would run again. Of each
+what the folder does not have is left out. Small studies of ``--size`` replicates, by default as
+many as there are, are drawn from these, with replacement, and of each those are run again that the study itself would run again. Of each
 probability: in how many of them its interval of the change holds the true one, in the worst
 condition and in the mean. Goals: in 93 % of them in each condition, and at most 20 % of the time
 for second and third runs at 1,000 replicates.
@@ -83,11 +84,11 @@ def further(first, rng, number=None):
     return easily, of_all, of_easy
 
 
-def held(levels, truth, choices, rng):
+def held(levels, truth, choices, size, rng):
     """{name: (studies with trials, those that hold the truth, half-widths)}."""
     found = dict.fromkeys(PROBABILITIES)
     for _ in range(choices):
-        some = rng.integers(0, truth[0].shape[-1], truth[0].shape[-1])
+        some = rng.integers(0, truth[0].shape[-1], size)
         one, two, three, true = ([each[..., some] for each in codes]
                                  for codes in (*levels, truth))  # fmt: skip
         easily, of_all, of_easy = further(one, rng)
@@ -123,6 +124,7 @@ def main():
     parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-6, 1e-7, 1e-8, 1e-9])
     parser.add_argument("--replicates", type=int, default=400)
     parser.add_argument("--choices", type=int, default=100)
+    parser.add_argument("--size", type=int)
     parser.add_argument("--folder", default="numerical_error")
     parser.add_argument("--stored", action="store_true")
     arguments = parser.parse_args()
@@ -145,7 +147,7 @@ def main():
             print(f"left out: {what}")
             continue
         first, second, exact = levels[0][0], levels[1][0], truth[0]
-        found = held(levels, truth, arguments.choices, rng)
+        found = held(levels, truth, arguments.choices, arguments.size or truth[0].shape[-1], rng)
         shares, half = [], []
         for name, (seen, holds, widths) in found.items():
             enough = seen >= ENOUGH * arguments.choices

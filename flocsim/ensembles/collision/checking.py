@@ -39,12 +39,9 @@ THIRD_COST = 4.0
 Z = 1.959963984540054
 """Normal quantile of 95 % intervals."""
 
-WIDER = 1.6
-"""Width of the interval of the flip rate over that of a probability: what costs less than a fifth
-of a study at 1,000 replicates (benchmarks.accuracy.numerical_error)."""
-
-LEAST_SHARE = 0.01
-"""Of the replicates that "auto" has run again."""
+LEAST_SHARE, MOST_SHARE, FEW = 0.01, 0.035, 16
+"""Of the replicates "auto" has run again at least, and at most where that is more than FEW: less
+than a fifth of the cost of a study of 1,000 (benchmarks.accuracy.numerical_error)."""
 
 EASILY = 3
 """Times as many "auto" has run again of those that flip easily."""
@@ -58,14 +55,15 @@ def expected_checks(replicates: int, share: float | str, easily: bool = False) -
 
     ``easily``: if all of them were of those that flip easily, EASILY times as many by "auto".
 
-    "auto": where no outcome flips, Wilson's interval of the flip rate at m is WIDER times as wide,
-    w, as that of a probability of ½ at n replicates, z²/(m + z²) = w z/√(n + z²), so
-    m = z √(n + z²)/w − z²; and at least one, and 1 %. Never falls, nor rises by more than 1 from
-    one replicate to the next.
+    "auto": where no outcome flips, Wilson's interval of the flip rate at m is as wide as that of a
+    probability of ½ at n replicates, z²/(m + z²) = z/√(n + z²), so m = z √(n + z²) − z²; beyond
+    FEW of them at most MOST_SHARE, and at least LEAST_SHARE. Never falls, nor rises by more than 1
+    from one replicate to the next.
     """
     if isinstance(share, str):
-        wanted = Z * math.sqrt(replicates + Z * Z) / WIDER - Z * Z
-        wanted = max(wanted, min(replicates, 1.0), LEAST_SHARE * replicates)
+        wanted = Z * math.sqrt(replicates + Z * Z) - Z * Z
+        wanted = min(wanted, max(FEW, MOST_SHARE * replicates))
+        wanted = max(wanted, LEAST_SHARE * replicates)
         return min(EASILY * wanted, replicates) if easily else wanted
     return share * replicates
 

@@ -378,10 +378,10 @@ class IntegratorConfig:
         beside_class=True,
         help="share of the replicates that are run again at a 100 times tighter tolerance (a fixed "
         "step: at a quarter of it); the outcomes that change are the numerical error of the "
-        'probabilities. "auto": of n replicates 1.96 √(n + 3.84)/1.6 − 3.84, which makes the '
-        "interval of a flip rate of 0 1.6 times as wide as a sampling interval, and at least one, "
-        "and 1 %, of hooks, rests and misses, which flip most, three times as many; one in sixteen "
-        "of these is run a third time, tighter still; 0: none",
+        'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
+        "of a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most "
+        "3.5 % and at least 1 %; of hooks, rests and misses, which flip most, three times as many; "
+        "one in sixteen of these is run a third time, tighter still; 0: none",
     )
 
     def __attrs_post_init__(self):
