@@ -8,10 +8,10 @@ runs Types I to III, N = 1, 16, 64 and δ from 0 to 1 at each preset, stiffness 
 tenth of it) and tolerance, at those of its second and third runs, and at 1e-12 m, taken for the
 truth. What has been run is kept in a folder and not run again; ``--stored``: nothing is run, and
 what the folder does not have is left out. Small studies of ``--size`` replicates, by default as
-many as there are, are drawn from these, with replacement, and of each those are run again that the study itself would run again. Of each
-probability: in how many of them its interval of the change holds the true one, in the worst
-condition and in the mean. Goals: in 93 % of them in each condition, and at most 20 % of the time
-for second and third runs at 1,000 replicates.
+many as there are, are drawn from these, with replacement, and of each those are run again that the
+study itself would run again. Of each probability: in how many of them its interval of the change
+holds the true one, in the worst condition and in the mean. Goals: in 93 % of them in each
+condition, and at most 20 % of the time for second and third runs at 1,000 replicates.
 """
 
 import itertools

@@ -176,7 +176,7 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
     else:
         start = even_start(room, count, radius)
         points = (paper_fit(room, start, radius) if method == "paper" else start) - margin
-    shape = SpheroPolygon(points * (1.0, -1.0), radius)
+    found, shape = points, SpheroPolygon(points * (1.0, -1.0), radius)
     if inscribed:
         edge = _margin(mask, points, radius)
         around = np.pad(mask, edge)
@@ -192,9 +192,11 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
     elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
         points = _settled(mask, points, radius, shape.area)
     vertices = points * (1.0, -1.0)
+    if points is not found:
+        shape = SpheroPolygon(vertices, radius)
     wrong = _wrong_pixels(mask, points, radius)
     error = 100.0 * wrong / float(mask.sum())
-    return Fit(SpheroPolygon(vertices, radius), vertices, radius, wrong, error)
+    return Fit(shape, vertices, radius, wrong, error)
 
 
 def _fit_with_holes(mask, holes, count, radius, method, preserve_area, inscribed):
