@@ -213,15 +213,17 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     and with SEEN_BEFORE."""
     f, c, u = (
         np.append(each.ravel(), before)
-        for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, 0.0))
+        for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, NONE))
     )
     more = further_flips(f, c, u, EACH_SIDE)
-    return FurtherFlips(*(each[:-1].reshape(flipped.shape) for each in more))
+    return FurtherFlips(*(each[: flipped.size].reshape(flipped.shape) for each in more))
 
 
-SEEN_BEFORE = 1, 500
-"""How many third runs ended otherwise than second ones, of so many, where this was looked at before
-(benchmarks.accuracy.numerical_error): it counts as one condition more."""
+SEEN_BEFORE = [0, 0, 0, 0, 1], [100] * 5
+"""How many third runs ended otherwise than second ones, of how many, where that was looked at
+(benchmarks.accuracy.numerical_error), as in five conditions: without them a study of one condition,
+of which a few replicates are run a third time, would know next to nothing of this."""
+NONE = np.zeros(5)
 
 
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
