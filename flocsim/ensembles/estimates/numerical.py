@@ -219,11 +219,11 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     return FurtherFlips(*(each[: flipped.size].reshape(flipped.shape) for each in more))
 
 
-SEEN_BEFORE = [0, 0, 0, 0, 1], [100] * 5
+SEEN_BEFORE = [0, 1], [250, 250]
 """How many third runs ended otherwise than second ones, of how many, where that was looked at
-(benchmarks.accuracy.numerical_error), as in five conditions: without them a study of one condition,
+(benchmarks.accuracy.numerical_error), as in two conditions: without them a study of one condition,
 of which a few replicates are run a third time, would know next to nothing of this."""
-NONE = np.zeros(5)
+NONE = np.zeros(2)
 
 
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
