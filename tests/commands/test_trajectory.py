@@ -94,6 +94,7 @@ def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
         assert (code, "--scene" in line) == (2, True)
 
 
+@pytest.mark.slow
 def test_the_same_command_makes_the_same_picture(folder, capsys):
     for name in ("a.png", "b.png"):
         assert call(capsys, "small.toml", "--vertices", 1, "-o", name)[0] == 0

@@ -66,7 +66,11 @@ def impact(law, integrator):
 
 
 @by_method
-@pytest.mark.parametrize("law", [Hertz(), OnTopOfContact()], ids=["own", "subclass of Contact"])
+@pytest.mark.parametrize(
+    "law",
+    [pytest.param(Hertz(), marks=pytest.mark.slow), OnTopOfContact()],
+    ids=["own", "subclass of Contact"],
+)
 def test_the_time_of_an_elastic_impact(law, integrator, allowed):
     restitution, lasted, deepest = impact(law, integrator)
     assert restitution == pytest.approx(1.0, rel=allowed)
