@@ -51,7 +51,7 @@ def test_a_figure_can_be_written_in_several_formats(folder, capsys):
 def test_forces_and_an_animation(folder, capsys):
     from PIL import Image
 
-    words = ["--type", "III", "--vertices", 4, "--forces", "f.png", "--animation", "a.gif"]
+    words = ["--type", "III", "--vertices", 1, "--forces", "f.png", "--animation", "a.gif"]
     code, output, errors = call(capsys, "small.toml", *words, "--set", "scene.start_gap=1e-6")
     assert (code, errors, output[2:]) == (0, [], ["f.png", "a.gif"])
     with Image.open(folder / "a.gif") as animation:

@@ -77,12 +77,12 @@ def test_a_reduced_example_runs(path, examples):
 
 
 @pytest.mark.parametrize("path", SWARMS, ids=lambda path: path.stem)
-def test_a_swarm_describes_itself(path, examples):
+def test_a_swarm_describes_itself(path, examples, capsys):
     check_swarms(load_any_config(examples / path.name))
-    done = run_command(examples.parent, f"examples/{path.name}", "--dry-run")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert SWARMS[path] in done.stdout and "N = 16" in done.stdout
-    assert "nothing was run" in done.stdout
+    assert main(["swarm", str(examples / path.name), "--dry-run"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "" and "nothing was run" in said.out
+    assert SWARMS[path] in said.out and "N = 16" in said.out
 
 
 @pytest.mark.slow
