@@ -173,16 +173,12 @@ def test_its_derivatives_are_laws_of_the_scene():
             assert slope == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize(
-    "method",
-    [pytest.param(Implicit(1e-9), marks=pytest.mark.slow), Overdamped(1e-8)],
-    ids=["inertia", "none"],
-)
+@pytest.mark.parametrize("method", [Implicit(1e-9), Overdamped(1e-9)], ids=["inertia", "none"])
 def test_an_ellipse_goes_round_as_jeffery_with_the_elongation_of_its_prism(method):
     flow = Fluid(viscosity=1e-3, gradient=(0.0, SHEAR, 0.0, 0.0))
     body = Body(TWO_TO_ONE, angle=0.2, spin=-1.0, surface_density=1e-3)
-    run = System([body], [DRAG], method, flow).run(1.0, jit=False)
-    times = np.linspace(0.05, 1.0, 4000)
+    run = System([body], [DRAG], method, flow).run(2.0, jit=False)
+    times = np.linspace(0.1, 2.0, 400)
     turned = 0.2 - run.at(times).position[:, 0, 2]
     begin, end = np.interp([turned[0], turned[0] + math.pi], turned, times)
     drag = prism_drag(TWO_TO_ONE.outline())
