@@ -88,14 +88,6 @@ def test_an_impact_in_a_swarm_is_that_of_a_system(integrator, family):
     assert found == pytest.approx(impact(0.05, True)[0], rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    "integrator", [pytest.param(METHODS[2], marks=pytest.mark.slow), METHODS[3]], ids=name_of
-)
-def test_an_impact_of_spheres_in_a_swarm_is_that_of_a_system(integrator):
-    found = restitution(Swarm, integrator, "spheres", 0.05)
-    assert found == pytest.approx(impact(0.05, True)[0], rel=1e-2)
-
-
 @pytest.mark.parametrize("integrator", CONTROLLED, ids=name_of)
 def test_a_sphere_comes_to_its_terminal_velocity(integrator):
     body = Body(Sphere(R), density=2650.0)

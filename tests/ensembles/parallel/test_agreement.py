@@ -169,7 +169,7 @@ if os.environ.get("FLOCSIM_EDIT"):
 """A module that edits the config and the user's modules as soon as they have been read."""
 
 
-@pytest.mark.parametrize("ranks", rest_slow([None, 2], lambda ranks: ranks is None))
+@pytest.mark.parametrize("ranks", rest_slow([None, 2], lambda ranks: False))
 def test_files_that_are_edited_during_the_start_are_read_once(tmp_path, ranks):
     path = write_own(tmp_path)
     before = path.read_text()
