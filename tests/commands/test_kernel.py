@@ -98,9 +98,8 @@ def test_equivalent_spheres_are_known_in_water(folder, capsys, meeting, sizes, k
     assert main(["export", "matrix", "kernel.h5", "--curvilinear", "spheres"]) == 0
     names = capsys.readouterr().out.split()
     assert names[-1] == "kernel-shear-N1-efficiency-spheres-spheres.csv"
-    plain, wet = (
-        np.genfromtxt(name, delimiter=",")[-len(sizes) :, 1:] for name in (names[-2], names[-1])
-    )
+    of_shear = names[len(meeting) - 1 :: len(meeting)]
+    plain, wet = (np.genfromtxt(name, delimiter=",")[-len(sizes) :, 1:] for name in of_shear)
     # Of spheres the product is what touches in water, closed in the plane as the efficiency is.
     ratio = wet / plain
     assert ratio == pytest.approx(ratio.T) and ratio[0, 0] == pytest.approx(0.257 / 1.124, rel=0.02)
