@@ -1,7 +1,9 @@
 """What every test run shares: one thread per process, no display, repeatable random examples."""
 
+import compileall
 import math
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,18 @@ CACHE = disk_cache.own_folder() / "tests"
 if not disk_cache.is_writable(CACHE):
     CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
 os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))
+
+# Hundreds of processes import flocsim. Where Python is told to keep no bytecode, each would compile
+# all of its sources first, and every run all of the tests: these are kept all the same.
+KEEPS_NO_BYTECODE = sys.dont_write_bytecode
+compileall.compile_dir(Path(__file__).parents[1] / "flocsim", quiet=2)
+sys.dont_write_bytecode = False
+
+
+def pytest_collection_finish():
+    """What tests write and import themselves is left to the settings of Python."""
+    sys.dont_write_bytecode = KEEPS_NO_BYTECODE
+
 
 # What a test's commands print must not depend on what was compiled before it.
 waiting.WORTH_SAYING = math.inf

@@ -12,6 +12,7 @@ from tests.helpers.fast_scene import (
     shape_of,
     silenced,
 )
+from tests.helpers.tiers import rest_slow
 from tests.reference.contacts import contacts
 from tests.reference.forces import loads
 from tests.reference.samples import scene_of
@@ -19,6 +20,7 @@ from tests.reference.samples import scene_of
 SCENES = range(220)
 ONE_BY_ONE = range(50)
 UNCOMPILED = range(20)
+FEW_QUICKLY = rest_slow(SCENES, lambda seed: seed < 60)
 
 TOGETHER = {gap: tuple(name for name in FORCES if not name.endswith(other))
             for gap, other in zip(GAPS, GAPS[::-1], strict=True)}  # fmt: skip
@@ -51,7 +53,7 @@ def slips_of(case, names):
     return case.slips if "contact" in names else None
 
 
-@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("seed", FEW_QUICKLY)
 def test_shape_integrals(seed):
     for body in scene_of(seed).bodies:
         shape = shape_of(body)
@@ -63,14 +65,14 @@ def test_shape_integrals(seed):
 
 
 @pytest.mark.parametrize("gap", GAPS)
-@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("seed", FEW_QUICKLY)
 def test_all_forces_together_compiled(seed, gap):
     case, names = random_case(seed), TOGETHER[gap]
     fast = FastScene(silenced(case, *names))
     assert_loads(fast.loads(slips_of(case, names)), *expected(case, names, fast), case)
 
 
-@pytest.mark.parametrize("seed", SCENES)
+@pytest.mark.parametrize("seed", FEW_QUICKLY)
 def test_contact_pairs(seed):
     plain = random_case(seed).plain
     fast = FastScene(silenced(random_case(seed), "contact"))
@@ -87,7 +89,7 @@ def test_contact_pairs(seed):
 
 
 @pytest.mark.parametrize("name", FORCES)
-@pytest.mark.parametrize("seed", ONE_BY_ONE)
+@pytest.mark.parametrize("seed", rest_slow(ONE_BY_ONE, lambda seed: seed < 20))
 def test_every_force_alone(seed, name):
     # Uncompiled, each scene is made of this one force's code, all other forces left out.
     case = random_case(seed)

@@ -8,6 +8,7 @@ import fnmatch
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -122,6 +123,7 @@ MOST_FILES = 16
 """Of a folder: more are found by their prefixes, not by their room."""
 
 
+@cache
 def package_sources():
     """Path inside the package → parsed file, for all of flocsim."""
     files = sorted((ROOT / "flocsim").rglob("*.py"))
@@ -148,8 +150,13 @@ def level_of(room, rows=ROWS):
     return next((level for level, row in enumerate(rows) if room in row), None)
 
 
+@cache
 def imports_of(path, tree):
     """(line, dotted name) of each import, relative ones and import_module("…") included."""
+    return list(find_imports(path, tree))
+
+
+def find_imports(path, tree):
     here = ["flocsim", *path.split("/")[:-1]]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -158,9 +165,10 @@ def imports_of(path, tree):
             anchor = here[: len(here) - node.level + 1] if node.level else []
             base = ".".join([*anchor, *filter(None, [node.module])])
             yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
-        elif isinstance(node, ast.Call) and "import" in ast.unparse(node.func) and node.args:
+        elif isinstance(node, ast.Call) and node.args:
             name = node.args[0]
-            if isinstance(name, ast.Constant) and isinstance(name.value, str):
+            text = isinstance(name, ast.Constant) and isinstance(name.value, str)
+            if text and "import" in ast.unparse(node.func):
                 yield node.lineno, name.value
 
 

@@ -12,6 +12,7 @@ from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import command, run_command, write_small
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 NAMES = ("init", "fit", "shapes", "ensemble", "sweep", "check", "work-precision", "trajectory",
          "plot", "info", "compare", "report", "export")  # fmt: skip
@@ -52,6 +53,7 @@ def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, 
     assert capsys.readouterr() == ("", said)
 
 
+@pytest.mark.slow
 def test_the_path_of_a_new_user(tmp_path):
     for words in (
         ["init", "study.toml"],
@@ -79,7 +81,9 @@ def test_flocsim_ensemble_is_the_ensemble_command(tmp_path):
     assert len(done.stdout.splitlines()) == 2
 
 
-@pytest.mark.parametrize("words", [["--dry-run"], ["--output", "a.h5"]])
+@pytest.mark.parametrize(
+    "words", rest_slow([["--dry-run"], ["--output", "a.h5"]], lambda words: words[0] == "--output")
+)
 def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     write_small(tmp_path, vertices="[1]", types='["III"]')  # the others settle implausibly fast
     job = subprocess.Popen(

@@ -12,6 +12,7 @@ from flocsim.bonds import statics
 from flocsim.bonds.bond import is_closed, size_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.slip_transfer import contact_point
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import star
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, TwoBodies, load, polygon
 
@@ -154,7 +155,7 @@ def by_linear_program(two, drift, grip):
     return True
 
 
-@pytest.mark.parametrize("friction", ["none", 0.3, 0.0])
+@pytest.mark.parametrize("friction", rest_slow(["none", 0.3, 0.0], lambda mu: mu == 0.3))
 def test_hooks_are_those_of_a_linear_program(friction):
     rng = np.random.default_rng(4)
     grip = {"none": statics.GRIP, 0.0: statics.SLACK}.get(friction, friction)
@@ -175,7 +176,7 @@ def turned(places, drift, angle):
     return moved, matrix @ drift
 
 
-@pytest.mark.parametrize("friction", ["none", 0.3])
+@pytest.mark.parametrize("friction", rest_slow(["none", 0.3], lambda mu: mu == "none"))
 def test_the_same_pair_seen_otherwise_hooks_alike(friction):
     rng, found = np.random.default_rng(11), []
     forces = [Contact(friction=friction)]

@@ -41,6 +41,7 @@ def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
     assert text.splitlines()[-1].split()[:5] == ["III", "1", "0.5", "6", "4"]
 
 
+@pytest.mark.slow
 def test_flocs_of_a_library_are_known_in_water(capsys):
     assert main(["info", str(SHIPPED), "--water"]) == 0
     heading, columns, *rows = capsys.readouterr().out.splitlines()

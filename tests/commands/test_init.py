@@ -4,6 +4,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands.init import COMMANDS, KINDS, TEMPLATES
+from tests.helpers.tiers import rest_slow
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -28,7 +29,7 @@ def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 3
 
 
-@pytest.mark.parametrize("kind", ["kernel", "brownian"])
+@pytest.mark.parametrize("kind", rest_slow(["kernel", "brownian"], lambda kind: kind == "kernel"))
 def test_few_spheres_of_it_come_to_results(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["init", "s.toml", "--kind", kind]) == 0

@@ -1,17 +1,19 @@
 """What commands may write to: never what they read, and nothing that exists without being asked."""
 
 import os
+from itertools import product
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from flocsim.__main__ import main
-from flocsim.io.plots.results import overview
+from flocsim.io.plots.results import figure_4
 from flocsim.io.plots.style import save
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_small, write_star_library
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 ONE = ("--type", "III", "--vertices", 1)
 """A replicate of spheres."""
@@ -66,8 +68,16 @@ def refused(folder, capsys, *words, code=2):
     return line
 
 
-@pytest.mark.parametrize("more", [[], ["--overwrite"], ["--resume", "--overwrite"]])
-@pytest.mark.parametrize("name", ["small.toml", "lib.h5", "spring_of_mine.py", "./link", "hard"])
+INPUTS = ["small.toml", "lib.h5", "spring_of_mine.py", "./link", "hard"]
+MORE = [[], ["--overwrite"], ["--resume", "--overwrite"]]
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    rest_slow(
+        product(INPUTS, MORE), lambda name, more: MORE.index(more) == INPUTS.index(name) % len(MORE)
+    ),
+)
 def test_inputs_of_a_study_are_never_its_output(folder, capsys, name, more):
     (folder / "link").symlink_to("lib.h5")
     os.link(folder / "small.toml", folder / "hard")
@@ -82,8 +92,17 @@ def test_a_config_with_the_name_of_the_journal_is_not_written_to(folder, capsys)
         assert "would replace x.h5.journal" in line
 
 
-@pytest.mark.parametrize("mode", [[], ["--restart"], ["--resume"]])
-@pytest.mark.parametrize("name", ["thesis.txt", "other.h5", "photo.png", "empty"])
+IN_THE_WAY = ["thesis.txt", "other.h5", "photo.png", "empty"]
+MODES = [[], ["--restart"], ["--resume"]]
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    rest_slow(
+        product(IN_THE_WAY, MODES),
+        lambda name, mode: MODES.index(mode) == IN_THE_WAY.index(name) % len(MODES),
+    ),
+)
 def test_nothing_at_the_output_of_a_study_is_replaced(folder, capsys, name, mode):
     write_star_library(folder / "other.h5")
     (folder / "empty").touch()
@@ -155,17 +174,17 @@ def test_a_library_or_its_table_is_replaced_on_request_and_kept(folder, capsys):
 def test_plots_are_drawn_again_and_photographs_spared(folder, capsys):
     results = make_results(types=("I",), count=4)
     write_results(folder / "study.h5", results)
-    words = ["plot", "study.h5", "--figures", "overview"]
+    words = ["plot", "study.h5", "--figures", "4"]
     assert main(words) == 0 and main(words) == 0
     # One of other results is flocsim's as well.
-    save(overview(make_results(types=("I",), count=8)), folder / "study-overview.png")
+    save(figure_4(make_results(types=("I",), count=8)), folder / "study-figure-4.png")
     assert main(words) == 0
     photo = (folder / "photo.png").read_bytes()
-    (folder / "study-overview.png").write_bytes(photo)
+    (folder / "study-figure-4.png").write_bytes(photo)
     capsys.readouterr()
-    assert "study-overview.png exists already" in refused(folder, capsys, *words)
+    assert "study-figure-4.png exists already" in refused(folder, capsys, *words)
     assert main([*words, "--overwrite"]) == 0
-    assert (folder / "study-overview.1.png").read_bytes() == photo
+    assert (folder / "study-figure-4.1.png").read_bytes() == photo
 
 
 def test_what_is_plotted_is_not_replaced_by_its_plot(folder, capsys):

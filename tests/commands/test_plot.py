@@ -37,11 +37,13 @@ def study(tmp_path):
 
 
 def test_all_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):
-    assert call(plot, study, "--output-dir", tmp_path / "a" / "b", "--format", "pdf") == 0
+    study.unlink()
+    write_results(study, make_results(types=("I",), vertices=(1,), delta=(0.0,), count=8))
+    assert call(plot, study, "--output-dir", tmp_path / "a" / "b", "--format", "svg") == 0
     printed = capsys.readouterr().out.split("\n")[:-1]
     labels = [f"figure-{name}" if name.isdigit() else name for name in FIGURES]
-    names = [f"study-{label}.pdf" for label in labels]
-    assert {"study-figure-4.pdf", "study-overview.pdf"} <= set(names)
+    names = [f"study-{label}.svg" for label in labels]
+    assert {"study-figure-4.svg", "study-overview.svg"} <= set(names)
     assert printed == [str(tmp_path / "a" / "b" / name) for name in names]
     assert sorted(os.listdir(tmp_path / "a" / "b")) == sorted(names)
 

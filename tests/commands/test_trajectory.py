@@ -51,7 +51,7 @@ def test_a_figure_can_be_written_in_several_formats(folder, capsys):
 def test_forces_and_an_animation(folder, capsys):
     from PIL import Image
 
-    words = ["--type", "III", "--vertices", 4, "--forces", "f.png", "--animation", "a.gif"]
+    words = ["--type", "III", "--vertices", 1, "--forces", "f.png", "--animation", "a.gif"]
     code, output, errors = call(capsys, "small.toml", *words, "--set", "scene.start_gap=1e-6")
     assert (code, errors, output[2:]) == (0, [], ["f.png", "a.gif"])
     with Image.open(folder / "a.gif") as animation:
@@ -94,6 +94,7 @@ def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
         assert (code, "--scene" in line) == (2, True)
 
 
+@pytest.mark.slow
 def test_the_same_command_makes_the_same_picture(folder, capsys):
     for name in ("a.png", "b.png"):
         assert call(capsys, "small.toml", "--vertices", 1, "-o", name)[0] == 0

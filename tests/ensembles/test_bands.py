@@ -7,6 +7,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.draw import columns_of
+from flocsim.ensembles.pairs import contents
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
@@ -76,6 +77,7 @@ def test_first_runs_are_those_of_a_study_without(folder):
 
 def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     monkeypatch.chdir(folder)
+    monkeypatch.setattr(contents, "FIGURES", {"overview": contents.FIGURES["overview"]})
     (folder / "study.toml").write_text(STUDY.format(outlines="band", scene=SCENES["measured"]))
     assert main(["ensemble", "study.toml"]) == 0
     printed = capsys.readouterr().out

@@ -142,7 +142,7 @@ def test_a_spheroradius_that_fills_the_smallest_body(folder, capsys):
     assert "leaves no room for a core in the smallest body, of r_eq = 4.62e-06 m" in line
 
 
-@pytest.mark.parametrize("ranks", [None, 2])
+@pytest.mark.parametrize("ranks", [None, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_library_without_the_wanted_number_of_vertices(folder, ranks):
     write_star_library(folder / "stars.h5", vertices=(4, 8))
     write_small(folder, vertices='[1, 4, 16]\nsource = "library"\nfile = "stars.h5"', pool=10)

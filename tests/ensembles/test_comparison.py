@@ -35,9 +35,10 @@ def changed(path, results, **columns):
     return path
 
 
-@pytest.fixture
-def files(tmp_path):
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
     """Two files of one study: in the second, every second aggregate inside has departed."""
+    tmp_path = tmp_path_factory.mktemp("compared")
     first = make_results()
     write_results(tmp_path / "a.h5", first)
     first = read_results(tmp_path / "a.h5")
@@ -159,7 +160,7 @@ def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_pat
 @pytest.mark.parametrize("identity", ['{"seed": 1e999}', '{"seed": 99999999999999999999}', "["])
 def test_what_no_flocsim_wrote_is_refused_in_one_line(tmp_path, monkeypatch, capsys, identity):
     monkeypatch.chdir(tmp_path)
-    made = make_results()
+    made = make_results(vertices=(1, 4), delta=(0.0, 1.0), count=12)
     write_results(tmp_path / "a.h5", attrs.evolve(made, run=made.run | {"identity": identity}))
     write_results(tmp_path / "b.h5", made)
     assert main(["compare", "a.h5", "b.h5"]) == 74

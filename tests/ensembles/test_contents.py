@@ -17,7 +17,7 @@ from tests.helpers.synthetic_results import make_results
 @pytest.fixture
 def synthetic(tmp_path):
     """(path, Results) of numbers that were made up."""
-    write_results(tmp_path / "r.h5", make_results())
+    write_results(tmp_path / "r.h5", make_results(vertices=(1, 4), delta=(0.0, 1.0), count=12))
     return tmp_path / "r.h5", read_results(tmp_path / "r.h5")
 
 

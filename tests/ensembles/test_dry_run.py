@@ -9,6 +9,7 @@ from flocsim.ensembles import cli, dry_run
 from flocsim.ensembles.pilot import forecast, needless
 from flocsim.errors import FlocsimError
 from tests.helpers.small_study import run_command, small_config, write_small
+from tests.helpers.tiers import rest_slow
 
 
 @pytest.fixture
@@ -96,7 +97,9 @@ def test_a_signal_ends_the_pilot(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize("kind", ["study", "swarm", "kernel", "brownian"])
+@pytest.mark.parametrize(
+    "kind", rest_slow(["study", "swarm", "kernel", "brownian"], lambda kind: kind == "brownian")
+)
 def test_a_dry_run_compiles_nothing(tmp_path, monkeypatch, kind):
     cache = tmp_path / "cache"
     monkeypatch.setenv("FLOCSIM_CACHE", str(cache))

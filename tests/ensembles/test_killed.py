@@ -11,6 +11,7 @@ import pytest
 from flocsim.__main__ import main
 from tests.ensembles.test_matrix import PAIRS
 from tests.helpers.swarm_study import SWARM
+from tests.helpers.tiers import rest_slow
 
 SCRIPT = """\
 import flocsim
@@ -47,13 +48,13 @@ def wait_until(holds, seconds):
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [("sweep", PAIRS), ("sweep", SWARM), ("strength", PAIRS), ("Study.run", PAIRS),
-     ("Study.run", SWARM)],
+    rest_slow([("sweep", PAIRS), ("sweep", SWARM), ("strength", PAIRS), ("Study.run", PAIRS),
+               ("Study.run", SWARM)], lambda name, text: name == "sweep" and text is PAIRS),
     ids=["sweep", "sweep of swarms", "strength", "Study.run", "Study.run of swarms"],
 )  # fmt: skip
 def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
     monkeypatch.chdir(tmp_path)
-    more = "replicates = 4000" if text is PAIRS else "replicates = 40"
+    more = "replicates = 1500" if text is PAIRS else "replicates = 40"
     changed = text.replace("replicates = 6", more).replace("replicates = 2", more)
     (tmp_path / "study.toml").write_text(changed, "utf-8")
     first, shows, then = RUNS[name]

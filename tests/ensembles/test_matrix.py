@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import product
 from pathlib import Path
 
 import attrs
@@ -21,6 +22,7 @@ from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import mpirun
 from tests.helpers.swarm_study import SWARM
+from tests.helpers.tiers import rest_slow
 
 PAIRS = """\
 preset = "tang2014"
@@ -51,8 +53,8 @@ KINDS = {
     each.name: each
     for each in (
         Kind("pairs", ("ensemble", "pairs.toml"), ("--replicates", "9"), PAIRS, read_results),
-        Kind("rates", ("kernel", "rates.toml"), ("--replicates", "64"),
-             kernel_text().replace('file = "kernel.h5"', 'file = "rates.h5"'), read_results),
+        Kind("rates", ("kernel", "rates.toml"), ("--replicates", "16"),
+             kernel_text(replicates=8, scrambles=2).replace("kernel.h5", "rates.h5"), read_results),
         Kind("swarms", ("swarm", "swarms.toml"), ("--replicates", "3"),
              SWARM.replace('file = "swarm.h5"', 'file = "swarms.h5"'), read_swarm),
         Kind("strengths", ("strength", "pairs.h5", *FEW), ("--count", "5"), "", read_strengths),
@@ -182,14 +184,12 @@ def study(cell):
 
 
 def swept(cell):
-    words = ["--over", "fluid.viscosity=1e-3,2e-3", "-o", "swept.h5"]
-    code = main(["sweep", cell.kind.words[1], *words])
+    words = ["sweep", cell.kind.words[1], "-o", "swept.h5"]
+    code = main([*words, "--over", "fluid.viscosity=1e-3"])
     if code == 0:
+        assert main([*words, "--over", "fluid.viscosity=1e-3,2e-3", "--resume"]) == 0
         assert main(["info", "swept.h5"]) == 0 == main(["plot", "swept.h5"])
-        found = flocsim.open("swept.h5").to_xarray()
-        assert found.sizes["viscosity"] == 2
-        more = ["--over", "fluid.viscosity=1e-3,2e-3,3e-3", "-o", "swept.h5", "--resume"]
-        assert main(["sweep", cell.kind.words[1], *more]) == 0
+        assert flocsim.open("swept.h5").to_xarray().sizes["viscosity"] == 2
     return code
 
 
@@ -213,7 +213,19 @@ ABILITIES = {
     "export": lambda cell: main(["export", "csv", cell.file]),
     "dry run": lambda cell: cell.run("--dry-run"),
 }
-CELLS = [(ability, kind) for ability in ABILITIES for kind in KINDS]
+LONG = {
+    "jobs": "strengths", "mpirun": "swarms", "resume": "pairs", "read while running": "swarms",
+    "sweep": "rates", "extend": "pairs", "Study": "swarms", "report": "rates", "plot": "rates",
+}  # fmt: skip
+"""Abilities that take long → the kind that shows them in the default run. Pairs under mpirun and in
+processes, swarms and rates that are resumed and extended, have files of tests of their own."""
+
+
+def is_quick(ability, kind):
+    return (ability, kind) in REFUSED or LONG.get(ability, kind) == kind
+
+
+CELLS = rest_slow(product(ABILITIES, KINDS), is_quick)
 
 
 @pytest.mark.parametrize(("ability", "kind"), CELLS)

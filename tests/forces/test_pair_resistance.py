@@ -13,6 +13,7 @@ from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.fast_scene import FastScene, right_hand_side
+from tests.helpers.tiers import rest_slow
 
 VISCOSITY = 1e-3
 GRADIENT = (1.0, 3.0, -0.5, -1.0)
@@ -41,7 +42,10 @@ def moving(rng):
 
 @pytest.mark.parametrize(
     ("radii", "gap"),
-    [((5e-6, 10e-6), 1e-6), ((5e-6, 5e-6), 2e-9), ((8e-6, 5e-6), 7e-6), ((3e-6, 9e-6), 5e-5)],
+    rest_slow(
+        [((5e-6, 10e-6), 1e-6), ((5e-6, 5e-6), 2e-9), ((8e-6, 5e-6), 7e-6), ((3e-6, 9e-6), 5e-5)],
+        lambda radii, gap: gap == 2e-9,
+    ),
 )
 def test_two_spheres_feel_what_the_resistance_functions_say(radii, gap):
     rng, angle = np.random.default_rng(1), 0.7

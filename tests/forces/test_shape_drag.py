@@ -178,7 +178,7 @@ def test_an_ellipse_goes_round_as_jeffery_with_the_elongation_of_its_prism(metho
     flow = Fluid(viscosity=1e-3, gradient=(0.0, SHEAR, 0.0, 0.0))
     body = Body(TWO_TO_ONE, angle=0.2, spin=-1.0, surface_density=1e-3)
     run = System([body], [DRAG], method, flow).run(2.0, jit=False)
-    times = np.linspace(0.1, 2.0, 4000)
+    times = np.linspace(0.1, 2.0, 400)
     turned = 0.2 - run.at(times).position[:, 0, 2]
     begin, end = np.interp([turned[0], turned[0] + math.pi], turned, times)
     drag = prism_drag(TWO_TO_ONE.outline())

@@ -60,7 +60,7 @@ def period_of(method, angle=0.2, shape=THREE_TO_ONE, until=2.5):
     """Twice the time of half a turn [s], without inertia to speak of."""
     body = Body(shape, angle=angle, spin=-1.0, surface_density=1e-3)
     run = System([body], [DRAG], method, FLOW).run(until, jit=False)
-    times = np.linspace(0.1, until, 4000)
+    times = np.linspace(0.1, until, 400)
     turned = angle - run.at(times).position[:, 0, 2]
     passed = np.interp([turned[0], turned[0] + math.pi], turned, times)
     return 2.0 * (passed[1] - passed[0])

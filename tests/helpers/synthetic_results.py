@@ -1,5 +1,7 @@
 """Made-up results with the trends of the paper, for tests of files, tables and figures."""
 
+from functools import cache
+
 import numpy as np
 
 from flocsim.ensembles.estimates.statistics import tabulate
@@ -54,6 +56,15 @@ def make_results(
     run=None,
 ):
     """A complete Results of random numbers; the same arguments give the same one."""
+    arrays = made(tuple(types), tuple(vertices), tuple(delta), count, seed)
+    replicates, table = ({name: each.copy() for name, each in group.items()} for group in arrays)
+    run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
+    return Results(types, vertices, delta, replicates, table, run, FAILURES)
+
+
+@cache
+def made(types, vertices, delta, count, seed):
+    """(replicates, probabilities) of them: intervals of hundreds of counts take a second."""
     rng = np.random.default_rng(seed)
     shape = (len(types), len(vertices), len(delta), count)
     outcome, inside, bond = draw_codes(rng, shape)
@@ -94,6 +105,4 @@ def make_results(
         replicates[f"aspect_ratio_{body}"] = 1.0 + rank
         replicates[f"circularity_{body}"] = 0.9 - 0.5 * rank**2
         replicates[f"solidity_{body}"] = 0.8 + 0.1 * np.cos(3 * rank)
-    run = {"preset": "tang2014", "seed": seed, "wall_time": 12.5} if run is None else run
-    table = tabulate(outcome, inside, bond, **again)
-    return Results(types, vertices, delta, replicates, table, run, FAILURES)
+    return replicates, tabulate(outcome, inside, bond, **again)

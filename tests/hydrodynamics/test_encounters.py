@@ -5,6 +5,7 @@ import pytest
 
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import Meeting, SpherePair
+from tests.helpers.tiers import rest_slow
 
 
 def attraction(radii, k):
@@ -23,18 +24,18 @@ def settling(k, water, radii=(0.5, 1.0), touch=1e-7):
     return meeting.settling(weights) ** 0.5
 
 
-@pytest.mark.parametrize(("k", "with_water", "without"), [
+@pytest.mark.parametrize(("k", "with_water", "without"), rest_slow([
     (1e-2, 0.6288, 1.30769), (1e-4, 0.2537, 1.0474), (1e-6, 0.1400, 1.0075),
-])  # fmt: skip
+], lambda k, *_: k == 1e-4))  # fmt: skip
 def test_settling(k, with_water, without):
     assert settling(k, True) == pytest.approx(with_water, rel=3e-3)
     assert settling(k, False) == pytest.approx(without, rel=3e-4)
     assert settling(k, True, (1.0, 0.5)) == pytest.approx(settling(k, True), rel=1e-6)
 
 
-@pytest.mark.parametrize(("k", "with_water", "without"), [
+@pytest.mark.parametrize(("k", "with_water", "without"), rest_slow([
     (1e-2, 0.604, 1.51), (1e-3, 0.325, 1.19), (1e-4, 0.189, 1.07), (1e-5, 0.110, 1.03),
-])  # fmt: skip
+], lambda k, *_: k == 1e-3))  # fmt: skip
 def test_shear(k, with_water, without):
     pair, force = SpherePair((1.0, 1.0)), attraction((1.0, 1.0), k)
     assert Meeting(pair, force, 1e-7).in_flow("shear", 1.0) == pytest.approx(with_water, rel=8e-3)
@@ -42,7 +43,12 @@ def test_shear(k, with_water, without):
     assert alone == pytest.approx(without, abs=6e-3)
 
 
-@pytest.mark.parametrize(("radius", "alpha"), [(5e-6, 0.257), (10e-6, 0.159), (20e-6, 0.096)])
+@pytest.mark.parametrize(
+    ("radius", "alpha"),
+    rest_slow(
+        [(5e-6, 0.257), (10e-6, 0.159), (20e-6, 0.096)], lambda radius, alpha: radius == 5e-6
+    ),
+)
 def test_quartz_in_shear(radius, alpha):
     def force(gap):
         return -4.7e-20 * 0.5 * radius / (6.0 * np.maximum(gap, 1e-9) ** 2)
@@ -72,6 +78,7 @@ def test_a_small_one_goes_round_a_large_one():
     assert np.all(np.diff(caught) > 0.0) and caught[-1] < 0.5 * (0.05 / 1.05) ** 2
 
 
+@pytest.mark.slow
 def test_in_shear_small_ones_come_round_before_they_meet():
     # Closed ways around the large one let no small one near (Wang, Zinchenko and Davis 1994).
     def share(ratio, flow):
@@ -88,6 +95,7 @@ def test_repulsion_keeps_all_apart():
     assert meeting.in_flow("shear", 1.0) == 0.0
 
 
+@pytest.mark.slow
 def test_spheres_change_places_in_shear():
     found = [Meeting(SpherePair(radii), attraction(radii, 1e-3), 1e-6).in_flow("shear", 1.0)
              for radii in ((0.5, 1.0), (1.0, 0.5))]  # fmt: skip

@@ -12,7 +12,8 @@ import pytest
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-from tests.helpers.methods import by_adaptive, by_setting
+from tests.helpers.methods import by_adaptive
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, Spring, encounter, head_on, watched
 
 STICKY = [Contact(k_n=20.0, k_t=2.0, damping_n=4e5), Spring(5e-2, -1e-6)]
@@ -55,8 +56,16 @@ def apart(end, other):
     return np.abs((end.position - other.position) * [1.0, 1.0, 1e-5]).max()
 
 
-@by_setting((VelocityVerlet(2e-9), 5e-10), (DormandPrince54(1e-13), 1e-11))
-@pytest.mark.parametrize("scene", ["spheres", "octagons"])
+@pytest.mark.parametrize(
+    ("integrator", "allowed"),
+    [
+        pytest.param(VelocityVerlet(2e-9), 5e-10, id="VelocityVerlet", marks=pytest.mark.slow),
+        pytest.param(DormandPrince54(1e-13), 1e-11, id="DormandPrince54"),
+    ],
+)
+@pytest.mark.parametrize(
+    "scene", rest_slow(["spheres", "octagons"], lambda scene: scene == "spheres")
+)
 def test_a_sticky_rolling_doublet_is_the_same_for_all_methods(scene, integrator, allowed):
     exact = run(scene, Implicit(1e-14))
     assert apart(run(scene, integrator), exact) < allowed

@@ -18,6 +18,7 @@ from flocsim.hooks import attempt
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.loop.driver import keep_lists, take_new_state
 from tests.helpers.methods import name_of
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
 
 EXACT = 1e-18
@@ -90,13 +91,15 @@ CASES = [
 
 @pytest.mark.parametrize(
     ("integrator", "scene", "counts", "order"),
-    CASES, ids=[f"{name_of(case[0])}-{case[1]}" for case in CASES],
+    rest_slow(CASES, lambda integrator, scene, *_: integrator is OWN or scene == "pressed"),
+    ids=[f"{name_of(case[0])}-{case[1]}" for case in CASES],
 )  # fmt: skip
 def test_order(integrator, scene, counts, order):
     exact = end_of(scene, OWN if integrator is OWN else DormandPrince54(), 2048)
     assert orders(scene, integrator, counts, exact)[-1] == pytest.approx(order, abs=0.4)
 
 
+@pytest.mark.slow
 def test_all_methods_go_to_the_same_end():
     for scene in SCENES:
         ends = [end_of(scene, method, 1024) for method in (Implicit(), DormandPrince54())]

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from flocsim import Body, Sphere, SpheroPolygon, run
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from tests.helpers.methods import by_method, by_setting
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import (
     WATER_VISCOSITY,
     Hertz,
@@ -42,7 +43,7 @@ def crowd(n):
 
 
 @by_method
-@pytest.mark.parametrize("n", [1, 3, 5])
+@pytest.mark.parametrize("n", rest_slow([1, 3, 5], lambda n: n == 3))
 def test_compiled_and_uncompiled_runs_agree(n, integrator):
     scene = PolygonSystem(crowd(n), own(), integrator)
     compiled, plain = scene.run(4e-5), scene.run(4e-5, jit=False)

@@ -113,6 +113,12 @@ def loads(bodies, position):
     return STIFFNESS * np.maximum(0.0, -np.array(gaps))
 
 
+def run_of(together, bodies, until):
+    """The run of a System or Swarm; that of a System is at its end before it were compiled."""
+    options = {"jit": False} if together is System else {}
+    return together(bodies, laws(), fluid=WATER).run(until, **options)
+
+
 @pytest.mark.parametrize("together", [System, Swarm])
 @pytest.mark.parametrize("extra", [0, 12])
 @pytest.mark.parametrize(("slope", "apart"), [(45.0, 0.0), (45.0, -1e-4), (30.0, 5e-6)])
@@ -124,7 +130,7 @@ def test_walls_that_meet_or_cross_share_a_weight_evenly(slope, apart, extra, tog
         wall((-1e-3, -1e-5 * k - 2e-4), (1e-3, 1e-5 * k - 2e-4), radius=THIN) for k in range(extra)
     ]
     bodies = [*walls, *below, disc]
-    run = together(bodies, laws(), fluid=WATER).run(5.0)
+    run = run_of(together, bodies, 5.0)
     assert run.status == Status.FINISHED
     expected = 9.81 * disc.buoyant_mass(WATER) / (2.0 * math.cos(math.radians(slope)))
     found = loads(bodies, run.position[-1])
@@ -169,7 +175,7 @@ def test_a_rough_floor_of_discs_that_overlap_carries_as_its_two_next_ones_do(cou
     height = math.sqrt((DISC + R) ** 2 - (0.5 * step) ** 2)
     disc = Body(Sphere(DISC), (0.5 * step, height + 1e-8), density=2650.0)
     for together in (System, Swarm):
-        run = together([*row, disc], laws(), fluid=WATER).run(5.0)
+        run = run_of(together, [*row, disc], 5.0)
         assert run.status == Status.FINISHED
         away = run.position[-1, :-1, :2] - run.position[-1, -1, :2]
         pushed = STIFFNESS * np.maximum(0.0, DISC + R - np.hypot(*away.T))

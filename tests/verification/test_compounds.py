@@ -16,8 +16,9 @@ WATER = Fluid(buoyancy=True)
 CONTACT = Contact(k_n=20.0, k_t=5.0)
 
 
-def finished(system, until, **options):
-    """The run of a system, which comes to its end."""
+def finished(system, until):
+    """The run of a System or Swarm; that of a System is at its end before it were compiled."""
+    options = {"jit": False} if isinstance(system, System) else {}
     found = system.run(until, **options)
     assert found.status == Status.FINISHED
     return found

@@ -14,6 +14,7 @@ from benchmarks.stability.families import FAMILIES, case_of, family_of
 from benchmarks.stability.spheres import bounce, resting_overlap, settle
 from benchmarks.stability.verdict import judge
 from flocsim.integrators import Status
+from tests.helpers.tiers import rest_slow
 from tests.reference.closed_forms import impact
 
 LONG = 600
@@ -37,7 +38,7 @@ def assert_right_or_typed(index):
     assert verdict.kind != "typed" or verdict.detail.split()[0] in TYPED
 
 
-@pytest.mark.parametrize("index", SHORT)
+@pytest.mark.parametrize("index", rest_slow(SHORT, lambda index: index < 50))
 def test_cases_of_few_scenes(index):
     assert_right_or_typed(index)
 

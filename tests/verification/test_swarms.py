@@ -102,6 +102,7 @@ def encounter(a, b, rng):
     return np.concatenate([a, b + [way, offset]])
 
 
+@pytest.mark.slow
 def test_clusters_of_ballistic_encounters_have_their_fractal_dimension():
     """1.49 +- .03: equal clusters of sticking discs that meet on straight lines."""
     rng, levels, many = np.random.default_rng(3), 8, 60

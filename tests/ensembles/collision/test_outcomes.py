@@ -477,6 +477,7 @@ def studies(tmp_path_factory):
     }
 
 
+@pytest.mark.slow
 def test_a_miss_is_one_for_every_method(studies):
     words = [
         [OUTCOMES[study.run(0, n, share, k)["outcome"]]

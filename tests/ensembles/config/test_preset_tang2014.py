@@ -12,6 +12,7 @@ import pytest
 from flocsim.ensembles.config.loader import lay_over, load_config
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import ROOT, problems
+from tests.helpers.tiers import rest_slow
 
 FOLDER = ROOT / "examples" / "tang2014"
 READINGS = tomllib.loads((FOLDER / "readings.toml").read_text("utf-8"))
@@ -39,7 +40,7 @@ def test_a_reading_is_another_config(name):
 
 
 @pytest.mark.parametrize(
-    ("vertices", "animations"), [("1,4", 0), pytest.param("1,64", 1, marks=pytest.mark.slow)]
+    ("vertices", "animations"), rest_slow([("1,4", 0), ("1,64", 1)], lambda *_: False)
 )
 def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     words = ["--replicates", "4", "--swarms", "1", "--vertices", vertices]

@@ -1,6 +1,7 @@
 """From points to capture widths and kernels: rows that are made up, and runs of spheres."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from flocsim.ensembles.runner import run
 from flocsim.io.results.kernel_group import ESTIMATES, WHAT
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.kernel_study import kernel_config
+from tests.helpers.tiers import rest_slow
 
 BARE = "[forces]\nvan_der_waals = false\ndouble_layer = false"
 
@@ -119,9 +121,20 @@ def test_flips_change_rates_by_their_weight_and_with_their_sign(tmp_path, meetin
 UNDECIDED = OUTCOMES.index("undecided")
 
 
-@pytest.mark.parametrize(("meeting", "rate"), CASES)
-@pytest.mark.parametrize("share", [0.01, 0.05, 0.2, 0.6, 1.0])
-@pytest.mark.parametrize("which", ["any", "captures", "misses", "touched"])
+SHARES = (0.01, 0.05, 0.2, 0.6, 1.0)
+WHICH = ("any", "captures", "misses", "touched")
+
+
+def is_in_turn(meeting, rate, share, which):
+    """Each share of each selection, in one of the meetings."""
+    number = SHARES.index(share) + WHICH.index(which)
+    return CASES[number % len(CASES)] == (meeting, rate)
+
+
+@pytest.mark.parametrize(
+    ("meeting", "rate", "share", "which"),
+    rest_slow(((*case, *more) for case in CASES for more in product(SHARES, WHICH)), is_in_turn),
+)
 def test_the_unknown_cannot_leave_the_interval(tmp_path, meeting, rate, share, which):
     """Whatever points are undecided or have failed, and whatever they would have come to."""
     scene = "" if meeting == "settling" else f"rate = {rate}"
@@ -167,6 +180,7 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     assert told["beta2_change_low"] < -0.9 * found.values["beta2"]
 
 
+@pytest.mark.slow
 def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
     """The same points, some of them without the steps that they need."""
     about = {"preset": "tang2014", "meeting": '["shear"]', "scene": 'rate = "10 1/s"',
@@ -203,6 +217,7 @@ def test_intervals_are_students_of_the_scrambles():
     assert flow_width(4.0, 1.0) == 4.0
 
 
+@pytest.mark.slow
 def test_intervals_cover_what_they_say(tmp_path):
     covered = []
     for seed in range(60):

@@ -13,6 +13,7 @@ from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config
 from tests.helpers.synthetic_results import bonds_of
+from tests.helpers.tiers import rest_slow
 
 RULE = {"half_width": 0.12, "least": 10}
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 300}
@@ -80,7 +81,7 @@ def ended_at(outcome, stop):
     return next(look for look in borders(stop, len(outcome)) if rule(look) or look == len(outcome))
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("share", rest_slow([0.1, 0.5, 0.8], lambda share: share == 0.8))
 def test_intervals_of_a_study_that_was_ended_still_cover(share):
     rng = np.random.default_rng(11)
     stop = StopConfig(half_width=0.08)

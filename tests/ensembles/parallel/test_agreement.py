@@ -27,6 +27,7 @@ from tests.helpers.small_study import (
     write_small,
     write_star_library,
 )
+from tests.helpers.tiers import rest_slow
 
 HERE = Facts({"seed": 1, "kernels.spheres": "ab", "code": "cd"}, {"version of numpy": "2.0"}, "n0")
 
@@ -133,7 +134,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("other", rest_slow(OTHERS, lambda other: other in (OTHERS[0], OTHERS[-1])))
 def test_ranks_with_other_words_are_refused(tmp_path, other):
     write_small(tmp_path, vertices="[1]")
     done = mixed(tmp_path, ["small.toml"], ["small.toml", *other])
@@ -168,7 +169,7 @@ if os.environ.get("FLOCSIM_EDIT"):
 """A module that edits the config and the user's modules as soon as they have been read."""
 
 
-@pytest.mark.parametrize("ranks", [None, 2])
+@pytest.mark.parametrize("ranks", rest_slow([None, 2], lambda ranks: False))
 def test_files_that_are_edited_during_the_start_are_read_once(tmp_path, ranks):
     path = write_own(tmp_path)
     before = path.read_text()

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import pytest
@@ -28,6 +28,7 @@ from flocsim.io.results import row_file
 from flocsim.io.results.row_file import RowFile, new_row_file, shared_row_file
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import mpirun, problems, run_command
+from tests.helpers.tiers import rest_slow
 
 REPLICATES = 12_000
 """Of ten conditions: four blocks, the last one short."""
@@ -113,8 +114,13 @@ def by_one_rank(folders, tmp_path_factory):
     return assemble(copied(folders["new file"], tmp_path_factory.mktemp("one")), 1)[0]
 
 
-@pytest.mark.parametrize("name", ["new file", "extended file"])
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize(
+    ("name", "ranks"),
+    rest_slow(
+        product(["new file", "extended file"], [1, 2, 3, 4, 7]),
+        lambda name, ranks: ranks in ((1, 7) if name == "new file" else (3,)),
+    ),
+)
 def test_any_number_of_ranks_writes_the_same_file(
     folders, reference, by_one_rank, tmp_path, name, ranks
 ):
@@ -149,7 +155,7 @@ def test_parts_make_up_the_whole():
         assert all(first < stop for first, stop in found)
 
 
-@pytest.mark.parametrize("words", [["--jobs", 3], [], None])
+@pytest.mark.parametrize("words", rest_slow([["--jobs", 3], [], None], bool))
 def test_the_command_writes_the_same_bytes(folders, reference, tmp_path, words):
     folder = copied(folders["extended file"], tmp_path)
     more = {"ranks": 3} if words == [] else {}
@@ -290,7 +296,11 @@ def test_a_signal_ends_it_and_leaves_nothing_behind(folders, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("new file", "mpirun -n 2"), ("extended file", "--jobs 2")]
+    ("name", "kind"),
+    [
+        pytest.param("new file", "mpirun -n 2", marks=pytest.mark.slow),
+        ("extended file", "--jobs 2"),
+    ],
 )
 def test_a_kill_while_the_file_is_made_loses_nothing(folders, reference, name, kind):
     if kind.startswith("mpirun"):
@@ -315,6 +325,7 @@ for path in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_readers_of_a_large_file_take_no_more_memory_than_of_a_small_one(reference, tmp_path):
     large = finish_here(write_study(tmp_path, 5 * REPLICATES))
     done = subprocess.run(

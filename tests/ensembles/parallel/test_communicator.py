@@ -27,6 +27,7 @@ from tests.helpers.small_study import (
     run_command,
     write_small,
 )
+from tests.helpers.tiers import rest_slow
 
 LAUNCHER = (*communicator.LAUNCHER_SIZES, *communicator.LAUNCHER_RANKS)
 
@@ -46,7 +47,7 @@ def unexpected(errors):
     return errors.splitlines()
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", rest_slow([1, 2, 3], lambda ranks: ranks == 3))
 def test_any_number_of_ranks_gives_the_same_bytes(serial, ranks):
     name = f"ranks{ranks}.h5"
     done = run_command(serial, "small.toml", "--output", name, ranks=ranks)
@@ -67,6 +68,7 @@ sys.exit(code)
 """
 
 
+@pytest.mark.slow
 def test_without_threads_in_mpi_rank_0_answers_between_two_replicates(serial):
     env = os.environ | {"MPI4PY_RC_THREAD_LEVEL": "funneled"}
     done = run_command(serial, "small.toml", "--output", "slow.h5", "--quiet", ranks=3, env=env)
@@ -74,7 +76,7 @@ def test_without_threads_in_mpi_rank_0_answers_between_two_replicates(serial):
     assert same_data(serial / "slow.h5", serial / "serial.h5") == []
 
 
-@pytest.mark.parametrize("jobs", [2, 3])
+@pytest.mark.parametrize("jobs", rest_slow([2, 3], lambda jobs: False))
 def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
     name = f"jobs{jobs}.h5"
     done = run_command(serial, "small.toml", "--output", name, "--jobs", jobs)
@@ -174,6 +176,7 @@ FAILS_SOON = FAILS_LATE.replace('"halted" in more', "True")
 """A rank 1 that fails at once, while rank 0 compiles."""
 
 
+@pytest.mark.slow
 def test_a_rank_that_fails_while_another_compiles_does_not_wait_for_it(tmp_path):
     with_force(tmp_path, FAILS_SOON, "Late")
     write_small(tmp_path, (tmp_path / "small.toml").read_text(), vertices="[1, 4]")
@@ -203,7 +206,10 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("words", "changes", "code", "said"), WRONG)
+@pytest.mark.parametrize(
+    ("words", "changes", "code", "said"),
+    rest_slow(WRONG, lambda words, changes, code, said: said == "scene.types" or code == 74),
+)
 def test_what_is_wrong_is_said_by_one_rank_in_one_line(tmp_path, words, changes, code, said):
     write_small(tmp_path, **changes)
     done = run_command(tmp_path, *words, ranks=2, timeout=60)
@@ -227,7 +233,7 @@ AFTER_CTRL_C = {
 sends SIGTERM on, Intel's is a shell script, which the signal ends once its job has ended."""
 
 
-@pytest.mark.parametrize("ranks", [None, 2])
+@pytest.mark.parametrize("ranks", rest_slow([None, 2], bool))
 def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
     words = ["small.toml", "--replicates", "100000", "--output", f"late{ranks}.h5"]
     job = subprocess.Popen(
@@ -263,6 +269,7 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
     assert same_data(serial / f"late{ranks}.h5", serial / "serial.h5") == []
 
 
+@pytest.mark.slow
 def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):
     text = SMALL + '[forces.mine]\nclass = "mine:Yukawa"\nstrength = "1 nN"\nlength = "1 um"\n'
     write_small(tmp_path, text, vertices="[1]", types='["III"]', delta="[0.0]")

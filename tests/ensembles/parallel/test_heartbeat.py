@@ -20,6 +20,7 @@ from flocsim.ensembles.parallel.heartbeat import (
 )
 from flocsim.io.journal.records import CHUNK, Record, scan
 from tests.helpers.small_study import command, mpirun, problems, run_command, write_small
+from tests.helpers.tiers import rest_slow
 
 
 class Wire(Communicator):
@@ -161,7 +162,10 @@ def rows_in(path):
 
 @pytest.mark.parametrize(
     ("ranks", "words", "frozen"),
-    [(3, [], 1), (2, [], 0), (None, ["--jobs", "2"], 1), (None, ["--jobs", "2"], 0)],
+    rest_slow(
+        [(3, [], 1), (2, [], 0), (None, ["--jobs", "2"], 1), (None, ["--jobs", "2"], 0)],
+        lambda ranks, words, frozen: not ranks and frozen == 1,
+    ),
 )
 def test_a_frozen_rank_ends_the_job_which_keeps_its_rows(tmp_path, ranks, words, frozen):
     if ranks:
@@ -222,6 +226,7 @@ class Busy(CentreForce):
 """
 
 
+@pytest.mark.slow
 def test_a_rank_that_is_busy_for_longer_is_not_taken_for_frozen(tmp_path):
     (tmp_path / "busy.py").write_text(BUSY)
     text = '[forces.busy]\nclass = "busy:Busy"\n'

@@ -49,6 +49,7 @@ def test_the_file_has_the_choice_and_its_rows_are_of_it(first):
     assert same_rows(found, read_results(folder / "fixed.h5"))
 
 
+@pytest.mark.slow
 def test_two_ranks_choose_and_compute_the_same(first):
     folder, found = first
     text = "\n".join([

@@ -10,6 +10,7 @@ import pytest
 from benchmarks.faults import damage, damage_cache
 from benchmarks.faults.job import Job, Tally, errors_of, make_study, run_here, verdict
 from tests.helpers.small_study import mpirun, problems
+from tests.helpers.tiers import rest_slow
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,10 @@ def job(folder, kind):
 
 @pytest.mark.parametrize(
     ("kind", "target"),
-    [("mpirun -n 2", "rank"), ("mpirun -n 3", "launcher"), ("--jobs 2", "group")],
+    rest_slow(
+        [("mpirun -n 2", "rank"), ("mpirun -n 3", "launcher"), ("--jobs 2", "group")],
+        lambda kind, target: False,
+    ),
 )
 def test_a_kill_costs_nothing_that_was_finished(root, reference, kind, target):
     folder = make_study(root / f"kill {kind} {target}")
@@ -48,7 +52,10 @@ def test_a_kill_costs_nothing_that_was_finished(root, reference, kind, target):
 
 @pytest.mark.parametrize(
     ("kind", "sign"),
-    [("serial", signal.SIGTERM), ("mpirun -n 2", signal.SIGUSR1), ("--jobs 2", signal.SIGINT)],
+    rest_slow(
+        [("serial", signal.SIGTERM), ("mpirun -n 2", signal.SIGUSR1), ("--jobs 2", signal.SIGINT)],
+        lambda kind, sign: kind == "serial",
+    ),
 )
 def test_a_signal_ends_with_75_and_a_journal(root, reference, kind, sign):
     folder = make_study(root / f"signal {kind}")
@@ -61,7 +68,9 @@ def test_a_signal_ends_with_75_and_a_journal(root, reference, kind, sign):
     assert verdict(folder, reference) == ""
 
 
-@pytest.mark.parametrize(("kind", "size"), [("serial", 60_000), ("--jobs 2", 500)])
+@pytest.mark.parametrize(
+    ("kind", "size"), [("serial", 60_000), pytest.param("--jobs 2", 500, marks=pytest.mark.slow)]
+)
 def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
     folder = make_study(root / f"disk {kind} {size}")
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))  # noqa: E731
@@ -74,12 +83,13 @@ def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
     assert verdict(folder, reference) == ""
 
 
+@pytest.mark.slow
 def test_every_damage_is_found_and_nothing_wrong_is_believed(root, reference, monkeypatch):
     monkeypatch.setattr(damage, "WHOLE_RERUNS", 3)
     rng = np.random.default_rng(2)
-    tallies = damage.damage_journal(root, reference, 60, rng)
-    tallies |= damage.damage_results(root, reference, 100, rng)
-    assert sum(tally.faults for tally in tallies.values()) == 160
+    tallies = damage.damage_journal(root, reference, 25, rng)
+    tallies |= damage.damage_results(root, reference, 35, rng)
+    assert sum(tally.faults for tally in tallies.values()) == 60
     assert [problem for tally in tallies.values() for problem in tally.wrong] == []
 
 

@@ -23,6 +23,7 @@ from flocsim.io.journal.records import CHUNK
 from tests.ensembles.storage.test_resume import stop_after
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, small_config
+from tests.helpers.tiers import rest_slow
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
 FEWER = [
@@ -80,7 +81,7 @@ def rows_in(path):
     return sum(each.description["count"] for each in journal.records if each.kind == CHUNK)
 
 
-@pytest.mark.parametrize("fewer", FEWER)
+@pytest.mark.parametrize("fewer", rest_slow(FEWER, lambda fewer: fewer == FEWER[0]))
 def test_results_with_more_than_is_asked_for_stay_and_the_rest_is_reported(
     finished, whole, fewer, tmp_path_factory
 ):
@@ -115,7 +116,7 @@ def test_results_that_have_more_of_one_thing_and_less_of_another_are_refused(
     assert names(finished) == ["r.h5"]
 
 
-@pytest.mark.parametrize("fewer", FEWER)
+@pytest.mark.parametrize("fewer", rest_slow(FEWER, lambda fewer: fewer == FEWER[-1]))
 def test_a_journal_with_more_than_is_asked_for_stays(
     stopped, whole, fewer, tmp_path_factory, capsys
 ):
@@ -215,7 +216,7 @@ def test_results_that_are_written_to_while_they_are_extended_are_not_believed(
     assert names(finished) == ["r.h5"]
 
 
-@pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
+@pytest.mark.parametrize("mode", rest_slow([NEW, RESUME, RESTART], lambda mode: mode == RESUME))
 def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, whole, monkeypatch, mode):
     with monkeypatch.context() as patch:
         # As a kill leaves it while the kernels are compiled, of another study even.

@@ -9,6 +9,7 @@ import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.studies.elasticity import elasticities
 from flocsim.ensembles.studies.study import Study
+from tests.helpers import parts_here
 from tests.helpers.small_study import write_small
 
 KEYS = ("forces.contact.k_n", "forces.van_der_waals.hamaker")
@@ -18,10 +19,11 @@ KEYS = ("forces.contact.k_n", "forces.van_der_waals.hamaker")
 def config(tmp_path_factory):
     """A study of few replicates."""
     folder = tmp_path_factory.mktemp("elasticity")
-    return write_small(folder, replicates=6, types='["III"]', delta="[0.0]", vertices="[4]", pool=2)
+    return write_small(folder, replicates=6, types='["III"]', delta="[0.0]", vertices="[1]")
 
 
-def test_an_elasticity_is_the_paired_difference_over_the_logarithm(config, tmp_path):
+def test_an_elasticity_is_the_paired_difference_over_the_logarithm(config, tmp_path, monkeypatch):
+    parts_here.use(monkeypatch)
     found = elasticities(Study(config), KEYS, tmp_path / "e.png", ratio=4.0)
     assert found.keys == KEYS and found.value.shape == (2, 1, 1, 1)
     for k, key in enumerate(KEYS):
@@ -37,7 +39,10 @@ def test_an_elasticity_is_the_paired_difference_over_the_logarithm(config, tmp_p
     assert KEYS[0] in found.table()
 
 
-def test_the_command_prints_a_table_writes_a_figure_and_goes_on(config, tmp_path, capsys):
+def test_the_command_prints_a_table_writes_a_figure_and_goes_on(
+    config, tmp_path, monkeypatch, capsys
+):
+    parts_here.use(monkeypatch)
     words = ["sweep", str(config), "--elasticities", KEYS[0], "-o", str(tmp_path / "f.svg")]
     assert main(words) == 0
     told = capsys.readouterr().out

@@ -16,6 +16,7 @@ from flocsim.__main__ import main
 from flocsim.errors import FileError, FlocsimError, UsageError
 from tests.helpers import parts_here
 from tests.helpers.small_study import write_small, write_star_library
+from tests.helpers.tiers import rest_slow
 
 HAMAKER = "forces.van_der_waals.hamaker"
 OWN = """\
@@ -75,8 +76,14 @@ def edit_library(folder):
     os.replace(folder / "new.h5", folder / "stars.h5")
 
 
-@pytest.mark.parametrize("at", [0, 1, 2])
-@pytest.mark.parametrize(("edit", "ratios"), [(edit_module, None), (edit_library, (8.0, 16.0))])
+EDITS = [(edit_module, None, at) for at in (0, 1, 2)]
+EDITS += [(edit_library, (8.0, 16.0), at) for at in (0, 1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("edit", "ratios", "at"),
+    rest_slow(EDITS, lambda edit, ratios, at: at == (2 if edit is edit_module else 1)),
+)
 def test_an_edit_ends_the_sweep_before_its_next_part(edits, edit, ratios, at):
     folder, done = edits
     study = write_study(folder, ratios=ratios)
@@ -132,7 +139,7 @@ BETWEEN = ("nothing", "parts gone", "one replaced", "one gone", "plan gone")
 
 
 @pytest.mark.parametrize(
-    "examples", [pytest.param(6, id="few"), pytest.param(60, marks=pytest.mark.slow, id="many")]
+    "examples", [pytest.param(2, id="few"), pytest.param(60, marks=pytest.mark.slow, id="many")]
 )
 def test_two_sweeps_one_upon_the_other_have_right_labels(monkeypatch, examples):
     parts_here.use(monkeypatch)

@@ -195,7 +195,9 @@ def start(folder, *words):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGKILL, marks=pytest.mark.slow), signal.SIGTERM]
+)
 def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
     finished, tmp_path, monkeypatch, capsys, number
 ):
@@ -236,6 +238,7 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
         assert both == [part.described() for part in whole if part.of == "moment"]
 
 
+@pytest.mark.slow
 def test_ranks_change_no_byte(finished, tmp_path):
     write_swarm_study(tmp_path)
     with start(tmp_path, "--jobs", "3", "--quiet") as process:

@@ -14,6 +14,7 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.resize import resized
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, covers, cross, drawn, framed, lace
+from tests.helpers.tiers import rest_slow
 
 
 def lens(r, s, apart):
@@ -63,7 +64,7 @@ def polar(region):
     return total
 
 
-@pytest.mark.parametrize("make", MAKERS)
+@pytest.mark.parametrize("make", rest_slow(MAKERS, lambda make: make is not lace))
 def test_area_is_a_count_of_points(make):
     found = make()
     reach, count = found.bounding_radius, 900

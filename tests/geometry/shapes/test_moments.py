@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of, inside_polygon
 from flocsim.geometry.shapes.moments import area_and_growth, swept_moments
 from flocsim.geometry.shapes.parts import Part
+from tests.helpers.tiers import rest_slow
 from tests.reference.outline import area_centroid_inertia
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, convex, spiral, star
@@ -51,7 +52,9 @@ def test_convex_outlines_obey_steiner(count, radius):
     assert swept_moments(core, radius)[0] == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("make_core", [convex, star, c_shape, spiral])
+@pytest.mark.parametrize(
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+)
 @given(seed=st.integers(0, 40), radius=st.floats(0.02, 0.4))
 def test_the_area_grows_with_the_radius_by_the_length_of_the_outline(make_core, seed, radius):
     core = random_core(make_core, np.random.default_rng(seed))
@@ -99,7 +102,9 @@ def test_a_hole_that_the_sweep_fills_is_gone():
     assert area == pytest.approx(filled - dip, rel=1e-12)
 
 
-@pytest.mark.parametrize("make_core", [convex, star, c_shape, spiral])
+@pytest.mark.parametrize(
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+)
 @given(seed=st.integers(0, 50), scale=st.floats(1e-3, 1e3), angle=st.floats(-7.0, 7.0))
 def test_scaling_turning_and_moving(make_core, seed, scale, angle):
     core = random_core(make_core, np.random.default_rng(seed))

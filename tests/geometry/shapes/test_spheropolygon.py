@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from flocsim import SpheroPolygon
 from flocsim.errors import ShapeError
+from tests.helpers.tiers import rest_slow
 from tests.reference.outline import area_centroid_inertia
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, convex, spiral, star
@@ -45,7 +46,9 @@ def test_what_makes_no_body_is_refused_in_one_line(case):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("make_core", [convex, star, c_shape, spiral])
+@pytest.mark.parametrize(
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+)
 @given(seed=st.integers(0, 30), radius=st.floats(0.3e-6, 4e-6))
 def test_moments_agree_with_the_reference(make_core, seed, radius):
     core = 1e-5 * random_core(make_core, np.random.default_rng(seed))

@@ -208,6 +208,7 @@ def test_the_jacobian_has_their_derivatives():
     assert np.all(abs(stiffness - found) < 0.02 * scale)
 
 
+@pytest.mark.slow
 def test_two_flocs_fall_together_and_stay():
     one, other = rough(8, SIZE, 7), rough(8, SIZE, 8)
     forces = [Gravity(), StokesDrag(), VanDerWaals(4.7e-20, law="outline"), Contact(20.0, 2.0)]

@@ -1,5 +1,7 @@
 """Figures show the numbers of the results, and say where there are none."""
 
+from itertools import product
+
 import attrs
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from flocsim.io.plots.results import FEW, FIGURES, against_size, figure_4, figur
 from flocsim.io.plots.style import save
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
+from tests.helpers.tiers import rest_slow
 
 OF_COLLISIONS = ("4", "5", "6", "8", "bonds", "delta", "overview")
 """Figures that have nothing to show where bodies miss each other."""
@@ -161,7 +164,9 @@ def test_a_panel_without_events_says_so():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", OF_COLLISIONS)
+@pytest.mark.parametrize(
+    "name", rest_slow(OF_COLLISIONS, lambda name: name in ("4", "8", "overview"))
+)
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
     assert name == "outcomes" or all("no " in texts(axes) for axes in figure.axes)
@@ -180,18 +185,22 @@ def test_many_vertex_counts_are_thinned_but_keep_both_ends():
     assert sum(map(bool, labels)) <= 9
 
 
+CONDITIONS = [
+    {"types": ("I",), "vertices": (1,), "delta": (0.0,)},
+    {"types": ("16.4/23 µm", "a$\\b$", "II", "III"), "vertices": (4, 5, 7)},
+    {"delta": tuple(np.linspace(0.0, 1.0, 12)), "types": ("I", "II")},
+]
+
+
+def is_next(number, name):
+    """One of the conditions for each figure, in turns."""
+    return list(FIGURES).index(name) % 3 == number
+
+
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("name", FIGURES)
-@pytest.mark.parametrize(
-    "conditions",
-    [
-        {"types": ("I",), "vertices": (1,), "delta": (0.0,)},
-        {"types": ("16.4/23 µm", "a$\\b$", "II", "III"), "vertices": (4, 5, 7)},
-        {"delta": tuple(np.linspace(0.0, 1.0, 12)), "types": ("I", "II")},
-    ],
-)
-def test_any_number_of_conditions_can_be_drawn(name, conditions, tmp_path):
-    results = make_results(**conditions, count=5)
+@pytest.mark.parametrize(("number", "name"), rest_slow(product(range(3), FIGURES), is_next))
+def test_any_number_of_conditions_can_be_drawn(name, number, tmp_path):
+    results = make_results(**CONDITIONS[number], count=5)
     figure = FIGURES[name](results)
     save(figure, tmp_path / "figure.svg")
     if name in OF_COLLISIONS or name == "size":  # others need not have a panel for each type

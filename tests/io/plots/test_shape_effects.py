@@ -60,6 +60,7 @@ def test_one_value_explains_no_variance():
     assert found.measure == pytest.approx([0.5])
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_share_95_times_in_100():
     held = 0
     for seed in range(300):

@@ -13,6 +13,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.ensembles.pairs import contents
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import read_sealed, seal
 from flocsim.io.results import older
@@ -21,9 +22,11 @@ from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES, TABLE
 from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 STORED = Path(__file__).parents[2] / "data"
 EVERY = (*older.VERSIONS, SCHEMA_VERSION)
+ENDS = EVERY[0], EVERY[-1]
 
 
 @pytest.fixture
@@ -92,14 +95,16 @@ def test_its_numbers_are_those_that_it_holds_and_the_rest_is_blank(stored, versi
     assert read_row(path, (1, 1, 0, 3))["steps"] == found.replicates["steps"][1, 1, 0, 3]
 
 
-@pytest.mark.parametrize("version", EVERY)
-def test_commands_read_it(stored, version, capsys):
+@pytest.mark.parametrize("version", rest_slow(EVERY, lambda version: version in ENDS))
+def test_commands_read_it(stored, version, monkeypatch, capsys):
     stored(version)
+    few = {name: contents.FIGURES[name] for name in ("4", "shape")}
+    monkeypatch.setattr(contents, "FIGURES", few)
     name = f"r{version}.h5"
     for command in (
         ["info", name],
         ["info", name, "--config"],
-        ["plot", name, "--figures", "4,overview"],
+        ["plot", name],
         ["report", name],
     ):
         assert main(command) == 0, command
@@ -111,7 +116,7 @@ def test_commands_read_it(stored, version, capsys):
         opened.replicate(0)
 
 
-@pytest.mark.parametrize("version", older.VERSIONS)
+@pytest.mark.parametrize("version", rest_slow(older.VERSIONS, lambda version: version == 2))
 def test_it_is_compared_with_a_file_of_now_by_its_rows(stored, version, capsys):
     stored(version), stored(SCHEMA_VERSION)
     assert main(["compare", f"r{version}.h5", f"r{SCHEMA_VERSION}.h5"]) == 0
@@ -120,7 +125,7 @@ def test_it_is_compared_with_a_file_of_now_by_its_rows(stored, version, capsys):
     assert flocsim.open(f"r{version}.h5").to_xarray("replicates").sizes["replicate"] == 8
 
 
-@pytest.mark.parametrize("version", EVERY)
+@pytest.mark.parametrize("version", rest_slow(EVERY, lambda version: version in ENDS))
 def test_it_is_not_extended_and_one_line_says_what_differs(stored, version, capsys, tmp_path):
     path = stored(version)
     before = path.read_bytes()
