@@ -186,14 +186,16 @@ def write_squares(scene, work, state, one, two):
     t_n, t_t, t_s = 0.0, 0.0, 0.0
     if near < 1.0:
         write_relative(scene, work, CENTRES, place, 1.0 - near, along, across)
-        t_n, t_t, t_s = pull_at(scene, place, (1.0 - near) * distance / (sizes + gap))
+        t_n, t_t, t_s = pull_at(scene, place, (1.0 - near) * distance / max(sizes, distance))
     else:
         write_nothing(work, CENTRES, 3)
     if near > 0.0:
         gap = max(outlines, floor)
         place = interval_of(scene, gap)
         write_relative(scene, work, OUTLINES, place, near, along, across)
-        more_n, more_t, more_s = pull_at(scene, place, near * distance / (sizes + gap))
+        more_n, more_t, more_s = pull_at(
+            scene, place, near * distance / (sizes + max(outlines, 0.0))
+        )
         t_n, t_t, t_s = t_n + more_n, t_t + more_t, t_s + more_s
         if outlines > floor:
             interval, share = place
