@@ -222,12 +222,15 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     FLOW,  # from here on: Fluid.flow
 ) = range(6)
 
-WATER_SIZE = FLOW + 6
+FIRST_RADIUS = FLOW + 6
+"""And behind it, of either body, the radius of the sphere that has its drag [m]."""
+
+WATER_SIZE = FIRST_RADIUS + 2
 
 TABLE_COLUMNS = 20
 """Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair_table.COLUMNS."""
 
-SQUARES = 9
+SQUARES = 6
 """Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a
 strain pulls at them with."""
 

@@ -2,10 +2,10 @@
 
 The resistance is a sum of squares (hydrodynamics/pair_table.py), each of a sum of the velocities of
 both bodies: three of common motion, at the distance of the centres, and three of relative motion,
-at the gap of the outlines, at that of the equivalent spheres, or at both with a share each. So it
-is positive whatever the shapes. All are along and across the line of centres: the normal of the
-nearest points jumps from one arm of a floc to the next while the gap is still wide, at 16 times the
-steps. Body 1 of the tables is the earlier one of a pair.
+at a gap between that of the outlines and that of spheres of the same drag. So it is positive
+whatever the shapes. All are along and across the line of centres: the normal of the nearest points
+jumps from one arm of a floc to the next while the gap is still wide, at 16 times the steps. Body 1
+of the tables is the earlier one of a pair.
 """
 
 import math
@@ -29,8 +29,13 @@ from flocsim.integrators.rhs.views import add_force, centre_line
 LOAD = 6
 """Column of ``Work.squares`` behind those of the velocities (v_x, v_y, spin) of both bodies."""
 
-COMMON, CENTRES, OUTLINES, PULL = 0, 3, 6, at.SQUARES
-"""First rows of ``Work.squares`` of the three parts, and the row of what a strain pulls with."""
+COMMON, RELATIVE, PULL = 0, 3, at.SQUARES
+"""First rows of ``Work.squares`` of the two parts, and the row of what a strain pulls with."""
+
+LEAN, LEAN_FALLS, LEAN_MOST = 1.5, 0.9, 0.8
+"""By what a relative gap lies from that of the outlines towards that of the spheres, how that falls
+with the gap, and by how many mean radii the two may differ in it: fitted to rigid multiblobs of 160
+pairs of real flocs at .25 to 3 mean radii (benchmarks/accuracy/water_pairs.py)."""
 
 SPHERE_DRAG, SPHERE_TURN = 6.0 * math.pi, 8.0 * math.pi
 """Of a sphere in slow flow, over µ r and µ r³."""
@@ -122,21 +127,20 @@ def write_common(scene, work, state, one, two, nx, ny, place):
         add_flow(scene, work, row, state, one, two)
 
 
-def write_relative(scene, work, first, place, weight, normal, tangent):
-    """The squares of relative motion, times √weight, of the directions along which the gap opens
-    and the bodies slide."""
+def write_relative(scene, work, place, normal, tangent):
+    """The squares of relative motion, of the directions along which the gap opens and the bodies
+    slide."""
     interval, share = place
-    root = math.sqrt(weight)
-    opens = root * column(scene, interval, share, GAP)
-    slides = root * column(scene, interval, share, SLIDE)
-    mixed = root * column(scene, interval, share, MIXED)
-    turns = root * column(scene, interval, share, TURN)
+    opens = column(scene, interval, share, GAP)
+    slides = column(scene, interval, share, SLIDE)
+    mixed = column(scene, interval, share, MIXED)
+    turns = column(scene, interval, share, TURN)
     (n_1, n_2), (t_1, t_2) = normal, tangent
-    write_row(work, first, scaled(n_1, opens), scaled(n_2, opens), 0.0)
+    write_row(work, RELATIVE, scaled(n_1, opens), scaled(n_2, opens), 0.0)
     x, y, spin = scaled(t_1, slides)
     x_2, y_2, spin_2 = scaled(t_2, slides)
-    write_row(work, first + 1, (x, y, spin - mixed), (x_2, y_2, spin_2 + mixed), 0.0)
-    write_row(work, first + 2, (0.0, 0.0, -turns), (0.0, 0.0, turns), 0.0)
+    write_row(work, RELATIVE + 1, (x, y, spin - mixed), (x_2, y_2, spin_2 + mixed), 0.0)
+    write_row(work, RELATIVE + 2, (0.0, 0.0, -turns), (0.0, 0.0, turns), 0.0)
 
 
 def scaled(entries, size):
@@ -144,28 +148,36 @@ def scaled(entries, size):
     return size * x, size * y, size * spin
 
 
-def write_nothing(work, first, count):
-    for row in range(first, first + count):
-        write_row(work, row, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
-
-
 def centre_directions(scene, one, two, nx, ny, distance, gap):
     """(along, across) the line of centres, entries on both bodies: the gap's rate, and sliding
     where its middle is."""
-    radius_1 = scene.bodies[one, at.EQUIVALENT_RADIUS]
-    sum_ = radius_1 + scene.bodies[two, at.EQUIVALENT_RADIUS] + gap
+    radius_1 = water_radius(scene, one)
+    sum_ = radius_1 + water_radius(scene, two) + gap
     arm = distance * (radius_1 + 0.5 * gap) / sum_
     along = (-nx, -ny, 0.0), (nx, ny, 0.0)
     return along, ((ny, -nx, -arm), (-ny, nx, arm - distance))
 
 
-def outline_gap(scene, work, state):
-    """(the smooth gap of the outlines [m], its share in relative motion: none of far ones)."""
+def water_radius(scene, body):
+    """Of the sphere that has the body's drag [m]."""
+    return scene.water[at.FIRST_RADIUS + body]
+
+
+def relative_gap(scene, work, state, between):
+    """(the gap of two spheres that move against each other as the bodies do [m], how fast it grows
+    with the gap of the outlines), ``between`` being that of the spheres of their drag.
+
+    Far outlines are of no account, and at touch theirs is the gap.
+    """
+    spheres = max(between, 0.0)
     if work.tally[at.CANDIDATES] == 0:
-        return 0.0, 0.0
-    gap, _ = soften(scene, work, state, 0, work.tally[at.CANDIDATES])
-    weight, _ = fading(gap, scene.water[at.NEAR_CUT])
-    return gap, weight
+        return spheres, 0.0
+    found, _ = soften(scene, work, state, 0, work.tally[at.CANDIDATES])
+    near, _ = fading(found, scene.water[at.NEAR_CUT])
+    outlines, mean = max(found, 0.0), scene.water[at.MEAN_RADIUS]
+    lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
+    factor = math.exp(LEAN * mean / (mean + LEAN_FALLS * outlines) * lean)
+    return near * outlines * factor + (1.0 - near) * spheres, near * factor
 
 
 @apart
@@ -173,36 +185,23 @@ def write_squares(scene, work, state, one, two):
     """Write the resistance of two bodies to ``work.squares``: (the share of it that counts, by how
     much relative resistance along the gap of the outlines grows with that gap [N s/m²])."""
     nx, ny, distance = centre_line(scene, work, state, two, one)
-    sizes = scene.bodies[one, at.EQUIVALENT_RADIUS] + scene.bodies[two, at.EQUIVALENT_RADIUS]
+    sizes = water_radius(scene, one) + water_radius(scene, two)
     far, _ = fading(distance - sizes, scene.water[at.CUT])
     if far == 0.0:
         return 0.0, 0.0
     floor, slope = scene.water[at.FLOOR], 0.0
     gap = max(distance - sizes, floor)
-    place = interval_of(scene, gap)
-    write_common(scene, work, state, one, two, nx, ny, place)
-    outlines, near = outline_gap(scene, work, state)
+    write_common(scene, work, state, one, two, nx, ny, interval_of(scene, gap))
     along, across = centre_directions(scene, one, two, nx, ny, distance, gap)
-    t_n, t_t, t_s = 0.0, 0.0, 0.0
-    if near < 1.0:
-        write_relative(scene, work, CENTRES, place, 1.0 - near, along, across)
-        t_n, t_t, t_s = pull_at(scene, place, (1.0 - near) * distance / max(sizes, distance))
-    else:
-        write_nothing(work, CENTRES, 3)
-    if near > 0.0:
-        gap = max(outlines, floor)
-        place = interval_of(scene, gap)
-        write_relative(scene, work, OUTLINES, place, near, along, across)
-        more_n, more_t, more_s = pull_at(
-            scene, place, near * distance / (sizes + max(outlines, 0.0))
-        )
-        t_n, t_t, t_s = t_n + more_n, t_t + more_t, t_s + more_s
-        if outlines > floor:
-            interval, share = place
-            size = column(scene, interval, share, GAP)
-            slope = 2.0 * far * near * size * column_slope(scene, interval, share, GAP, gap)
-    else:
-        write_nothing(work, OUTLINES, 3)
+    found, grows = relative_gap(scene, work, state, distance - sizes)
+    gap = max(found, floor)
+    place = interval_of(scene, gap)
+    write_relative(scene, work, place, along, across)
+    t_n, t_t, t_s = pull_at(scene, place, distance / (sizes + found))
+    if found > floor:
+        interval, share = place
+        size = column(scene, interval, share, GAP)
+        slope = 2.0 * far * grows * size * column_slope(scene, interval, share, GAP, gap)
     e_nn, e_nt = strain_along(scene, nx, ny)
     t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
     (n_1, n_2), (a_1, a_2) = along, across
@@ -227,8 +226,8 @@ def pull_at(scene, place, size):
 
 
 def own_drag(scene, body):
-    """(of velocities, of the spin) Stokes drag of the equivalent sphere [N s/m, N m s]."""
-    radius, viscosity = scene.bodies[body, at.EQUIVALENT_RADIUS], scene.water[at.VISCOSITY]
+    """(of velocities, of the spin) Stokes drag of the sphere of its drag [N s/m, N m s]."""
+    radius, viscosity = water_radius(scene, body), scene.water[at.VISCOSITY]
     return SPHERE_DRAG * viscosity * radius, SPHERE_TURN * viscosity * radius**3
 
 
@@ -290,21 +289,21 @@ def add_pair_damping(scene, work):
             jacobian[at.DAMPING, body, 1, 1] -= far * drag
             jacobian[at.DAMPING, body, 2, 2] -= far * turn
         if slope != 0.0:
-            add_narrowing(work, blocks, slope, value_in(work, OUTLINES, at.NOW, one, two))
+            add_narrowing(work, blocks, slope, value_in(work, RELATIVE, at.NOW, one, two))
 
 
 def add_narrowing(work, blocks, slope, rate):
-    """Add that the resistance to the rate of the gap grows as it closes; row OUTLINES of the
+    """Add that the resistance to the rate of the gap grows as it closes; row RELATIVE of the
     squares is along the gap, ``rate`` what it comes to."""
     s = work.squares
-    size = s[OUTLINES, 3] * s[OUTLINES, 3] + s[OUTLINES, 4] * s[OUTLINES, 4]
+    size = s[RELATIVE, 3] * s[RELATIVE, 3] + s[RELATIVE, 4] * s[RELATIVE, 4]
     if size == 0.0:
         return
     weight = slope * rate / (size * math.sqrt(size))
     for half in range(4):
         for i in range(3):
             for j in range(3):
-                entry = s[OUTLINES, 3 * (half // 2) + i] * s[OUTLINES, 3 * (half % 2) + j]
+                entry = s[RELATIVE, 3 * (half // 2) + i] * s[RELATIVE, 3 * (half % 2) + j]
                 work.jacobian[at.STIFFNESS, blocks[half], i, j] += weight * entry
 
 
