@@ -181,7 +181,8 @@ def water_between(
         )
     water = np.zeros(at.WATER_SIZE)
     water[[at.VISCOSITY, at.MEAN_RADIUS, at.FLOOR]] = fluid.viscosity, mean, force.h_min
-    water[at.CUT], water[at.NEAR_CUT] = force.cut * 2.0 * mean, NEAR * mean
+    spheres = all(len(body.shape.vertices) == 1 for body in bodies)
+    water[at.CUT], water[at.NEAR_CUT] = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
     water[at.FLOW : at.FLOW + 6] = fluid.flow
     water[at.FIRST_RADIUS : at.FIRST_RADIUS + 2] = radii
     table = unit_table(second / first) * pair_table.scales(fluid.viscosity, mean)[:, None]

@@ -8,7 +8,7 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
-from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal
+from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal, VanDerWaals
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.swarms.swarm import Swarm
@@ -18,6 +18,7 @@ from tests.helpers.real_pairs import (
     Resistance,
     line_mobilities,
     multiblobs,
+    pose,
     random_pair,
     real_flocs,
     resized,
@@ -202,6 +203,17 @@ def test_turned_mirrored_and_exchanged_bodies_feel_the_same():
             np.testing.assert_allclose(other / size, found / size, atol=1e-6)
         other = loads(shapes[::-1], places[::-1], velocities[::-1], still)[::-1]
         np.testing.assert_allclose(other / size, found / size, atol=1e-6)
+
+
+def test_beside_forces_between_outlines_it_takes_their_gap():
+    rng, shapes = np.random.default_rng(8), [SpheroPolygon(L_SHAPE, 1e-6), Sphere(4e-6)]
+    nothing = VanDerWaals(1e-40, gap="surface", cut=1e-4)
+    for _ in range(6):
+        places, velocities = pose(rng, shapes, rng.uniform(0.1e-6, 2e-6)), moving(rng)
+        alone = loads(shapes, places, velocities)
+        beside = loads(shapes, places, velocities, forces=(*WATER, nothing))
+        size = np.abs(alone).max(axis=0)
+        np.testing.assert_allclose(beside / size, alone / size, atol=1e-3)
 
 
 def test_compiled_it_is_what_it_is_uncompiled():
