@@ -218,18 +218,24 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     MEAN_RADIUS,  # of the two [m]
     FLOOR,  # the gap below which it stays what it is [m]
     CUT,  # the gap at which it ends [m]; 0: there is none
-    NEAR_CUT,  # the gap of outlines up to which they count [m]
+    NEAR_CUT,  # the gap of outlines up to which they count [m]; 0: of two spheres
     FLOW,  # from here on: Fluid.flow
 ) = range(6)
 
-WATER_SIZE = FLOW + 6
+FIRST_RADIUS = FLOW + 6
+"""And behind it, of either body, the radius of the sphere that has its drag [m]."""
+
+WATER_SIZE = FIRST_RADIUS + 2
 
 TABLE_COLUMNS = 20
 """Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair_table.COLUMNS."""
 
-SQUARES = 9
+SQUARES = 6
 """Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a
-strain pulls at them with."""
+strain pulls at them with, and the smooth gap of the last two bodies that were asked for one."""
+
+SOFT_GAP = 6
+"""Column of that gap [m]."""
 
 # Columns of ``Work.pairs``: two bodies that may come near each other.
 (

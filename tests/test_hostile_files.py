@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
 from tests.helpers import hostile_files
+from tests.helpers.tiers import rest_slow
 
 EXAMPLES = 40
 
@@ -40,19 +41,21 @@ def test_any_file_is_read_or_refused_in_one_line(readers, kind):
     throw()
 
 
+@pytest.mark.parametrize("files", rest_slow([30, 60], lambda files: files == 30))
 @pytest.mark.parametrize("kind", KINDS)
-def test_some_are_read_and_some_are_refused(readers, kind):
+def test_some_are_read_and_some_are_refused(readers, kind, files):
     """Else the files would be so wrong, or so right, that they test nothing."""
     folder, make, read = readers[kind]
     ends = {
         outcome(read, made(make, kind, number, folder))[0]
-        for number in random.Random(kind).sample(range(10**6), 30)
+        for number in random.Random(kind).sample(range(10**6), files)
     }
     assert ends <= {"read", "refused"}
     assert "refused" in ends
 
 
-def test_making_them_writes_into_no_other_file(tmp_path, monkeypatch):
+@pytest.mark.parametrize("files", rest_slow([60, 300], lambda files: files == 60))
+def test_making_them_writes_into_no_other_file(tmp_path, monkeypatch, files):
     """Data that a file says lie elsewhere are somebody's: whoever runs this must not lose them."""
     precious = tmp_path / "precious"
     precious.write_bytes(b"root:x:0:0")
@@ -60,7 +63,7 @@ def test_making_them_writes_into_no_other_file(tmp_path, monkeypatch):
     monkeypatch.setattr(hostile_files, "ELSEWHERE", str(precious))
     replaced = hostile_files.valid_results(tmp_path)
     before = {path.name for path in tmp_path.iterdir()}
-    for number in range(60):
+    for number in range(files):
         rng = random.Random(number)
         data = replaced
         for _ in range(3):

@@ -56,6 +56,15 @@ def body_resistance(body: Body) -> tuple[float, ...]:
     return tuple(number * radius**power for number, power in zip(unit, POWERS, strict=True))
 
 
+def drag_radius(forces: Iterable[Force], body: Body) -> float:
+    """Of the sphere that is as hard to move as a body in the mean of all directions of its plane,
+    free to turn [m]: r_eq unless a drag follows shapes."""
+    if not follows_shape(forces):
+        return body.shape.equivalent_radius
+    free = np.linalg.inv(resistance_matrices(body_resistance(body))[0])
+    return float(1.0 / (3.0 * math.pi * (free[0, 0] + free[1, 1])))
+
+
 def resistance_matrices(numbers: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
     """(R (3, 3), Γ (3, 2)) of such numbers."""
     xx, xy, yy, xs, ys, ss, *strain = numbers

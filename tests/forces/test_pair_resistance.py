@@ -8,11 +8,22 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
-from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal
+from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal, VanDerWaals
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.fast_scene import FastScene, right_hand_side
+from tests.helpers.real_pairs import (
+    SIZE,
+    Resistance,
+    line_mobilities,
+    multiblobs,
+    pose,
+    random_pair,
+    real_flocs,
+    resized,
+    settling,
+)
 from tests.helpers.tiers import rest_slow
 
 VISCOSITY = 1e-3
@@ -119,6 +130,67 @@ def test_the_resistance_of_shapes_is_symmetric_positive_and_the_derivative(law):
         )
 
 
+def least_resistance(rng, shapes, law, poses, jit):
+    """Over the poses: of any motion of two shapes, over that of the smaller one's sphere."""
+    resistance, outer = Resistance(shapes, law, jit), sum(each.bounding_radius for each in shapes)
+    size = min(each.equivalent_radius for each in shapes)
+    scale = np.array([1.0, 1.0, size] * 2)
+    found = []
+    for _ in range(poses):
+        towards, *angles = rng.uniform(0.0, 2.0 * math.pi, 3)
+        distance = outer * rng.uniform(0.4, 1.0) * 8.0 ** rng.uniform(0.0, 1.0) ** 3
+        x, y = distance * math.cos(towards), distance * math.sin(towards)
+        matrix = resistance(np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]]))
+        found.append(np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0])
+    return min(found) / (6.0 * math.pi * size)
+
+
+def least_of_real_pairs(pairs, poses, law, jit):
+    rng, flocs = np.random.default_rng(6), real_flocs(8, vertices=16)
+    found = []
+    for _ in range(pairs):
+        first, second = rng.choice(len(flocs), 2)
+        shapes = [flocs[first], resized(flocs[second], SIZE * rng.uniform(0.1, 1.0))]
+        found.append(least_resistance(rng, shapes, law, poses, jit))
+    return min(found)
+
+
+def test_no_motion_of_two_real_flocs_gets_work_back():
+    assert least_of_real_pairs(3, 100, "shape", jit=False) > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["stokes", "shape"])
+def test_no_motion_of_two_real_flocs_gets_work_back_in_any_of_many_poses(law):
+    assert least_of_real_pairs(25, 2_000, law, jit=True) > 0.2
+
+
+def check_against_multiblobs(pairs, gap):
+    """How fast two real flocs move, within 10 % but for the rate of their gap."""
+    rng, flocs = np.random.default_rng(1), real_flocs(16)
+    for _ in range(pairs):
+        shapes, places = random_pair(rng, flocs, gap)
+        found, exact = Resistance(shapes)(places), multiblobs(shapes, places)
+        lines = line_mobilities(found, places) / line_mobilities(exact, places)
+        np.testing.assert_allclose(lines[[0, 1, 3]], 1.0, atol=0.1)
+        # An outline that covers the other keeps it off more than its gap says.
+        assert abs(lines[2] - 1.0) < (0.15 if gap >= 1.0 else 0.25 if gap >= 0.5 else 1.1)
+        ours, theirs = settling(found, shapes), settling(exact, shapes)
+        off = np.linalg.norm(ours - theirs, axis=2) / np.linalg.norm(theirs, axis=2).max()
+        assert off.max() < 0.12
+
+
+@pytest.mark.parametrize("gap", [0.25, 1.0])
+def test_two_real_flocs_move_as_rigid_multiblobs_do(gap):
+    check_against_multiblobs(3, gap)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.25, 0.5, 1.0, 3.0])
+def test_twenty_pairs_of_real_flocs_move_as_rigid_multiblobs_do(gap):
+    check_against_multiblobs(20, gap)
+
+
 def test_turned_mirrored_and_exchanged_bodies_feel_the_same():
     rng, shapes = np.random.default_rng(4), [SpheroPolygon(L_SHAPE, 1e-6), Sphere(4e-6)]
     still = Fluid(viscosity=VISCOSITY)
@@ -135,6 +207,17 @@ def test_turned_mirrored_and_exchanged_bodies_feel_the_same():
             np.testing.assert_allclose(other / size, found / size, atol=1e-6)
         other = loads(shapes[::-1], places[::-1], velocities[::-1], still)[::-1]
         np.testing.assert_allclose(other / size, found / size, atol=1e-6)
+
+
+def test_beside_forces_between_outlines_it_takes_their_gap():
+    rng, shapes = np.random.default_rng(8), [SpheroPolygon(L_SHAPE, 1e-6), Sphere(4e-6)]
+    nothing = VanDerWaals(1e-40, gap="surface", cut=1e-4)
+    for _ in range(6):
+        places, velocities = pose(rng, shapes, rng.uniform(0.1e-6, 2e-6)), moving(rng)
+        alone = loads(shapes, places, velocities)
+        beside = loads(shapes, places, velocities, forces=(*WATER, nothing))
+        size = np.abs(alone).max(axis=0)
+        np.testing.assert_allclose(beside / size, alone / size, atol=1e-3)
 
 
 def test_compiled_it_is_what_it_is_uncompiled():

@@ -56,9 +56,9 @@ KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: watch_kicked_pair}
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
 
-START = 5.0
+START = 3.0
 """Gap over r_i + r_j at which two bodies begin that move the water around each other: shapes are to
-each other what spheres are there, and in a flow a strain brings them together by all but .003."""
+each other what spheres are there, and in a flow a strain brings them together by all but .01."""
 
 STRESSLET = 6.116 / 3.0
 """By how much more a strain pulls at the bond of two equal spheres in the water between them than

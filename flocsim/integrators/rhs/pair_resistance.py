@@ -2,10 +2,10 @@
 
 The resistance is a sum of squares (hydrodynamics/pair_table.py), each of a sum of the velocities of
 both bodies: three of common motion, at the distance of the centres, and three of relative motion,
-at the gap of the outlines, at that of the equivalent spheres, or at both with a share each. So it
-is positive whatever the shapes. All are along and across the line of centres: the normal of the
-nearest points jumps from one arm of a floc to the next while the gap is still wide, at 16 times the
-steps. Body 1 of the tables is the earlier one of a pair.
+at a gap between that of the outlines and that of spheres of the same drag. So it is positive
+whatever the shapes. All are along and across the line of centres: the normal of the nearest points
+jumps from one arm of a floc to the next while the gap is still wide, at 16 times the steps. Body 1
+of the tables is the earlier one of a pair.
 """
 
 import math
@@ -27,10 +27,16 @@ from flocsim.integrators.rhs.views import add_force, centre_line
 """Columns of ``Scene.pair_table``."""
 
 LOAD = 6
-"""Column of ``Work.squares`` behind those of the velocities (v_x, v_y, spin) of both bodies."""
+"""Column of ``Work.squares`` behind those of the velocities (v_n, v_t, spin) of both bodies, along
+and across the line of centres."""
 
-COMMON, CENTRES, OUTLINES, PULL = 0, 3, 6, at.SQUARES
-"""First rows of ``Work.squares`` of the three parts, and the row of what a strain pulls with."""
+COMMON, RELATIVE, PULL = 0, 3, at.SQUARES
+"""First rows of ``Work.squares`` of the two parts, and the row of what a strain pulls with."""
+
+LEAN, LEAN_FALLS, LEAN_MOST = 1.5, 0.9, 0.8
+"""By what a relative gap lies from that of the outlines towards that of the spheres, how that falls
+with the gap, and by how many mean radii the two may differ in it: fitted to rigid multiblobs of 160
+pairs of real flocs at .25 to 3 mean radii (benchmarks/accuracy/water_pairs.py)."""
 
 SPHERE_DRAG, SPHERE_TURN = 6.0 * math.pi, 8.0 * math.pi
 """Of a sphere in slow flow, over µ r and µ r³."""
@@ -59,20 +65,41 @@ def column_slope(scene, interval, share, which, gap):
 
 
 def write_row(work, row, one, two, load):
-    """Write a square: entries (v_x, v_y, spin) of body 1 and of body 2, and its load."""
-    for axis in range(3):
-        work.squares[row, axis] = one[axis]
-        work.squares[row, 3 + axis] = two[axis]
-    work.squares[row, LOAD] = load
+    """Write a square: entries (v_n, v_t, spin) of body 1 and of body 2, and its load."""
+    s = work.squares
+    s[row, 0], s[row, 1], s[row, 2] = one
+    s[row, 3], s[row, 4], s[row, 5] = two
+    s[row, LOAD] = load
 
 
-def value_in(work, row, state, one, two):
-    """A row times the velocities of two bodies in a state."""
-    total = 0.0
-    for axis in range(at.VELOCITY, at.VELOCITY + 3):
-        total += work.squares[row, axis - at.VELOCITY] * work.motion[state, one, axis]
-        total += work.squares[row, axis - at.VELOCITY + 3] * work.motion[state, two, axis]
-    return total
+def value_in(work, row, motion):
+    """A row times velocities (6,)."""
+    s = work.squares
+    return (
+        s[row, 0] * motion[0] + s[row, 1] * motion[1] + s[row, 2] * motion[2]
+        + s[row, 3] * motion[3] + s[row, 4] * motion[4] + s[row, 5] * motion[5]
+    )  # fmt: skip
+
+
+def motion_in(work, state, one, two, nx, ny):
+    """(v_n, v_t, spin) of both bodies in a state."""
+    m = work.motion
+    x, y = m[state, one, at.VX], m[state, one, at.VY]
+    x_2, y_2 = m[state, two, at.VX], m[state, two, at.VY]
+    return (
+        x * nx + y * ny, y * nx - x * ny, m[state, one, at.SPIN],
+        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, m[state, two, at.SPIN],
+    )  # fmt: skip
+
+
+def against_flow(scene, work, state, one, two, nx, ny, motion):
+    """The same against the flow at each body."""
+    u, v, spin = flow_in(scene, work, state, one)
+    u_2, v_2, _ = flow_in(scene, work, state, two)
+    return (
+        motion[0] - u * nx - v * ny, motion[1] - v * nx + u * ny, motion[2] - spin,
+        motion[3] - u_2 * nx - v_2 * ny, motion[4] - v_2 * nx + u_2 * ny, motion[5] - spin,
+    )  # fmt: skip
 
 
 def flow_in(scene, work, state, body):
@@ -93,125 +120,92 @@ def strain_along(scene, nx, ny):
     return e_xx * cosine + e_xy * sine, e_xy * cosine - e_xx * sine
 
 
-def add_flow(scene, work, row, state, one, two):
-    """Add what the flow at both bodies comes to in a square to its load."""
-    for body, first in ((one, 0), (two, 3)):
-        u, v, spin = flow_in(scene, work, state, body)
-        s = work.squares
-        s[row, LOAD] += s[row, first] * u + s[row, first + 1] * v + s[row, first + 2] * spin
-
-
-def write_common(scene, work, state, one, two, nx, ny, place):
-    """The squares of common motion; their loads are those of the flow as well."""
+def write_common(scene, work, place, e_nn, e_nt):
+    """The squares of common motion against the flow."""
     interval, share = place
-    e_nn, e_nt = strain_along(scene, nx, ny)
     first = column(scene, interval, share, N_1)
     other = column(scene, interval, share, N_2)
     load = column(scene, interval, share, K_N) * e_nn
-    write_row(work, COMMON, (first * nx, first * ny, 0.0), (other * nx, other * ny, 0.0), load)
+    write_row(work, COMMON, (first, 0.0, 0.0), (other, 0.0, 0.0), load)
     for row, v, w, k in ((1, A_V1, A_W1, K_A), (2, B_V1, B_W1, K_B)):
         first = column(scene, interval, share, v)
         other = column(scene, interval, share, v + 1)
         turn_1 = column(scene, interval, share, w)
         turn_2 = column(scene, interval, share, w + 1)
-        one_row = -first * ny, first * nx, turn_1
-        two_row = -other * ny, other * nx, turn_2
         load = column(scene, interval, share, k) * e_nt
-        write_row(work, COMMON + row, one_row, two_row, load)
-    for row in range(COMMON, COMMON + 3):
-        add_flow(scene, work, row, state, one, two)
+        write_row(work, COMMON + row, (0.0, first, turn_1), (0.0, other, turn_2), load)
 
 
-def write_relative(scene, work, first, place, weight, normal, tangent):
-    """The squares of relative motion, times √weight, of the directions along which the gap opens
-    and the bodies slide."""
+def write_relative(scene, work, place, arm, arm_2):
+    """The squares of relative motion: of the gap's rate, and of sliding where its middle is."""
     interval, share = place
-    root = math.sqrt(weight)
-    opens = root * column(scene, interval, share, GAP)
-    slides = root * column(scene, interval, share, SLIDE)
-    mixed = root * column(scene, interval, share, MIXED)
-    turns = root * column(scene, interval, share, TURN)
-    (n_1, n_2), (t_1, t_2) = normal, tangent
-    write_row(work, first, scaled(n_1, opens), scaled(n_2, opens), 0.0)
-    x, y, spin = scaled(t_1, slides)
-    x_2, y_2, spin_2 = scaled(t_2, slides)
-    write_row(work, first + 1, (x, y, spin - mixed), (x_2, y_2, spin_2 + mixed), 0.0)
-    write_row(work, first + 2, (0.0, 0.0, -turns), (0.0, 0.0, turns), 0.0)
+    opens = column(scene, interval, share, GAP)
+    slides = column(scene, interval, share, SLIDE)
+    mixed = column(scene, interval, share, MIXED)
+    turns = column(scene, interval, share, TURN)
+    write_row(work, RELATIVE, (-opens, 0.0, 0.0), (opens, 0.0, 0.0), 0.0)
+    one, two = -slides * arm - mixed, -slides * arm_2 + mixed
+    write_row(work, RELATIVE + 1, (0.0, -slides, one), (0.0, slides, two), 0.0)
+    write_row(work, RELATIVE + 2, (0.0, 0.0, -turns), (0.0, 0.0, turns), 0.0)
 
 
-def scaled(entries, size):
-    x, y, spin = entries
-    return size * x, size * y, size * spin
+def water_radius(scene, body):
+    """Of the sphere that has the body's drag [m]."""
+    return scene.water[at.FIRST_RADIUS + body]
 
 
-def write_nothing(work, first, count):
-    for row in range(first, first + count):
-        write_row(work, row, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+def relative_gap(scene, work, state, between):
+    """(the gap of two spheres that move against each other as the bodies do [m], how fast it grows
+    with the gap of the outlines), ``between`` being that of the spheres of their drag.
 
-
-def centre_directions(scene, one, two, nx, ny, distance, gap):
-    """(along, across) the line of centres, entries on both bodies: the gap's rate, and sliding
-    where its middle is."""
-    radius_1 = scene.bodies[one, at.EQUIVALENT_RADIUS]
-    sum_ = radius_1 + scene.bodies[two, at.EQUIVALENT_RADIUS] + gap
-    arm = distance * (radius_1 + 0.5 * gap) / sum_
-    along = (-nx, -ny, 0.0), (nx, ny, 0.0)
-    return along, ((ny, -nx, -arm), (-ny, nx, arm - distance))
-
-
-def outline_gap(scene, work, state):
-    """(the smooth gap of the outlines [m], its share in relative motion: none of far ones)."""
+    Far outlines are of no account, and at touch theirs is the gap.
+    """
+    spheres = max(between, 0.0)
+    if scene.water[at.NEAR_CUT] == 0.0:
+        return spheres, 1.0
     if work.tally[at.CANDIDATES] == 0:
-        return 0.0, 0.0
-    gap, _ = soften(scene, work, state, 0, work.tally[at.CANDIDATES])
-    weight, _ = fading(gap, scene.water[at.NEAR_CUT])
-    return gap, weight
+        return spheres, 0.0
+    if scene.surface_reach > 0.0:
+        # Forces between the two outlines have asked for it just now.
+        found = work.squares[PULL, at.SOFT_GAP]
+    else:
+        found, _ = soften(scene, work, state, 0, work.tally[at.CANDIDATES])
+    near, _ = fading(found, scene.water[at.NEAR_CUT])
+    outlines, mean = max(found, 0.0), scene.water[at.MEAN_RADIUS]
+    lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
+    factor = math.exp(LEAN * mean / (mean + LEAN_FALLS * outlines) * lean)
+    return near * outlines * factor + (1.0 - near) * spheres, near * factor
 
 
 @apart
 def write_squares(scene, work, state, one, two):
     """Write the resistance of two bodies to ``work.squares``: (the share of it that counts, by how
-    much relative resistance along the gap of the outlines grows with that gap [N s/m²])."""
+    much relative resistance along the gap of the outlines grows with that gap [N s/m²], the
+    direction from 1 to 2)."""
     nx, ny, distance = centre_line(scene, work, state, two, one)
-    sizes = scene.bodies[one, at.EQUIVALENT_RADIUS] + scene.bodies[two, at.EQUIVALENT_RADIUS]
+    radius = water_radius(scene, one)
+    sizes = radius + water_radius(scene, two)
     far, _ = fading(distance - sizes, scene.water[at.CUT])
     if far == 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, nx, ny
     floor, slope = scene.water[at.FLOOR], 0.0
     gap = max(distance - sizes, floor)
-    place = interval_of(scene, gap)
-    write_common(scene, work, state, one, two, nx, ny, place)
-    outlines, near = outline_gap(scene, work, state)
-    along, across = centre_directions(scene, one, two, nx, ny, distance, gap)
-    t_n, t_t, t_s = 0.0, 0.0, 0.0
-    if near < 1.0:
-        write_relative(scene, work, CENTRES, place, 1.0 - near, along, across)
-        t_n, t_t, t_s = pull_at(scene, place, (1.0 - near) * distance / (sizes + gap))
-    else:
-        write_nothing(work, CENTRES, 3)
-    if near > 0.0:
-        gap = max(outlines, floor)
-        place = interval_of(scene, gap)
-        write_relative(scene, work, OUTLINES, place, near, along, across)
-        more_n, more_t, more_s = pull_at(scene, place, near * distance / (sizes + gap))
-        t_n, t_t, t_s = t_n + more_n, t_t + more_t, t_s + more_s
-        if outlines > floor:
-            interval, share = place
-            size = column(scene, interval, share, GAP)
-            slope = 2.0 * far * near * size * column_slope(scene, interval, share, GAP, gap)
-    else:
-        write_nothing(work, OUTLINES, 3)
     e_nn, e_nt = strain_along(scene, nx, ny)
+    write_common(scene, work, interval_of(scene, gap), e_nn, e_nt)
+    arm = distance * (radius + 0.5 * gap) / (sizes + gap)
+    found, grows = relative_gap(scene, work, state, distance - sizes)
+    gap = max(found, floor)
+    place = interval_of(scene, gap)
+    write_relative(scene, work, place, arm, distance - arm)
+    if found > floor:
+        interval, share = place
+        size = column(scene, interval, share, GAP)
+        slope = 2.0 * far * grows * size * column_slope(scene, interval, share, GAP, gap)
+    t_n, t_t, t_s = pull_at(scene, place, distance / (sizes + found))
     t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
-    (n_1, n_2), (a_1, a_2) = along, across
-    one_x, one_y, one_turn = (
-        n_1[0] * t_n + a_1[0] * t_t, n_1[1] * t_n + a_1[1] * t_t, a_1[2] * t_t - t_s,
-    )  # fmt: skip
-    two_x, two_y, two_turn = (
-        n_2[0] * t_n + a_2[0] * t_t, n_2[1] * t_n + a_2[1] * t_t, a_2[2] * t_t + t_s,
-    )  # fmt: skip
-    write_row(work, PULL, (one_x, one_y, one_turn), (two_x, two_y, two_turn), 0.0)
-    return far, slope
+    one_pull, two_pull = (-t_n, -t_t, -arm * t_t - t_s), (t_n, t_t, (arm - distance) * t_t + t_s)
+    write_row(work, PULL, one_pull, two_pull, work.squares[PULL, at.SOFT_GAP])
+    return far, slope, nx, ny
 
 
 def pull_at(scene, place, size):
@@ -225,42 +219,40 @@ def pull_at(scene, place, size):
 
 
 def own_drag(scene, body):
-    """(of velocities, of the spin) Stokes drag of the equivalent sphere [N s/m, N m s]."""
-    radius, viscosity = scene.bodies[body, at.EQUIVALENT_RADIUS], scene.water[at.VISCOSITY]
+    """(of velocities, of the spin) Stokes drag of the sphere of its drag [N s/m, N m s]."""
+    radius, viscosity = water_radius(scene, body), scene.water[at.VISCOSITY]
     return SPHERE_DRAG * viscosity * radius, SPHERE_TURN * viscosity * radius**3
-
-
-def add_own(scene, work, state, body, far, first):
-    """Add to a body's force what the water does to both beside their Stokes drag: ``PULL`` of it
-    and the reverse of that drag."""
-    u, v, spin = flow_in(scene, work, state, body)
-    drag, turn = own_drag(scene, body)
-    pull, m = work.squares, work.motion
-    add_force(
-        work, state, body,
-        far * (pull[PULL, first] + drag * (m[state, body, at.VX] - u)),
-        far * (pull[PULL, first + 1] + drag * (m[state, body, at.VY] - v)),
-        far * (pull[PULL, first + 2] + turn * (m[state, body, at.SPIN] - spin)),
-    )  # fmt: skip
 
 
 @hook
 def add_pair_resistance(scene, work, state):
-    """Add what the water between two bodies puts on them in a state, which is located."""
+    """Add what the water between two bodies puts on them in a state, which is located, beside their
+    Stokes drag."""
     if scene.water[at.CUT] == 0.0:
         return
     s = work.squares
     for pair in range(work.tally[at.PAIRS]):
         one, two = work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
-        far, _ = write_squares(scene, work, state, one, two)
+        far, _, nx, ny = write_squares(scene, work, state, one, two)
         if far == 0.0:
             continue
-        for row in range(at.SQUARES):
-            size = far * (s[row, LOAD] - value_in(work, row, state, one, two))
-            add_force(work, state, one, size * s[row, 0], size * s[row, 1], size * s[row, 2])
-            add_force(work, state, two, size * s[row, 3], size * s[row, 4], size * s[row, 5])
-        add_own(scene, work, state, one, far, 0)
-        add_own(scene, work, state, two, far, 3)
+        motion = motion_in(work, state, one, two, nx, ny)
+        against = against_flow(scene, work, state, one, two, nx, ny, motion)
+        (drag, turn), (drag_2, turn_2) = own_drag(scene, one), own_drag(scene, two)
+        n, t, spin = drag * against[0], drag * against[1], turn * against[2]
+        n_2, t_2, spin_2 = drag_2 * against[3], drag_2 * against[4], turn_2 * against[5]
+        for row in range(at.SQUARES + 1):
+            size = 1.0
+            if row < RELATIVE:
+                size = s[row, LOAD] - value_in(work, row, against)
+            elif row < PULL:
+                size = -value_in(work, row, motion)
+            n, t, spin = n + size * s[row, 0], t + size * s[row, 1], spin + size * s[row, 2]
+            n_2, t_2 = n_2 + size * s[row, 3], t_2 + size * s[row, 4]
+            spin_2 += size * s[row, 5]
+        x, y, x_2, y_2 = n * nx - t * ny, n * ny + t * nx, n_2 * nx - t_2 * ny, n_2 * ny + t_2 * nx
+        add_force(work, state, one, far * x, far * y, far * spin)
+        add_force(work, state, two, far * x_2, far * y_2, far * spin_2)
 
 
 @hook
@@ -272,38 +264,35 @@ def add_pair_damping(scene, work):
     s, jacobian = work.squares, work.jacobian
     for pair in range(work.tally[at.PAIRS]):
         one, two = work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
-        far, slope = write_squares(scene, work, at.NOW, one, two)
+        far, slope, nx, ny = write_squares(scene, work, at.NOW, one, two)
         if far == 0.0:
             continue
         blocks = (one, upper_block(work, pair), lower_block(work, pair), two)
+        opening = slope * value_in(work, RELATIVE, motion_in(work, at.NOW, one, two, nx, ny))
         for row in range(at.SQUARES):
-            for half in range(4):
-                for i in range(3):
-                    for j in range(3):
-                        entry = s[row, 3 * (half // 2) + i] * s[row, 3 * (half % 2) + j]
-                        jacobian[at.DAMPING, blocks[half], i, j] += far * entry
+            for first in (0, 3):
+                n, t = s[row, first], s[row, first + 1]
+                s[row, first], s[row, first + 1] = n * nx - t * ny, n * ny + t * nx
+            add_square(work, at.DAMPING, blocks, row, far)
         for body in (one, two):
             drag, turn = own_drag(scene, body)
             jacobian[at.DAMPING, body, 0, 0] -= far * drag
             jacobian[at.DAMPING, body, 1, 1] -= far * drag
             jacobian[at.DAMPING, body, 2, 2] -= far * turn
-        if slope != 0.0:
-            add_narrowing(work, blocks, slope, value_in(work, OUTLINES, at.NOW, one, two))
+        size = s[RELATIVE, 3] * s[RELATIVE, 3] + s[RELATIVE, 4] * s[RELATIVE, 4]
+        if opening != 0.0 and size > 0.0:
+            # Resistance to the rate of the gap grows as it closes.
+            add_square(work, at.STIFFNESS, blocks, RELATIVE, opening / (size * math.sqrt(size)))
 
 
-def add_narrowing(work, blocks, slope, rate):
-    """Add that the resistance to the rate of the gap grows as it closes; row OUTLINES of the
-    squares is along the gap, ``rate`` what it comes to."""
+def add_square(work, kind, blocks, row, weight):
+    """Add a square, its entries along x and y, to the blocks of both bodies."""
     s = work.squares
-    size = s[OUTLINES, 3] * s[OUTLINES, 3] + s[OUTLINES, 4] * s[OUTLINES, 4]
-    if size == 0.0:
-        return
-    weight = slope * rate / (size * math.sqrt(size))
     for half in range(4):
         for i in range(3):
             for j in range(3):
-                entry = s[OUTLINES, 3 * (half // 2) + i] * s[OUTLINES, 3 * (half % 2) + j]
-                work.jacobian[at.STIFFNESS, blocks[half], i, j] += weight * entry
+                entry = s[row, 3 * (half // 2) + i] * s[row, 3 * (half % 2) + j]
+                work.jacobian[kind, blocks[half], i, j] += weight * entry
 
 
 def nothing_between(scene, work, state):

@@ -117,6 +117,7 @@ def soften(scene, work, state, row, end):
             own = length_at(scene, geometry[state, each, at.GAP])
             geometry[state, each, at.SHARE] *= length / (own * total)
             rate += geometry[state, each, at.SHARE] * normal_rate(work, state, each)
+    work.squares[at.SQUARES, at.SOFT_GAP] = gap
     return gap, rate
 
 

@@ -87,9 +87,9 @@ def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
 def test_every_damage_is_found_and_nothing_wrong_is_believed(root, reference, monkeypatch):
     monkeypatch.setattr(damage, "WHOLE_RERUNS", 3)
     rng = np.random.default_rng(2)
-    tallies = damage.damage_journal(root, reference, 25, rng)
-    tallies |= damage.damage_results(root, reference, 35, rng)
-    assert sum(tally.faults for tally in tallies.values()) == 60
+    tallies = damage.damage_journal(root, reference, 60, rng)
+    tallies |= damage.damage_results(root, reference, 100, rng)
+    assert sum(tally.faults for tally in tallies.values()) == 160
     assert [problem for tally in tallies.values() for problem in tally.wrong] == []
 
 

@@ -188,7 +188,7 @@ def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):
 def test_a_journal_cut_anywhere_goes_on(stopped, whole):
     path = stopped / "r.h5.journal"
     data = path.read_bytes()
-    for size in (5, len(data) // 2, len(data) - 1):
+    for size in (0, 5, 100, len(data) // 2, len(data) - 1):
         (stopped / "r.h5").unlink(missing_ok=True)
         path.write_bytes(data[:size])
         go_on(stopped)

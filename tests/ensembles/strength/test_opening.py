@@ -18,13 +18,24 @@ from flocsim.ensembles.strength.opening import (
     gap_of,
     sphere_rate,
 )
-from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, Thermal, VanDerWaals
+from flocsim.forces import (
+    Contact,
+    DoubleLayer,
+    Gravity,
+    PairResistance,
+    StokesDrag,
+    Thermal,
+    VanDerWaals,
+)
 from flocsim.integrators import Overdamped
 
 WATER = Fluid(viscosity=8.9e-4)
 RADII = (5e-6, 5e-6)
 CRITICAL = 9.339e4
 """H_A/(18πγ d_min² R) [1/s] of H_A = 4.7e-20 J, d_min = 1 nm, r = 5 µm both."""
+
+IN_WATER = 4.58e4
+"""The same where the two push water at each other: at touch it pulls with 6.116 πµa²G, not 3."""
 
 
 def bond(gap="surface"):
@@ -41,6 +52,9 @@ def test_rate_of_two_spheres():
     assert other == pytest.approx(found, rel=1e-12)
     assert sphere_rate([StokesDrag()], RADII, WATER) == 0.0
     assert 0.0 < sphere_rate([*bond(), DoubleLayer(15e-3, 1e-8)], RADII, WATER) < found
+    in_water = sphere_rate([*bond(), PairResistance()], RADII, WATER)
+    assert in_water == pytest.approx(found * 3.0 / 6.116, rel=1e-3)
+    assert in_water == pytest.approx(IN_WATER, rel=1e-3)
 
 
 def test_gap_of_placed_outlines():
@@ -100,6 +114,15 @@ def test_two_spheres_hold_below_their_rate_and_open_above(flow):
     pair = doublet(bond(), flow)
     assert pair.opens_at(0.98 * CRITICAL) is False
     assert pair.opens_at(1.02 * CRITICAL) is True
+
+
+@pytest.mark.parametrize("flow", ["shear", "extension"])
+@pytest.mark.parametrize("h_min", [1e-9, 5e-8])
+def test_the_pull_of_the_water_between_opens_two_spheres_in_either_flow(flow, h_min):
+    pair = doublet([*bond(), PairResistance(h_min=h_min)], flow, jit=True)
+    assert pair.rate_of_spheres() == pytest.approx(IN_WATER, rel=4e-3)
+    assert pair.opens_at(0.98 * IN_WATER) is False
+    assert pair.opens_at(1.02 * IN_WATER) is True
 
 
 def test_weight_and_warmth_are_left_out_and_none_is_held():

@@ -1,0 +1,55 @@
+"""Two real flocs in water, by `[forces.hydrodynamics]` and the drag of their shape, against rigid
+multiblobs of both: by how much how fast they move is off.
+
+python -m benchmarks.accuracy.water_pairs
+"""
+
+import numpy as np
+
+from benchmarks.reporting import Table, parse_arguments, print_heading
+from tests.helpers.real_pairs import (
+    Resistance,
+    line_mobilities,
+    multiblobs,
+    random_pair,
+    real_flocs,
+    settling,
+)
+
+GAPS = 0.25, 0.5, 1.0, 3.0
+"""Of the outlines, over the mean r_eq."""
+
+MOTIONS = "together, along", "across", "against, along", "across", "settling"
+
+
+def differences(shapes, places):
+    """Of the mobilities along and across the line of centres, together and against each other (4,),
+    and the larger of both bodies' velocities, over the faster speed, in the worst direction."""
+    found, exact = Resistance(shapes)(places), multiblobs(shapes, places)
+    lines = line_mobilities(found, places) / line_mobilities(exact, places) - 1.0
+    ours, theirs = settling(found, shapes), settling(exact, shapes)
+    speed = np.linalg.norm(theirs, axis=2).max(axis=1)
+    return [*lines, np.max(np.linalg.norm(ours - theirs, axis=2) / speed[:, None])]
+
+
+def table_of(count):
+    """By the gap: the rms of a difference and the largest, in per cent."""
+    rng, flocs = np.random.default_rng(1), real_flocs(16)
+    table = Table(f"{count} pairs at each gap, rms and largest, %", ("gap", *MOTIONS))
+    for gap in GAPS:
+        off = 100.0 * np.array([differences(*random_pair(rng, flocs, gap)) for _ in range(count)])
+        rms, most = np.sqrt(np.mean(off**2, axis=0)), np.abs(off).max(axis=0)
+        told = [f"{a:.1f}, {b:.1f}" for a, b in zip(rms, most, strict=True)]
+        table.add(gap, *told)
+    return table
+
+
+def main():
+    """Print the table."""
+    arguments = parse_arguments(__doc__)
+    print_heading()
+    table_of(4 if arguments.quick else 20).print(arguments.markdown)
+
+
+if __name__ == "__main__":
+    main()

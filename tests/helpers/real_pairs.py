@@ -1,0 +1,148 @@
+"""Pairs of real flocs in water: rigid multiblobs of both, and what the engine makes of them."""
+
+import math
+from functools import cache
+
+import numpy as np
+
+import flocsim.arrays as at
+from flocsim import Body, Fluid, SpheroPolygon, System
+from flocsim.arrays import work_of
+from flocsim.forces import PairResistance, StokesDrag
+from flocsim.geometry.fit.fit import fit_mask
+from flocsim.geometry.shapes.parts import core_gap
+from flocsim.hydrodynamics import prism
+from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from tests.helpers.fast_scene import right_hand_side
+from tests.helpers.real_images import silhouettes
+
+SIZE = 1e-5
+"""r_eq of all [m]."""
+
+UNIT = Fluid(viscosity=1.0)
+
+COVERINGS = 150, 300
+"""Spheres on half of the surface of each body: two coverings, and their limit."""
+
+
+@cache
+def real_flocs(count, vertices=24, least=60):
+    """Shapes of the first silhouettes of so many pixels at least, all of one size."""
+    masks = [mask for mask, _ in silhouettes() if mask.sum() >= least][:count]
+    return [resized(fit_mask(mask, vertices=vertices, radius=1.0).shape) for mask in masks]
+
+
+def resized(shape, radius=SIZE):
+    """The shape with another r_eq."""
+    scale = radius / shape.equivalent_radius
+    return SpheroPolygon(scale * np.array(shape.vertices), scale * shape.radius)
+
+
+def gap_between(shapes, places):
+    first, second = (
+        shape.placed_parts(*place) for shape, place in zip(shapes, places, strict=True)
+    )
+    return min(core_gap(a, b) - a.radius - b.radius for a in first for b in second)
+
+
+def pose(rng, shapes, gap):
+    """Places (2, 3) at random angles and a gap of the outlines [m]."""
+    towards, *angles = rng.uniform(0.0, 2.0 * math.pi, 3)
+    n = np.array([math.cos(towards), math.sin(towards)])
+
+    def places(distance):
+        return np.array([[0.0, 0.0, angles[0]], [*(distance * n), angles[1]]])
+
+    low, high = 0.0, sum(shape.bounding_radius for shape in shapes) + 2.0 * gap
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        near = gap_between(shapes, places(middle)) < gap
+        low, high = (middle, high) if near else (low, middle)
+    return places(high)
+
+
+def random_pair(rng, flocs, gap):
+    """Two flocs, the second as large as the first or half of it, and places with a gap of so many
+    mean radii between their outlines."""
+    first, second = rng.choice(len(flocs), 2, replace=False)
+    share = rng.choice([1.0, 0.5])
+    shapes = [flocs[first], resized(flocs[second], share * SIZE)]
+    return shapes, pose(rng, shapes, gap * 0.5 * (1.0 + share) * SIZE)
+
+
+def rings_of(shape, place):
+    """Of the placed outline, over SIZE."""
+    c, s = math.cos(place[2]), math.sin(place[2])
+    return [(ring[:-1] @ [[c, s], [-s, c]] + place[:2]) / SIZE for ring in shape.outline()]
+
+
+def multiblobs(shapes, places):
+    """(6, 6) resistance of prisms 4/3 r_eq deep, viscosity 1."""
+    outlines = [rings_of(*each) for each in zip(shapes, places, strict=True)]
+    heights = [4.0 / 3.0 * shape.equivalent_radius / SIZE for shape in shapes]
+    area = sum(
+        0.5 * height * sum(np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).sum() for ring in rings)
+        + math.pi * (0.75 * height) ** 2
+        for rings, height in zip(outlines, heights, strict=True)
+    )
+    spacings, found = [], []
+    for count in COVERINGS:
+        spacing = math.sqrt(area / (count * len(shapes)))
+        blobs = [prism.surface(*each, spacing) for each in zip(outlines, heights, strict=True)]
+        owner = np.repeat(range(len(shapes)), [len(each) for each in blobs])
+        loads = prism.loads(
+            np.concatenate(blobs), prism.RADIUS * spacing, owner, places[:, :2] / SIZE
+        )
+        spacings.append(spacing)
+        found.append(0.5 * (loads[:, :-2] + loads[:, :-2].T))
+    wide, fine = spacings
+    limit = found[1] + (found[1] - found[0]) * fine / (wide - fine)
+    powers = np.array([0.0, 0.0, 1.0] * len(shapes))
+    return limit * SIZE ** (1.0 + powers[:, None] + powers)
+
+
+def resistance_here(scene, work):
+    """An entry of the engine: the Jacobian of forces where bodies are."""
+    if not right_hand_side(scene, work):
+        return False
+    assemble_jacobian(scene, work, 0.0, 1.0)
+    return True
+
+
+class Resistance:
+    """−∂F/∂v (6, 6) of two shapes by the engine, viscosity 1, wherever they lie."""
+
+    def __init__(self, shapes, law="shape", jit=False):
+        bodies = [
+            Body(shape, (1e-3 * place, 0.0), density=2000.0) for place, shape in enumerate(shapes)
+        ]
+        system = System(bodies, (StokesDrag(law=law), PairResistance()), fluid=UNIT)
+        self.scene = system.scene(jit=jit)
+        self.work = work_of(self.scene, *system.motion(), capacity=8192)
+        self.entry = system.compose(entry=resistance_here, observer=None, jit=jit)
+
+    def __call__(self, places):
+        self.work.motion[at.NOW, :, :3] = places
+        assert self.entry(self.scene, self.work)
+        blocks = self.work.jacobian[at.DAMPING]
+        return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])
+
+
+def line_mobilities(resistance, places):
+    """How fast two bodies that are pulled together, along and across their line of centres, and
+    against each other, move so (4,): over a pull of 1 on either."""
+    n = places[1, :2] - places[0, :2]
+    n = n / np.hypot(*n)
+    t = np.array([-n[1], n[0]])
+    pulls = np.array([[*(sign * axis), 0.0, *axis, 0.0] for sign in (1, -1) for axis in (n, t)])
+    return np.diag(pulls @ np.linalg.solve(resistance, pulls.T))
+
+
+def settling(resistance, shapes):
+    """Velocities (directions, 2, 2) of both under weights ∝ r_eq³ in eight directions."""
+    turn = 2.0 * math.pi * np.arange(8) / 8
+    weights = [shape.equivalent_radius**3 for shape in shapes]
+    pulls = np.array([
+        [part for w in weights for part in (w * math.cos(a), w * math.sin(a), 0.0)] for a in turn
+    ])  # fmt: skip
+    return np.linalg.solve(resistance, pulls.T).T.reshape(-1, 2, 3)[..., :2]
