@@ -33,7 +33,7 @@ def leave_at_once(scene, work, clock, step):
 
 
 @hook
-def settle_grazes(scene, work, clock):
+def settle_grazes(scene, work, clock, step):
     """Let pairs begin and cease to graze behind a step, where a method has that;
     whether any has."""
     return False

@@ -96,7 +96,7 @@ def accept(scene, work, clock, counts, step, lists):
             _, depth = resolutions_of(work, clock)
             add_switch_errors(scene, work, clock, step, depth)
         forget_offsets(work)
-    grazes = controlled and not across and settle_grazes(scene, work, clock)
+    grazes = controlled and not across and settle_grazes(scene, work, clock, step)
     hand_over(scene, work)
     switched = set_modes(scene, work)
     if across:
