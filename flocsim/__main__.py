@@ -25,7 +25,7 @@ STUDIES = {"ensemble", "kernel", "swarm", "strength"}
 """Commands that run studies, also under mpirun."""
 
 ALONE = (
-    "flocsim: {} is the work of one rank, the others of this job have ended: start it without a "
+    "flocsim: {} runs on one rank; the others of this job have ended: start it without a "
     "launcher, and with --jobs where it has that"
 )
 

@@ -1,19 +1,17 @@
 """Pictures whose flocs are known: layers under noise, blur that may select, bands, necks.
 
-    python -m benchmarks.accuracy.drawn_pictures [--quick] [--markdown] [--images ../shared/images]
+    python -m benchmarks.accuracy.drawn_pictures [--quick] [--markdown] [--images DIR]
 
 Layered: aggregates of overlapping discs, each of which takes a share of the light; IoU of the
 foreground, regions for bodies. Blurred: real silhouettes of 4 to 20 px under one blur: kept of
 put, mean r_eq kept over put, r_eq found over known, share of known sizes within the bands.
 """
 
-from pathlib import Path
-
 import numpy as np
 from scipy.ndimage import gaussian_filter, label
 
+from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from benchmarks.speed.fit import IMAGES, silhouettes
 from flocsim.io.images.outlines import EIGHT, filled
 from flocsim.io.images.pictures import read_grey, segment
 
@@ -126,9 +124,9 @@ def soot_table(images):
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    arguments = parse_arguments(__doc__, images=PICTURES)
+    images = checked(arguments.images, "soot_tem", "silhouettes")
     print_heading(["scikit-image"])
-    images = Path(arguments.images)
     soot_table(images).print(arguments.markdown)
     layered_table(range(2 if arguments.quick else 8)).print(arguments.markdown)
     masks = [mask for mask, _ in silhouettes(images) if max(mask.shape) < 72][:80]

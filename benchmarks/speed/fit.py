@@ -1,6 +1,6 @@
 """Relative errors and CPU times of fits on real silhouettes, against the paper's optimiser.
 
-    python -m benchmarks.speed.fit [--quick] [--markdown] [--images ../shared/images]
+    python -m benchmarks.speed.fit [--quick] [--markdown] [--images DIR]
 
 Means over flocs come with half their 95 % interval (Student).  `even` is the start of `paper`: N
 points evenly on the outline, drawn in by r.  The paper counts V over the whole picture anew for
@@ -9,18 +9,17 @@ every trial move; that time is computed: its number of counts times the time of 
 
 import time
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy import stats
 
+from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.fit import paper as fit_paper
 from flocsim.geometry.fit.coverage import compiled, padded
 from flocsim.geometry.fit.search import count_errors, searched
 from flocsim.geometry.fit.starts import even_start, inset, trace_outline
-from flocsim.io.images.masks import read_masks, segment_mask
 
 COUNTS = (4, 8, 16, 28, 64)
 CLASSES = {"14 to 26 px": (14.0, 26.0), "4 to 5 px": (4.0, 5.0)}
@@ -31,14 +30,6 @@ GOALS = {
 }  # fmt: skip
 REPEATS = 5
 STEPS = np.array([8.0, 4.0, 2.0, 1.0, 0.5, 0.25])
-IMAGES = Path(__file__).resolve().parents[3] / "shared/images"
-
-
-def silhouettes(images):
-    """[(mask, r_eq)] of the real silhouettes."""
-    masks = read_masks(Path(images) / "silhouettes/flocs_open.npz")
-    regions = [segment_mask(mask, min_radius=0.0).regions[0] for _, mask in masks]
-    return [(region.mask, region.equivalent_radius) for region in regions]
 
 
 class Fits:
@@ -185,9 +176,10 @@ def least_table(fits, starts):
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    arguments = parse_arguments(__doc__, images=PICTURES)
+    images = checked(arguments.images, "silhouettes")
     print_heading()
-    flocs = silhouettes(arguments.images)
+    flocs = silhouettes(images)
     fits = Fits(flocs, every=4 if arguments.quick else 1)
     error_table(fits).print(arguments.markdown)
     time_table(fits).print(arguments.markdown)

@@ -1,6 +1,6 @@
 """Finding flocs: time and outcome on real pictures, r_eq on known outlines, `flocsim fit --jobs`.
 
-    python -m benchmarks.speed.segmentation [--quick] [--markdown] [--images ../shared/images]
+    python -m benchmarks.speed.segmentation [--quick] [--markdown] [--images DIR]
 
 Known outlines: real silhouettes put on a 1920×1080 frame with a vignette, blurred by 1 px, with
 noise.  --jobs: wall times in alternate runs, load of the machine beside them; where others keep the
@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from benchmarks.speed.fit import IMAGES, silhouettes
 from flocsim.io.images.pictures import read_grey, segment
 
-PICTURES = (
+SEGMENTED = (
     "flocpy/023.png", "flocpy/024.png", "flocpy/025.png", "safas/brightfield_flocs.png",
     "safas/clayflocs.png", "safas/darkfield_highgray_mudflocs.png",
     "safas/darkfield_noisy_mudflocs_left.png", "sandi/FlocCAM-image2.jpg",
@@ -41,8 +41,8 @@ def picture_table(images):
         ("picture", "pixels", "s", "flocs", "border", "blurred", "small", "foreground %", "IoU"),
     )
     human = read_grey(images / HUMAN) > 0.5
-    segment(read_grey(images / PICTURES[-1]))
-    for name in PICTURES:
+    segment(read_grey(images / SEGMENTED[-1]))
+    for name in SEGMENTED:
         grey = read_grey(images / name)
         began = time.process_time()
         found = segment(grey)
@@ -139,9 +139,9 @@ def jobs_table(images, rounds):
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__, images={"default": str(IMAGES), "metavar": "DIR"})
+    arguments = parse_arguments(__doc__, images=PICTURES)
+    images = checked(arguments.images)
     print_heading(["scikit-image"])
-    images = Path(arguments.images)
     picture_table(images).print(arguments.markdown)
     known_table(silhouettes(images)).print(arguments.markdown)
     jobs_table(images, 1 if arguments.quick else 3).print(arguments.markdown)

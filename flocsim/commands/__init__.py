@@ -28,7 +28,7 @@ SUMMARIES = {
 """{command: what it does}, in the order of the help, which needs no more of them than this."""
 
 FOLDER_HELP = (
-    "where the config of the results lay, its shape library and its own modules, which are run "
+    "folder of the config of the results, its shape library and its own modules, which are run "
     "then whatever they are (default: where the results lie, and modules only as the results keep "
     "them)"
 )

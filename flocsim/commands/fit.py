@@ -51,9 +51,9 @@ def add_parser(subparsers: Any) -> None:
         help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default: that which "
         "an OME-TIFF or ImageJ file gives)")  # fmt: skip
     add("--page", metavar="LIST",
-        help="of a stack: these pages, from 1, with commas between them, or all")  # fmt: skip
+        help="of a stack, use these pages, from 1, with commas between them, or all")  # fmt: skip
     add("--channel", metavar="K",
-        help="of several channels or colours, this one: its number from 1, or name")  # fmt: skip
+        help="of several channels or colours, use this one: number from 1, or name")  # fmt: skip
     add("--crop", metavar="X,Y,W,H",
         help="use this part of every picture: left, top, width, height in pixels")  # fmt: skip
     add("--vertices", default="4,8,16,64", metavar="LIST",
@@ -219,7 +219,7 @@ def read_options(args):
         )
     if args.band and (args.masks or args.holes):
         raise UsageError(
-            "--band goes without --masks, which say nothing of where else an outline might lie, "
+            "--band goes without --masks, which do not show where else an outline might lie, "
             "and without --holes"
         )
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)

@@ -20,13 +20,13 @@ def add_parser(subparsers: Any) -> None:
         "intervals, and where it came from. Of a study that still runs or was interrupted, its "
         "replicates so far, without touching it.",
     )
-    parser.add_argument("results", help="file that flocsim wrote, or is to write")
+    parser.add_argument("results", help="file that flocsim wrote, or is writing")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
     parser.add_argument(
         "--modules", action="store_true",
-        help="print only the modules of one's own that it was run with",
+        help="print only the user's modules that it was run with",
     )  # fmt: skip
     parser.add_argument(
         "--water", action="store_true",

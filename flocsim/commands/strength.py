@@ -27,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
     add("--flow", default="shear", metavar="FLOW",
         help="shear, u = (G y, 0), or extension, u = (G x, -G y)/2 "
         "(default: %(default)s)")  # fmt: skip
-    add("--count", type=int, metavar="K", help="so many doublets of each condition (default: all)")
+    add("--count", type=int, metavar="K", help="doublets of each condition (default: all)")
     add("--precision", type=float, default=5e-3, metavar="P",
         help="relative precision of a rate (default: %(default)g)")  # fmt: skip
     add("--jobs", type=int, default=1, metavar="N",

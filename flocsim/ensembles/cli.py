@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--heartbeat", type=float, default=SECONDS, metavar="SECONDS",
-        help="end the job where a rank has not been heard of for so long, stopped or on a machine "
+        help="end the job where a rank has been silent for this time, stopped or on a machine "
         f"that is gone (default {SECONDS:g}; 0: wait without end)",
     )  # fmt: skip
     begin = parser.add_mutually_exclusive_group()
@@ -304,7 +304,7 @@ def refused_anywhere(comm: Communicator, code: int | None = None) -> int | None:
     which = [rank for rank, each in enumerate(codes) if each is not None]
     if which and len(which) < len(codes):
         tell(
-            f"flocsim: rank {which[0]} was started with words that are no study's: start all "
+            f"flocsim: rank {which[0]} was started with invalid arguments: start all "
             "ranks with the same",
             sys.stderr,
         )

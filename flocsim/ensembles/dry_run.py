@@ -130,7 +130,7 @@ def checks_of(config, count, how):
     return (
         f"{count} of the {config.replicates} replicates of each condition "
         f"({100.0 * count / config.replicates:.2g} %){more or ','} at {how}; "
-        f"one in {THIRD_OF} of these a third time, more exactly still"
+        f"one in {THIRD_OF} of these a third time, at a still tighter tolerance"
     )
 
 

@@ -81,7 +81,7 @@ def format_table(
     return "\n".join([*lines, *graze_lines(delta)])
 
 
-GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little of collisions"
+GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
 
 
 def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
@@ -117,8 +117,8 @@ def efficiency_lines(results: Results) -> list[str]:
 
 
 RECTILINEAR = (
-    "upper bounds: bodies come along straight ways, or those of the flow, as the water that one "
-    "displaces moves no other (no hydrodynamic interaction)"
+    "upper bounds: bodies approach along straight paths, or those of the flow, as the water that "
+    "one displaces moves no other (no hydrodynamic interaction)"
 )
 """What is to be known of all widths and kernels."""
 

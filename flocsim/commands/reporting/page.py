@@ -15,7 +15,7 @@ MOST_FAILURES = 20
 def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Example]) -> str:
     """The HTML of a file; FileError as `summary_of` raises it."""
     said = summary_of(path, kind, found)
-    sections = [("results", "What was run, and what came out", facts_of(said.facts))]
+    sections = [("results", "What was run, and the results", facts_of(said.facts))]
     if said.warnings or said.failed:
         more = len(said.failed) - MOST_FAILURES
         shown = said.failed[:MOST_FAILURES]
@@ -30,7 +30,7 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
         motions = "\n".join(map(motion_of, examples))
         told = (
             "<p>The first replicate of each class, of the flocs with the most vertices, run again "
-            "from the seed. Seen from the receiving floc; frames follow the way, not the time. "
+            "from the seed. Seen from the receiving floc; frames are spaced by distance, not time. "
             "Red rings: outlines overlap there.</p>"
         )
         sections.append(("motion", "In motion", f"{told}<div class='motions'>{motions}</div>"))

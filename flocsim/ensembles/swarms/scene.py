@@ -131,8 +131,7 @@ class SwarmScene:
         "s",
         above=0.0,
         default=60.0,
-        help="time on the clock after which a replicate's state is kept, to go on from with "
-        "--resume",
+        help="wall time after which a replicate's state is kept, to go on from with --resume",
     )
     all_pairs: bool = flag(
         default=False, help="take forces without a reach for more than 200 bodies all the same"

@@ -7,8 +7,9 @@ from flocsim.errors import ImageError
 AGREEING = 0.75
 """Least share of like neighbours, in the median over labels.
 
-Of ten photographs in ../shared/images the median grey level has .25 at most, and .70 smoothed by
-2 px or more; labels have 1 where flocs lie apart, and .8 where squares of 5 px cover everything.
+Of ten photographs, listed in docs/images.md, the median grey level has .25 at most, and .70
+smoothed by 2 px or more; labels have 1 where flocs lie apart, and .8 where squares of 5 px cover
+everything.
 """
 
 BETWEEN = 0.02

@@ -156,7 +156,7 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
         panels[0].set_ylabel("relative error RE [%]")
         panels[0].set_ylim(bottom=0.0)
         title = "mean ± standard deviation\ndashed: circle of equal area"
-        panels[0].legend(title=title, alignment="left", loc="upper left", **UNCROSSED)
+        panels[0].legend(title=title, alignment="left", loc="upper right", **UNCROSSED)
         return figure
 
 

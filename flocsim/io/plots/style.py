@@ -52,6 +52,12 @@ CONTACT_COLOUR = "#D7191C"
 MARKERS = "osD^vPX*"
 MOST_LABELS = 8
 """More labels of vertex counts than this would run into each other."""
+WIDE = 5.0
+"""Ends of a logarithmic axis that differ by so much have two of 1, 2 and 5 of a decade between."""
+LONG = 1000.0
+"""Ends from which on labels at 2 and 5 would touch."""
+PLAIN = (1e-3, 2e5)
+"""Numbers that are written out."""
 LEAST_LETTERS = 8
 """Of a line of a title that is broken."""
 CROWDED = 50
@@ -189,12 +195,24 @@ def set_probability_axis(axes):
 
 
 def set_log_axis(axis):
-    """A logarithmic axis with plain numbers at 1, 2 and 5 of each decade."""
-    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+    """Ticks at 1, 2 and 5 of each decade of a logarithmic axis, everything on it being drawn; at 1
+    alone where these would touch, at round numbers where the axis is too short for two of them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    low, high = axis.get_view_interval()
+    steps = (1.0,) if high > LONG * low else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=steps) if high > WIDE * low else MaxNLocator(4))
+    axis.set_major_formatter(FuncFormatter(lambda value, place: number_words(value)))
     axis.set_minor_locator(NullLocator())
+
+
+def number_words(value):
+    """A number above 0 as on an axis: 0.5, 2000, and with a power of ten beyond PLAIN."""
+    if PLAIN[0] <= value < PLAIN[1]:
+        return f"{value:g}"
+    factor, power = f"{value:.3e}".split("e")
+    times = "" if float(factor) == 1.0 else rf"{float(factor):g}\times"
+    return f"${times}10^{{{int(power)}}}$"
 
 
 def dodge(number, count):

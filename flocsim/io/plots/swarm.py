@@ -22,6 +22,7 @@ from flocsim.io.plots.style import (
     house_style,
     new_figure,
     save_gif,
+    set_log_axis,
 )
 from flocsim.io.results.swarm_file import GONE, SwarmResults, mean
 
@@ -57,6 +58,7 @@ def snapshots(results: SwarmResults) -> Figure:
         for axes, place in zip(panels, chosen, strict=True):
             draw_bodies(axes, results, 0, int(place))
             axes.set_title(f"{times[place]:.4g} s")
+        panels[0].set_ylabel("y [µm]")
         return figure
 
 
@@ -121,8 +123,8 @@ def sizes(results: SwarmResults) -> Figure:
             axes.step(np.append(values, values[-1] * 1.3), np.append(share, 1.0), where="post",
                       color=colour, label=f"{times[place]:.4g} s")  # fmt: skip
         axes.set_xscale("log")
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.set_xlabel("bodies of a cluster")
+        set_log_axis(axes.xaxis)
+        axes.set_xlabel("bodies in the cluster")
         axes.set_ylabel("share of bodies in clusters\nup to that size")
         axes.set_ylim(0.0, 1.03)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
@@ -145,8 +147,8 @@ def classes(results: SwarmResults) -> Figure:
         axes.set_xlabel("time [s]")
         axes.set_ylabel("clusters in the box")
         axes.set_ylim(bottom=0.0)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="r_eq = √(A/π)",
-                    alignment="left")  # fmt: skip
+        title = r"$r_\mathrm{eq} = \sqrt{A/\pi}$"
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=title, alignment="left")
         return figure
 
 
@@ -255,6 +257,7 @@ def write_swarm_animation(
             figure = new_figure(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3)
             axes = figure.subplots()
             draw_bodies(axes, results, replicate, place, outlines)
+            axes.set_ylabel("y [µm]")
             axes.set_title(f"{results.scales['time'][place]:.4g} s")
             figure.canvas.draw()
             pictures.append(frame_of(figure))

@@ -100,7 +100,7 @@ def against_key(results: SweepResults) -> Figure:
         grid[0, 0].set_ylabel("share of replicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
         place_legend(grid[0, -1], end_handles(), "bars from left:\nas lines below")
-        title = ", ".join(plain(name) for name in others) + BARS + words_of(marked)
+        title = ", ".join(line_title(name, results) for name in others) + BARS + words_of(marked)
         add_line_legend(grid[1, -1], words, colours, title)
         return figure
 
@@ -116,9 +116,16 @@ def lines_of(values, place):
     return moved.reshape(moved.shape[0], -1, *moved.shape[axes - 1 :])
 
 
-def key_label(swept):
-    unit = f" [{swept.unit}]" if swept.unit not in ("1", *PREFIXED) else ""
+def key_label(swept, prefixed=PREFIXED):
+    """A key with its unit in brackets, but for units that stand at the values."""
+    unit = f" [{swept.unit}]" if swept.unit not in ("1", *prefixed) else ""
     return plain(swept.key) + unit
+
+
+def line_title(name, results):
+    """What a legend calls an axis whose values it lists as they are."""
+    swept = results.swept.get(name)
+    return key_label(swept, ()) if swept else plain(name)
 
 
 def set_key_axis(axes, swept, places):
@@ -177,7 +184,7 @@ def over_time(results: SweepResults) -> Figure:
             axes.set_xlabel("time [s]")
             axes.set_title(label, fontsize=8.0)
         panels[-1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0),
-                          title=", ".join(plain(name) for name in names))  # fmt: skip
+                          title=", ".join(line_title(name, results) for name in names))  # fmt: skip
         return figure
 
 

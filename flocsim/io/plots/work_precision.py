@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.io.plots.style import Figure, house_style, new_figure, type_titles
+from flocsim.io.plots.style import Figure, house_style, new_figure, set_log_axis, type_titles
 
 COLOURS = {"Implicit": "#0072B2", "DormandPrince54": "#D55E00"}
 MARKERS = {"Implicit": "o", "DormandPrince54": "^"}
@@ -47,7 +47,7 @@ def draw_ladders(
             rows[0, place].set_title(titles[place])
             rows[1, place].set_xlabel("CPU time of a replicate [ms]")
         rows[0, 0].set_ylabel("outcomes that flip [%]")
-        rows[1, 0].set_ylabel("error of d_c [m], bar to 90 %")
+        rows[1, 0].set_ylabel("error of $d_c$ [m], bar to 90 %")
         handles, labels = rows[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
@@ -105,14 +105,10 @@ def draw_errors(axes, rungs, chosen):
 
 
 def set_time_axis(axes):
-    """Logarithmic, with plain numbers at 1, 2 and 5."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
+    """Logarithmic, with room for the words beside the outermost points."""
     axes.set_xscale("log")
     axes.margins(x=0.12)
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, place: f"{value:g}"))
-    axes.xaxis.set_minor_locator(NullLocator())
+    set_log_axis(axes.xaxis)
 
 
 def say_tolerances(axes, line, heights, places):

@@ -69,7 +69,7 @@ ADDED = {
     ),
     5: Addition(
         {"probabilities": frozenset({"n_held"})},
-        "pairs that rest apart without touching are not told from those that miss",
+        "pairs that rest apart without touching are not distinguished from those that miss",
     ),
     6: Addition(
         {"replicates": frozenset(schema.SHAPE_COLUMNS)},

@@ -47,7 +47,7 @@ COUNTS = {
     "bonds_rest": ("f8", "1", "touching pairs that have kept their pose, without such a proof"),
     "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
     "removed": ("f8", "1", "bodies that have left the box for good"),
-    "reentered": ("f8", "1", "how often bodies have left the box and come in again"),
+    "reentered": ("f8", "1", "how often bodies have left the box and re-entered"),
     "median_error": ("f8", "m", "median over bodies of the stated error of position"),
     "error": ("f8", "m", "largest stated error of position of a body"),
 }  # fmt: skip
@@ -55,7 +55,7 @@ COUNTS = {
 
 BY_CLASS = {"n_class": ("f8", "1", "clusters of each size class")}
 SNAPSHOTS = {
-    "position": ("f8", "m, m, rad", "x, y and angle; places go on through a box that repeats"),
+    "position": ("f8", "m, m, rad", "x, y and angle; positions continue through a periodic box"),
     "velocity": ("f8", "m s-1, m s-1, rad s-1", "velocity and spin"),
 }
 """Columns (replicate, time, body, component)."""
@@ -98,7 +98,7 @@ RINGS = {
 
 BOX = {"box": ("f8", "m", "width and height of the box")}
 ENDS = {
-    "finished": ("i4", "1", "1: came to its end; 0: stopped before it"),
+    "finished": ("i4", "1", "1: finished; 0: stopped early"),
     "end_time": ("f8", "s", "time at which it ended"),
     "steps": ("i8", "1", "accepted steps of islands"),
     "rejected": ("i8", "1", "rejected steps of islands"),

@@ -77,7 +77,7 @@ def test_a_rank_that_falls_silent_ends_the_job_and_is_named(capsys):
     pass_time(beat, clock, 2.5, signs=(1,))
     assert wire.ended_with == 75
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith("flocsim: rank 2 (node2, process 7) has not been heard of for 6 s")
+    assert line.startswith("flocsim: rank 2 (node2, process 7) has been silent for 6 s")
     assert "continue with --resume" in line
     beat.turn()
     assert capsys.readouterr().err == ""
@@ -194,7 +194,7 @@ def test_a_frozen_rank_ends_the_job_which_keeps_its_rows(tmp_path, ranks, words,
             os.kill(job.pid, signal.SIGCONT)
         assert job.wait(timeout=30) == 75
         lines = (tmp_path / "errors.txt").read_text().splitlines()
-        told = [line for line in lines if "has not been heard of for 2 s" in line]
+        told = [line for line in lines if "has been silent for 2 s" in line]
         assert f"flocsim: rank {frozen} (" in told[0] and f"process {pids[frozen]})" in told[0]
         assert not any("Traceback" in line for line in lines)
         assert rows_in(journal) >= kept > 0

@@ -257,6 +257,11 @@ def test_the_figure_shows_the_share_that_has_opened():
     figure = over_rate(mixed())
     lines = [line for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata())]
     assert any(np.allclose(line.get_ydata(), [1 / 3, 2 / 3]) for line in lines)
+    legends = [axes.get_legend() for axes in figure.axes if axes.get_legend()]
+    named = {(h.get_color().tobytes(), h.get_marker()) for h in legends[0].get_lines()}
+    points = {(line.get_color().tobytes(), line.get_marker()) for line in lines
+              if line.get_marker() != "None"}  # fmt: skip
+    assert points and points <= named
 
 
 @pytest.fixture

@@ -232,4 +232,4 @@ def test_what_is_no_study_is_done_by_one_rank(tmp_path):
     assert done.returncode == 0, done.stderr
     alone = run_command(tmp_path, *words, module="flocsim")
     assert done.stdout == alone.stdout
-    assert done.stderr.count("is the work of one rank") == 1
+    assert done.stderr.count("runs on one rank; the others") == 1

@@ -6,11 +6,9 @@ import re
 import pytest
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots.collision import (
-    draw_distance,
-)
+from flocsim.io.plots.collision import draw_distance
 from flocsim.io.plots.results import figure_4
-from flocsim.io.plots.style import save
+from flocsim.io.plots.style import new_figure, save, set_log_axis
 from tests.helpers.synthetic_results import make_results
 
 
@@ -50,3 +48,22 @@ def test_the_users_matplotlibrc_changes_nothing():
     usual = picture()
     with matplotlib.rc_context({"font.size": 30, "lines.linewidth": 9, "axes.facecolor": "red"}):
         assert picture() == usual
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (0.4, 12.0, ["0.5", "1", "2", "5", "10"]),
+        (1e3, 2e6, ["1000", "10000", "100000", r"$10^{6}$"]),
+        (5e-5, 3e-4, [r"$5\times10^{-5}$", r"$10^{-4}$", r"$2\times10^{-4}$"]),
+        (6e4, 1.3e5, ["60000", "80000", "100000", "120000"]),
+    ],
+)
+def test_a_logarithmic_axis_has_round_numbers_that_fit(low, high, words):
+    axes = new_figure(3.0, 2.0).subplots()
+    axes.set(xscale="log", xlim=(low, high))
+    set_log_axis(axes.xaxis)
+    at = axes.xaxis.get_majorticklocs()
+    labels = axes.xaxis.get_major_formatter().format_ticks(at)
+    shown = [word for place, word in zip(at, labels, strict=True) if low <= place <= high]
+    assert shown == words
