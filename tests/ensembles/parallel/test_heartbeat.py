@@ -87,7 +87,7 @@ def test_the_others_leave_a_rank_0_that_is_silent():
     beat, wire, clock = heartbeat(rank=1)
     pass_time(beat, clock, 8.0)
     assert wire.ended_with == 75
-    assert beat.words([0]).startswith("rank 0 (node0, process 7) has not")
+    assert beat.words([0]).startswith("rank 0 (node0, process 7) has been silent")
 
 
 def test_time_in_which_this_rank_was_stopped_itself_does_not_count():
