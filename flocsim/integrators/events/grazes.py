@@ -227,14 +227,26 @@ def rattles(work, row):
     return False
 
 
+def is_alone(work, row):
+    """Whether its bodies touch, or have touched lately, at its contact point only."""
+    for other in range(work.tally[at.CANDIDATES]):
+        if work.candidates[other, at.PAIR] != work.candidates[row, at.PAIR]:
+            continue
+        touches = work.candidates[other, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, other] > 0.0
+        if touches and not near(work, row, other):
+            return False
+    return True
+
+
 def count_flight(work, clock, step, row):
     """Count how often a pair, which has touched, was apart by far less than the tolerance.
 
     Where a single step has led from parting to touching again, no end of a step has seen it apart:
-    it has flown a quarter of the way that its rate would have led, as on a parabola.
+    it has flown a quarter of the way that its rate would have led, as on a parabola. This counts
+    where the bodies touch nowhere else; contacts that throw each other open in turn are followed.
     """
     flight = work.slip[at.FLIGHT, row]
-    if flight == 0.0:
+    if flight == 0.0 and is_alone(work, row):
         flight = 0.25 * step * abs(normal_rate(work, at.NOW, row))
     if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
         work.slip[at.FLIGHTS, row] = 0.0
