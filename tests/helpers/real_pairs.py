@@ -8,9 +8,9 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.arrays import work_of
+from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
-from flocsim.geometry.shapes.parts import core_gap
 from flocsim.hydrodynamics import prism
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from tests.helpers.fast_scene import right_hand_side
@@ -38,17 +38,11 @@ def resized(shape, radius=SIZE):
     return SpheroPolygon(scale * np.array(shape.vertices), scale * shape.radius)
 
 
-def gap_between(shapes, places):
-    first, second = (
-        shape.placed_parts(*place) for shape, place in zip(shapes, places, strict=True)
-    )
-    return min(core_gap(a, b) - a.radius - b.radius for a in first for b in second)
-
-
 def pose(rng, shapes, gap):
     """Places (2, 3) at random angles and a gap of the outlines [m]."""
     towards, *angles = rng.uniform(0.0, 2.0 * math.pi, 3)
     n = np.array([math.cos(towards), math.sin(towards)])
+    bodies = [Body(shape, density=2000.0) for shape in shapes]
 
     def places(distance):
         return np.array([[0.0, 0.0, angles[0]], [*(distance * n), angles[1]]])
@@ -56,7 +50,7 @@ def pose(rng, shapes, gap):
     low, high = 0.0, sum(shape.bounding_radius for shape in shapes) + 2.0 * gap
     for _ in range(50):
         middle = 0.5 * (low + high)
-        near = gap_between(shapes, places(middle)) < gap
+        near = gap_of(bodies, places(middle)) < gap
         low, high = (middle, high) if near else (low, middle)
     return places(high)
 

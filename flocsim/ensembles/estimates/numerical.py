@@ -213,17 +213,17 @@ def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
     and with SEEN_BEFORE."""
     f, c, u = (
         np.append(each.ravel(), before)
-        for each, before in ((flipped, SEEN_BEFORE[0]), (checked, SEEN_BEFORE[1]), (exposed, NONE))
+        for each, before in zip((flipped, checked, exposed), SEEN_BEFORE, strict=True)
     )
     more = further_flips(f, c, u, EACH_SIDE)
     return FurtherFlips(*(each[: flipped.size].reshape(flipped.shape) for each in more))
 
 
-SEEN_BEFORE = [0, 1], [250, 250]
+SEEN_BEFORE = [0, 1], [250, 250], [0, 0]
 """How many third runs ended otherwise than second ones, of how many, where that was looked at
-(benchmarks.accuracy.numerical_error), as in two conditions: without them a study of one condition,
-of which a few replicates are run a third time, would know next to nothing of this."""
-NONE = np.zeros(2)
+(benchmarks.accuracy.numerical_error), as in two conditions, of which none is left: without them a
+study of one condition, of which a few replicates are run a third time, would know next to nothing
+of this."""
 
 
 def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

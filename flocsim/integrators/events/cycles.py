@@ -17,7 +17,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.grazes import hums
+from flocsim.integrators.events.grazes import hums, takes_part
 from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.events.resolution import above_rounding
 
@@ -114,11 +114,6 @@ def modes_of(work):
         mode = 3 * work.candidates[row, at.CLOSED] + work.candidates[row, at.SLIDING] + 1
         code = (code * BASE + mode + 1) % MODULUS
     return code
-
-
-def takes_part(work, row):
-    """Whether a pair touches, or has done so a moment ago."""
-    return work.candidates[row, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, row] > 0.0
 
 
 def any_hums(work):

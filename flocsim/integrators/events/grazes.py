@@ -227,13 +227,16 @@ def rattles(work, row):
     return False
 
 
+def takes_part(work, row):
+    """Whether a pair touches, or has done so a moment ago."""
+    return work.candidates[row, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, row] > 0.0
+
+
 def is_alone(work, row):
     """Whether its bodies touch, or have touched lately, at its contact point only."""
     for other in range(work.tally[at.CANDIDATES]):
-        if work.candidates[other, at.PAIR] != work.candidates[row, at.PAIR]:
-            continue
-        touches = work.candidates[other, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, other] > 0.0
-        if touches and not near(work, row, other):
+        same = work.candidates[other, at.PAIR] == work.candidates[row, at.PAIR]
+        if same and takes_part(work, other) and not near(work, row, other):
             return False
     return True
 
