@@ -1,11 +1,14 @@
 """Two real flocs in water, by `[forces.hydrodynamics]` and the drag of their shape, against rigid
 multiblobs of both: by how much how fast they move is off.
 
-python -m benchmarks.accuracy.water_pairs
+python -m benchmarks.accuracy.water_pairs [--quick] [--markdown] [--images DIR]
 """
+
+from functools import partial
 
 import numpy as np
 
+from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from tests.helpers.real_pairs import (
     Resistance,
@@ -32,9 +35,9 @@ def differences(shapes, places):
     return [*lines, np.max(np.linalg.norm(ours - theirs, axis=2) / speed[:, None])]
 
 
-def table_of(count):
+def table_of(count, images):
     """By the gap: the rms of a difference and the largest, in per cent."""
-    rng, flocs = np.random.default_rng(1), real_flocs(16)
+    rng, flocs = np.random.default_rng(1), real_flocs(16, read=partial(silhouettes, images))
     table = Table(f"{count} pairs at each gap, rms and largest, %", ("gap", *MOTIONS))
     for gap in GAPS:
         off = 100.0 * np.array([differences(*random_pair(rng, flocs, gap)) for _ in range(count)])
@@ -46,9 +49,10 @@ def table_of(count):
 
 def main():
     """Print the table."""
-    arguments = parse_arguments(__doc__)
+    arguments = parse_arguments(__doc__, images=PICTURES)
+    images = checked(arguments.images, "silhouettes")
     print_heading()
-    table_of(4 if arguments.quick else 20).print(arguments.markdown)
+    table_of(4 if arguments.quick else 20, images).print(arguments.markdown)
 
 
 if __name__ == "__main__":

@@ -26,9 +26,10 @@ COVERINGS = 150, 300
 
 
 @cache
-def real_flocs(count, vertices=24, least=60):
-    """Shapes of the first silhouettes of so many pixels at least, all of one size."""
-    masks = [mask for mask, _ in silhouettes() if mask.sum() >= least][:count]
+def real_flocs(count, vertices=24, least=60, read=silhouettes):
+    """Shapes of the first silhouettes of so many pixels at least, all of one size; ``read`` gives
+    pairs (mask, r_eq)."""
+    masks = [mask for mask, _ in read() if mask.sum() >= least][:count]
     return [resized(fit_mask(mask, vertices=vertices, radius=1.0).shape) for mask in masks]
 
 
