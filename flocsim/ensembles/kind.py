@@ -131,9 +131,9 @@ class StudyKind:
         """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
         raise NotImplementedError
 
-    def uncompiled(self) -> list[Code]:
-        """The kinds of code that no run on this machine has compiled, as far as can be told before
-        they are run."""
+    def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
+        """Those that no run on this machine has compiled, as far as can be told before they are
+        run."""
         return []
 
     def run_task(

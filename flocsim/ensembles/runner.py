@@ -313,14 +313,14 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
 
 
 def compile_in_turn(study, comm, stored=()):
-    """Every kind of code is compiled by one rank, or, where there is but one, in copies of it; then
-    all load what the others made.
+    """Every kind of code is compiled by one rank, in a copy of it; then all load what the others
+    made.
 
     UsageError where the first rows are not the same on all ranks, and as ``stored``.
     """
-    if isinstance(comm, SerialCommunicator):
-        in_copies([partial(study.compile, [kind]) for kind in study.uncompiled()])
-    study.compile(study.kinds[comm.rank :: comm.size])
+    own = study.kinds[comm.rank :: comm.size]
+    in_copies([partial(study.compile, [kind]) for kind in study.uncompiled(own)])
+    study.compile(own)
     comm.barrier()
     rows = first_rows.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))

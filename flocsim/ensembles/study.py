@@ -319,11 +319,11 @@ class Study(StudyKind):
         """
         return {kind: self.run(*kind, self.config.scene.delta[0], 0) for kind in kinds}
 
-    def uncompiled(self) -> list[Code]:
-        """The kinds whose engine is not on the disk."""
+    def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
+        """Those whose engine is not on the disk."""
         delta = self.config.scene.delta[0]
         return [
-            kind for kind in self.kinds
+            kind for kind in kinds
             if not is_on_disk(self.driver(self.draw(*kind, delta, 0).encounter))
         ]  # fmt: skip
 

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body
+from flocsim.compiler.composer import is_on_disk
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
@@ -144,6 +145,10 @@ class SwarmStudy(StudyKind):
             self.trial = trial_of(self.first)
             found[code] = {"trial": self.trial}
         return found
+
+    def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
+        """All where the engine is not on the disk: a swarm has but one."""
+        return [] if is_on_disk(self.first.begin(TRIAL_SECONDS).runner.driver) else list(kinds)
 
     def run_task(
         self, place: Place, replicate: int, halted: Callable[[], bool], left: Left | None = None,

@@ -1,5 +1,6 @@
 """What copies of the process do for it."""
 
+import json
 import os
 import signal
 import subprocess
@@ -8,14 +9,17 @@ import time
 from functools import partial
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from flocsim.compiler import composer
+from flocsim.ensembles import runner
 from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.processes import in_copies
 from tests.helpers.small_study import small_config
+from tests.helpers.swarm_study import swarm_config
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux")
 
@@ -94,12 +98,49 @@ def test_a_study_knows_which_engines_the_disk_has(tmp_path, monkeypatch):
     config = small_config(tmp_path, {"shapes": {"vertices": [1, 4]}})
     study = study_of(config, flocs_of(config))
     study.compile(study.kinds)
-    assert study.uncompiled() == []
+    assert study.uncompiled(study.kinds) == []
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-    assert study.uncompiled() == study.kinds
+    assert study.uncompiled(study.kinds) == study.kinds
     (tmp_path / "cache").mkdir()
     name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).code.name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
-    assert study.uncompiled() == study.kinds[1:]
+    assert study.uncompiled(study.kinds) == study.kinds[1:]
     monkeypatch.setattr(composer.disk_cache, "is_writable", lambda folder: False)
-    assert study.uncompiled() == []
+    assert study.uncompiled(study.kinds) == []
+
+
+def test_a_study_of_swarms_knows_whether_the_disk_has_its_engine(tmp_path, monkeypatch):
+    study = study_of(swarm_config(tmp_path))
+    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "cache").mkdir()
+    assert study.uncompiled(study.kinds) == study.kinds
+    name = study.first.begin(1.0).runner.driver.code.name
+    (tmp_path / "cache" / f"{name}-1234.code").touch()
+    assert study.uncompiled(study.kinds) == []
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_each_rank_compiles_its_own_kinds_in_a_copy(tmp_path, monkeypatch, rank):
+    config = small_config(tmp_path, {"shapes": {"vertices": [1, 4]}})
+    study = study_of(config, flocs_of(config))
+    compiled = tmp_path / "compiled"
+    monkeypatch.setattr(type(study), "uncompiled", lambda self, kinds: list(kinds))
+    monkeypatch.setattr(type(study), "compile", lambda self, kinds: note(compiled, kinds))
+    monkeypatch.setattr(runner.first_rows, "packed", lambda study, rows: b"")
+    comm = SimpleNamespace(
+        rank=rank,
+        size=2,
+        barrier=lambda: None,
+        gather=lambda value: None,
+        broadcast=lambda value: None,
+    )
+    runner.compile_in_turn(study, comm)
+    lines = [json.loads(line) for line in compiled.read_text().splitlines()]
+    own = [list(study.kinds[rank])]
+    assert [kinds for _, kinds in lines] == [own, own, [list(each) for each in study.kinds]]
+    assert [number == os.getpid() for number, _ in lines] == [False, True, True]
+
+
+def note(path, kinds):
+    with path.open("a") as file:
+        file.write(json.dumps([os.getpid(), list(kinds)]) + "\n")
