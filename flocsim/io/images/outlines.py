@@ -51,8 +51,15 @@ RATIO = 1.12
 """Between two levels that are looked at, above the base."""
 
 STEEP = 0.8
-"""Share of the greatest steepness from which an outline is at its edge.  A step blurred by a
-Gaussian is that steep from .25 to .75 of its height: the middle of these levels is its half."""
+"""Share of the steepness of an edge from which an outline is at it.  A step blurred by a Gaussian
+is that steep from .25 to .75 of its height: the middle of these levels is its half."""
+
+OUTER = 0.6
+"""Share of the greatest steepness that makes an edge of a rise from which it falls again by DIP:
+where layers begin at one place, they are steeper together than the rim is elsewhere."""
+
+DIP = 0.93
+"""What is left of the steepness of an edge between it and the next."""
 
 SPAN = 3.0
 """The ratio of these two levels: what is steep beyond is another layer."""
@@ -261,7 +268,7 @@ class Search:
         return found
 
     def level(self, focus, mask, box, base):
-        """The level in the middle of the lowest ones at which the outline is steep."""
+        """The level in the middle of those of the lowest edge."""
         from scipy.ndimage import binary_dilation
 
         near = binary_dilation(mask, iterations=2)
@@ -278,15 +285,27 @@ class Search:
         count = np.maximum(smoothed(pixels, few), 1.0)
         steep = np.sqrt(np.maximum(smoothed(squares, few) / count - focus.noise, 0.0))
         above = np.cumsum(pixels[::-1])[::-1]
-        greatest = steep[above >= LARGE * mask.sum()].max(initial=0.0)
-        if greatest <= 0.0:
-            return base
-        at_edge = steep >= STEEP * greatest
-        first = int(np.argmax(at_edge))
-        behind = np.flatnonzero(~at_edge[first:])
-        last = first + int(behind[0]) - 1 if behind.size else len(steep) - 1
         middles = np.sqrt(edges[1:] * edges[:-1])
+        first, last = edge_of(steep, (middles >= self.floor) & (above >= LARGE * mask.sum()))
+        if last < first:
+            return base
         return base + 0.5 * float(middles[first] + min(middles[last], SPAN * middles[first]))
+
+
+def edge_of(steep, told):
+    """(first, last) of the levels of the lowest edge; ``told``: which of them tell where it is. Of
+    none the last lies before the first."""
+    seen = np.where(told, steep, 0.0)
+    highest = np.maximum.accumulate(seen)
+    greatest = highest[-1]
+    if greatest <= 0.0:
+        return 0, -1
+    fallen = np.flatnonzero((steep < DIP * highest) & (highest >= OUTER * greatest))
+    peak = int(np.argmax(seen[: fallen[0]] if fallen.size else seen))
+    at_edge = steep >= STEEP * steep[peak]
+    before, behind = np.flatnonzero(~at_edge[:peak]), np.flatnonzero(~at_edge[peak:])
+    first = int(before[-1]) + 1 if before.size else 0
+    return first, peak + int(behind[0]) - 1 if behind.size else len(steep) - 1
 
 
 def overlap(box, other):
