@@ -151,7 +151,7 @@ def test_a_file_without_rates_has_no_tables(folder, capsys):
     (folder / "two.toml").write_text(text + "[shapes]\nvertices = [1]\n", "utf-8")
     assert main(["ensemble", "two.toml", "--quiet"]) == 0
     assert main(["export", "csv", "two.h5"]) == 2
-    assert "two.h5 is of no kernel study" in capsys.readouterr().err
+    assert "two.h5 is not from a kernel study" in capsys.readouterr().err
 
 
 def test_a_dry_run_says_what_would_be_run(folder, capsys):

@@ -126,7 +126,9 @@ def test_info_tells_how_many_were_run_again_and_flipped(study, tmp_path, capsys)
     checked, flipped = table["n_checked"].sum(), table["n_flipped"].sum()
     call(info, study)
     fact = facts_printed(capsys.readouterr().out)["numerical error"]
-    assert fact.startswith(f"{checked} replicates were run again more exactly, {flipped} of them")
+    assert fact.startswith(
+        f"{checked} replicates were run again more accurately, {flipped} of them"
+    )
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

@@ -41,7 +41,7 @@ def test_more_attraction_lets_more_touch(tmp_path):
 
 
 @pytest.mark.parametrize(("scene", "more", "words"), [
-    ('receiver = "fixed"', "", "where one is held: choose scene.receiver = 'free'"),
+    ('receiver = "fixed"', "", "with a fixed receiver: choose scene.receiver = 'free'"),
     ("", '[forces.thermal]\ntemperature = "293 K"', "where they are kicked"),
     ("", '[fluid]\ngradient = [0.0, 10.0, 0.0, 0.0]', "where they settle in a flow"),
 ])  # fmt: skip

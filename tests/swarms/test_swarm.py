@@ -161,7 +161,9 @@ def test_what_a_swarm_cannot_do_is_said():
     Swarm(few, [Everywhere()])
     with pytest.raises(UsageError, match="the box is 2e-05 m wide"):
         Swarm(few, forces(), box=(2e-5, None))
-    with pytest.raises(UsageError, match="the flow changes along y, along which the box repeats"):
+    with pytest.raises(
+        UsageError, match="the flow varies along y, along which the box is periodic"
+    ):
         Swarm(few, forces(), fluid=Fluid(gradient=(0.0, 1.0, 0.0, 0.0)), box=(SIDE, SIDE))
     with pytest.raises(UsageError, match="at least one body that moves"):
         Swarm([floor(SIDE)], forces())

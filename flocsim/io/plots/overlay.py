@@ -211,7 +211,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         )  # fmt: skip
         for axes, text in zip(panels, words, strict=True):
             axes.set_title(text, fontsize=8)
-        panels[3].text(0.0, -0.02, "blue: left out, orange: too much", fontsize=7, va="top",
+        panels[3].text(0.0, -0.02, "blue: missing, orange: in excess", fontsize=7, va="top",
                        transform=panels[3].transAxes)  # fmt: skip
         if name:
             figure.suptitle(plain(visible(name, keep="")), x=0.01, ha="left", fontsize=9)

@@ -260,7 +260,7 @@ def against_size(results: Results) -> Figure:
         figure, panels, _ = panel_grid(titles, LABELS["pr_a"], x_label="approaching $r_j$ [µm]")
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
-        missing = "the sizes are not known" if results.pooled else "not yet pooled"
+        missing = "sizes unknown" if results.pooled else "not yet pooled"
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
             axes.set_xscale("log")

@@ -36,7 +36,7 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
         how = low if low == high else f"{low} to {high}"
         parts.append(f"{len(sure)} parted at necks, confidence {how} (--neck 0 joins them)")
     if found.annotated:
-        parts.append("a scale bar or its writing left out")
+        parts.append("a scale bar or its label left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
@@ -51,8 +51,8 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         if coarse:
             print(
                 f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not "
-                f"below r_eq of {plural(coarse, 'floc')}, which it cannot follow; use a smaller "
-                "--radius",
+                f"below r_eq of {plural(coarse, 'floc')}, whose outline the fit cannot follow; use "
+                "a smaller --radius",
                 file=sys.stderr,
             )
 

@@ -88,7 +88,7 @@ def fill(file, name):
 
 INSTEAD = {
     "external": (external, "values in another file"),
-    "virtual": (virtual, "in pieces, packed|another dataset|flocsim does not write"),
+    "virtual": (virtual, "chunked, compressed|another dataset|flocsim does not write"),
     "packed": (bomb, "filters or compression"),
     "filled": (fill, "flocsim does not write|value of its own|bytes of values"),
     "soft link": (lambda f, n: f.__setitem__(n, h5py.SoftLink("/run")), "link"),
@@ -185,7 +185,7 @@ def test_the_newest_format_is_refused_not_followed(tmp_path):
     with h5py.File(image, "w", libver="latest") as file:
         file.attrs["format"] = "flocsim results"
     (tmp_path / "r.h5").write_bytes(seal(image.getvalue()))
-    refused(tmp_path / "r.h5", "another one than h5py writes")
+    refused(tmp_path / "r.h5", "not the one that h5py writes")
 
 
 def put(name, place, value):

@@ -112,7 +112,7 @@ def test_commands_read_it(stored, version, monkeypatch, capsys):
     assert "Traceback" not in said.err
     opened = flocsim.open(name)
     assert opened.types == ("I", "III") and "Pr[inside]" in opened.table()
-    with pytest.raises(UsageError, match="cannot be run again as it was: "):
+    with pytest.raises(UsageError, match="cannot be reproduced: "):
         opened.replicate(0)
 
 
@@ -170,5 +170,5 @@ def test_no_file_says_itself_that_it_was_older(tmp_path):
     with h5py.File(image, "r+") as file:
         file.attrs[older.WRITTEN_AS] = 2
     (tmp_path / "r.h5").write_bytes(seal(image.read_bytes()))
-    with pytest.raises(FileError, match="which no file has"):
+    with pytest.raises(FileError, match="which no file of flocsim has"):
         read_results(tmp_path / "r.h5")
