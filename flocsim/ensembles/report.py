@@ -297,7 +297,7 @@ def change_lines(results: Results) -> list[str]:
     return [
         f"{what} Pr[A] would change by {worst} at most, 95 %"
         for what, group, name in (
-            ("run exactly,", results.numerics, "pr_a_change"),
+            ("if all replicates were exact,", results.numerics, "pr_a_change"),
             (shape, results.outlines, "pr_a_shape"),
         )
         if (worst := worst_changes(results, group, name))

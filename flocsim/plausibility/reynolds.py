@@ -85,7 +85,7 @@ def beyond_the_law(bodies: Sequence[Settled], forces: dict[str, Any]) -> str:
     if worst.reynolds <= drag.serves_up_to:
         return ""
     advice = (
-        f'{name} takes law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
+        f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
         if drag.law == "stokes"
         else "use smaller or lighter bodies, or a drag of your own"
     )

@@ -170,7 +170,7 @@ def conditions(results: Results) -> Facts:
         ("preset", preset(results.run)),
         *axes_of(results),
         ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
-        *([("over the config", json.dumps(over))] if over else []),
+        *([("overrides", json.dumps(over))] if over else []),
     ]
 
 
@@ -226,7 +226,7 @@ def outcomes(results: Overview) -> Facts:
     if any(number for _, number in named):
         rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))
     if totals.count:
-        steps = f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
+        steps = f"{totals.steps / totals.count:.4g} on average, {totals.most_steps} at "
         steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
         rows.append(("steps", steps))
     return rows
