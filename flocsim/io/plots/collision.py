@@ -139,7 +139,7 @@ def strip_keys(names, seen_from):
               label=f"body {name}")
         for number, name in shown
     ]  # fmt: skip
-    seen = "" if seen_from is None else f", in the frame of {names[seen_from]}"
+    seen = "" if seen_from is None else f", seen from {names[seen_from]}"
     keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
                        label=f"path of a body's centre, whole run{seen}"))  # fmt: skip
     keys.append(Line2D([], [], **RING, label="contact"))
