@@ -60,7 +60,7 @@ def test_a_pixel_size_with_its_unit(tmp_path, frame):
 
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
     options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
-    with pytest.raises(UsageError, match=r"reaches .* m far"):
+    with pytest.raises(UsageError, match=r"reaches .* m, "):
         run(frame, "--pixel-size", "8.6", *options)
     capsys.readouterr()
     assert run(frame, "--pixel-size", "8.6 mm", *options) == 0
@@ -485,7 +485,10 @@ def test_masks_without_a_picture_are_told_and_drawn_by_themselves(tmp_path, fram
         (("--masks", "--pictures", "frames"), "give --masks and --overlay"),
         (("--overlay", "o.png", "--pictures", "frames"), "give --masks and --overlay"),
         (("--masks", "--overlay", "o.png", "--pictures", "none"), "takes a folder, found 'none'"),
-        (("--masks", "--overlay", "o.png", "--pictures", "frames"), "a.bmp and a.png, so that"),
+        (
+            ("--masks", "--overlay", "o.png", "--pictures", "frames"),
+            "a.bmp and a.png, so the picture",
+        ),
     ],
 )
 def test_pictures_beneath_that_cannot_be_used_are_refused(

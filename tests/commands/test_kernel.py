@@ -54,7 +54,7 @@ def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
     assert "--curvilinear is for matrices, not csv" in capsys.readouterr().err
     words = ["export", "matrix", "kernel.h5", "--what", "beta3", "--curvilinear", "burd"]
     assert main(words) == 2
-    assert "not beta3: take efficiency" in capsys.readouterr().err
+    assert "not beta3: use efficiency" in capsys.readouterr().err
     kernel = flocsim.open("kernel.h5").kernel
     assert kernel.arrays["width_c"][0, 0, 0, 1] == pytest.approx(6e-5, rel=1e-12)
 
@@ -181,7 +181,10 @@ def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch
     assert main(["info", "kernel.h5"]) == 0 and line[17:80] in capsys.readouterr().out
     assert main(["plot", "kernel.h5"]) == 0
     assert main(["export", "matrix", "kernel.h5"]) == 0
-    assert "it is not known" in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+    assert (
+        "an empty cell is unknown"
+        in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+    )
     with pytest.warns(flocsim.errors.PlausibilityWarning, match="rates have no estimate"):
         again = flocsim.Study("kernel.toml").run(output="again.h5")
     assert np.isnan(again.kernel.arrays["beta2"]).all()

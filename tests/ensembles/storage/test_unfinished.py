@@ -102,7 +102,7 @@ def test_finished_results_are_read_themselves(tmp_path):
     [
         (
             {"types": ["I", *map(str, range(300))], "delta": [*range(300)]},
-            "is of 180600 conditions",
+            "has 180600 conditions",
         ),
         ({"types": ["I"] * 300}, "the same condition twice"),
     ],

@@ -105,7 +105,7 @@ def test_a_file_in_the_way_is_left_alone(finished):
     before = (folder / "small.h5").read_bytes()
     with pytest.raises(UsageError, match=r'already exists.*mode="resume".*overwrite=True'):
         study.run(output=folder / "small.h5")
-    with pytest.raises(UsageError, match="is read"):
+    with pytest.raises(UsageError, match="is an input"):
         study.run(output=study.path)
     assert (folder / "small.h5").read_bytes() == before
     again = study.run(output=folder / "small.h5", mode="resume")

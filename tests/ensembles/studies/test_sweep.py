@@ -102,7 +102,7 @@ def test_a_grid_has_an_axis_for_each_key(tmp_path):
         ({"seed": [1, 2]}, "cannot be swept"),
         ({"output.file": ["a"]}, "cannot be swept"),
         ({HAMAKER: ["5 kg"]}, "hamaker must be"),
-        ({HAMAKER: [1e-20, "1e-20 J"]}, "one value twice"),
+        ({HAMAKER: [1e-20, "1e-20 J"]}, "same value twice"),
     ],
 )
 def test_what_cannot_be_swept_is_told(tmp_path, over, text):
