@@ -154,7 +154,7 @@ def reach_words(system, force):
     """How far a pair force reaches, and whether it does so at the start."""
     if not force.reach < math.inf:
         return "at every gap"
-    words = f"not called at gaps from {force.reach:.3g} m on"
+    words = f"not called at gaps above {force.reach:.3g} m"
     nearest = least_gap(system.bodies, force)
     if nearest >= force.reach:
         words += f" (out of range at the start, where gaps are at least {nearest:.3g} m)"

@@ -303,7 +303,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         "forces and code:",
         *code_lines(config, measured),
         "  out: trajectories: an ensemble records none (see `flocsim trajectory`)",
-        "  out: plots: none is drawn (see `flocsim plot`)",
+        "  out: plots: none are drawn (see `flocsim plot`)",
         *(["  out: MPI: not needed for one rank"] if ranks == 1 else []),
         "stiffness:",
         *(

@@ -343,7 +343,7 @@ def names_in(config: Config, acting: Sequence[Force]) -> Names:
 
 
 IMPLIED = (
-    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as much "
+    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as dense "
     "as water at its sizes: they settle too fast for Stokes's drag, and shape decides the outcome. "
     'At real weight (preset = "si") whatever touches stays together: see docs/presets.md'
 )
