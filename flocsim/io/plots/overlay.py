@@ -73,7 +73,7 @@ def draw_overlay(
             for ring in swept_rings(fit.parts):
                 axes.plot(*(ring * (1.0, -1.0) + (first_column - 1, first_row - 1)).T,
                           color=FLOC_COLOUR, linewidth=0.8)  # fmt: skip
-            sure = "" if region.parted != region.parted else f" parted, {region.parted:.2f}"
+            sure = "" if region.parted != region.parted else f" separated, {region.parted:.2f}"
             labels.put(f"{region.label}{sure}", region.bbox, FLOC_COLOUR, 7)
             for mask in region.band or ():
                 draw_mask(axes, mask, region.bbox, FLOC_COLOUR, linewidths=0.3)

@@ -29,12 +29,12 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     if reasons:
         parts.append(f"rejected {' and '.join(reasons)}")
     if found.left_whole:
-        parts.append(f"{found.left_whole} with necks not parted (--neck)")
+        parts.append(f"{found.left_whole} with necks not separated (--neck)")
     sure = [each.parted for each in found.regions if each.parted == each.parted]
     if sure:
         low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
         how = low if low == high else f"{low} to {high}"
-        parts.append(f"{len(sure)} parted at necks, confidence {how} (--neck 0 joins them)")
+        parts.append(f"{len(sure)} separated at necks, confidence {how} (--neck 0 joins them)")
     if found.annotated:
         parts.append("a scale bar or its label left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
