@@ -27,7 +27,9 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
         parts.append(f"the {fitted} largest fitted")
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
-        parts.append(f"rejected {' and '.join(reasons)}")
+        *others, last = reasons
+        listed = f"{', '.join(others)} and {last}" if others else last
+        parts.append(f"rejected {listed}")
     if found.left_whole:
         parts.append(f"{found.left_whole} with necks not separated (--neck)")
     sure = [each.parted for each in found.regions if each.parted == each.parted]
