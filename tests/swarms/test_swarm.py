@@ -155,7 +155,7 @@ class Everywhere(CentreForce):
 def test_what_a_swarm_cannot_do_is_said():
     few, _ = crowd(3, 0)
     many = [Body(Sphere(R), (3.0 * R * k, 0.0), density=1e3) for k in range(201)]
-    with pytest.raises(UsageError, match="Everywhere has no reach"):
+    with pytest.raises(UsageError, match="Everywhere has no finite reach"):
         Swarm(many, [Everywhere()])
     Swarm(many, [Everywhere()], all_pairs=True)
     Swarm(few, [Everywhere()])

@@ -96,7 +96,7 @@ INSTEAD = {
     "hard link": (lambda f, n: f.__setitem__(n, f[n.partition("/")[0]]), None),
     "group": (lambda f, n: f.create_group(n), "unknown group"),
     "empty": (lambda f, n: f.__setitem__(n, h5py.Empty("f8")), "shape that flocsim"),
-    "may grow": (lambda f, n: f.create_dataset(n, (3,), "f8", maxshape=(9,)), "may grow|pieces"),
+    "resizable": (lambda f, n: f.create_dataset(n, (3,), "f8", maxshape=(9,)), "resizable|chunked"),
     "float32": (lambda f, n: f.__setitem__(n, np.zeros(3, "f4")), "a type that flocsim"),
     "big-endian": (lambda f, n: f.__setitem__(n, np.zeros(3, ">f8")), "a type that flocsim"),
     "complex": (lambda f, n: f.__setitem__(n, np.zeros(3, "c16")), "a type that flocsim"),

@@ -78,11 +78,11 @@ def head(shape, descr="'|u1'"):
     [
         (head("(100000, 100000)"), "more than the"),
         (head("(9223372036854775807, 2)"), "more than the"),
-        (head("(1000, 1000)"), "promises 1000000 bytes"),
+        (head("(1000, 1000)"), "claims 1000000 bytes"),
         (head("(-1, 5)"), "not numbers"),
         (head("(2, 2)", "'|O'") + bytes(32), "not numbers"),
         (head("(" * 400), "cannot be read"),
-        (head("(2, 2)") + b"\0", "promises|cut short"),
+        (head("(2, 2)") + b"\0", "claims|truncated"),
         (b"", "cannot be read"),
         (b"\x93NUMPY\x09\0", "unknown"),
     ],
@@ -129,7 +129,7 @@ def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "m.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for name in "abc":
             archive.writestr(name, npy(np.zeros((600, 600), "u1")))
-    refused(tmp_path / "m.npz", "unpacked")
+    refused(tmp_path / "m.npz", "after decompression")
 
 
 @pytest.mark.parametrize(
