@@ -81,7 +81,7 @@ def format_table(
     return "\n".join([*lines, *graze_lines(delta)])
 
 
-GRAZE = "delta 1: by construction the outlines only graze, or miss; it says little about collisions"
+GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
 
 
 def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
