@@ -87,7 +87,7 @@ def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
 
 @pytest.mark.parametrize(
     ("words", "ranks", "said"),
-    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one of the two")],
+    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one or the other")],
 )
 def test_jobs_that_cannot_be_are_refused(serial, words, ranks, said):
     done = run_command(serial, "small.toml", *words, ranks=ranks)

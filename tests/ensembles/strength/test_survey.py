@@ -133,7 +133,7 @@ def test_bad_input_is_refused(fake, given, words):
     with pytest.raises(UsageError, match=words):
         survey(fake, **given)
     fake.replicates["outcome"][:] = 4
-    with pytest.raises(UsageError, match="holds no bound doublet"):
+    with pytest.raises(UsageError, match="has no bound doublet"):
         survey(fake)
 
 
