@@ -132,7 +132,11 @@ def test_it_is_not_extended_and_one_line_says_what_differs(stored, version, caps
     Path("study.toml").write_text(str(flocsim.open(path).run["config"]), "utf-8")
     assert main(["ensemble", "study.toml", "-o", path.name, "--resume", "--quiet"]) == 2
     [line] = [each for each in capsys.readouterr().err.splitlines() if "warning: " not in each]
-    said = "belongs to another study: " if version == SCHEMA_VERSION else f"of schema version {version}: "
+    said = (
+        "belongs to another study: "
+        if version == SCHEMA_VERSION
+        else f"of schema version {version}: "
+    )
     assert re.search(said, line), line
     assert path.read_bytes() == before and not Path(f"{path.name}.journal").exists()
 
